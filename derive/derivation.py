@@ -1,0 +1,93 @@
+"""Derivation: what a derivation hands on, in SymPy, before anything is lowered to code.
+
+`premises` are the physical equations as the field states them; `definitions` are the explicit
+assignments that follow from them, in an order in which they can be evaluated.  Only the
+definitions are lowered; the premises are what the checks compare the lowered kernel with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import sympy as sp
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named array: MatrixSymbol `symbol` of shape (rows, columns); columns = 1 for a vector.
+
+    `symmetric` quantities are stored as their upper triangle, row by row.
+    """
+
+    symbol: sp.MatrixSymbol
+    unit: str = ""
+    meaning: str = ""
+    symmetric: bool = False
+    accumulate: bool = False
+
+    @property
+    def name(self) -> str:
+        return str(self.symbol.name)
+
+    @property
+    def rows(self) -> int:
+        return int(self.symbol.rows)
+
+    @property
+    def columns(self) -> int:
+        return int(self.symbol.cols)
+
+
+@dataclass(frozen=True)
+class Equation:
+    """left = right; for a definition `left` is the MatrixSymbol that `right` gives a value to."""
+
+    name: str
+    left: sp.Basic
+    right: sp.Basic
+    source: str = ""
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """One element (or one step of the sweep), from its premises to explicit definitions."""
+
+    element: str
+    title: str
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    definitions: tuple[Equation, ...]
+    premises: tuple[Equation, ...] = ()
+    sources: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def definition(self, name: str) -> sp.Basic:
+        """Right-hand side of the definition of `name`; KeyError if there is none."""
+        for equation in self.definitions:
+            if str(getattr(equation.left, "name", equation.left)) == name:
+                return equation.right
+        raise KeyError(f"{self.element}: nothing defines {name!r}")
+
+
+def vector(name: str, length: int) -> sp.MatrixSymbol:
+    """Column of `length` numbers."""
+    return sp.MatrixSymbol(name, length, 1)
+
+
+def tilde(a: sp.MatrixBase | sp.MatrixExpr | Iterable[sp.Expr]) -> sp.ImmutableDenseMatrix:
+    """Cross-product matrix: tilde(a) b = a x b."""
+    x, y, z = a if not hasattr(a, "shape") else (a[0, 0], a[1, 0], a[2, 0])
+    return sp.ImmutableDenseMatrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def axial(matrix: sp.MatrixBase) -> sp.ImmutableDenseMatrix:
+    """Inverse of `tilde` on the skew part of a 3 x 3 matrix."""
+    return sp.ImmutableDenseMatrix(
+        [
+            (matrix[2, 1] - matrix[1, 2]) / 2,
+            (matrix[0, 2] - matrix[2, 0]) / 2,
+            (matrix[1, 0] - matrix[0, 1]) / 2,
+        ]
+    )

@@ -1,0 +1,1 @@
+"""mstmm: transfer matrix method for multibody systems."""

@@ -1,0 +1,37 @@
+"""Every error a user can meet: one base class, few subclasses, one exit code each.
+
+A message says which file, which element and which key, what was expected (with units), what was
+found, and one way out.  The command line prints the message alone and exits with `exit_code`.
+"""
+
+from __future__ import annotations
+
+
+class MstmmError(Exception):
+    """Base of every error raised on purpose; `exit_code` is what the command line returns."""
+
+    exit_code = 2
+
+
+class SceneError(MstmmError):
+    """A scene (file or Python object) that does not describe a system; names file and key."""
+
+
+class ExpressionError(MstmmError):
+    """Text that is not an expression of the small grammar (`mstmm.expression`)."""
+
+
+class ElementError(MstmmError):
+    """A hinge, body or force definition that contradicts itself; names the equation."""
+
+
+class EnvironmentFailure(MstmmError):
+    """Something the machine lacks: a compiler, an optional package, a writable folder."""
+
+    exit_code = 3
+
+
+class NumericalFailure(MstmmError):
+    """A computation that has no trustworthy answer; names time, element and cause."""
+
+    exit_code = 4

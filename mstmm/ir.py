@@ -1,0 +1,335 @@
+"""KernelIR: the one intermediate form between derived equations and everything that computes.
+
+A kernel is a list of scalar statements in single-assignment order over typed inputs and outputs.
+It holds plain text and whole numbers only (no SymPy), is frozen, hashable, and stored as JSON.
+
+Shapes are whole numbers, or one declared size symbol `n` (modal sizes).  With `n` present there
+are three loops and no others: an indexed sum over k < n, an indexed store over k < n and the
+primitive `solve`.  There are no branches except `select` and guards.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+#: Index that stands for the loop variable of an indexed sum or store.
+LOOP_INDEX = "k"
+
+#: Operation name -> number of operands.  The C printer, the tape and the evaluator read this table.
+OPERATIONS: dict[str, int] = {
+    "neg": 1, "add": 2, "sub": 2, "mul": 2, "div": 2, "pow": 2,
+    "sqrt": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "atan2": 2,
+    "sinh": 1, "cosh": 1, "tanh": 1, "exp": 1, "log": 1, "abs": 1, "sign": 1, "floor": 1,
+    "min": 2, "max": 2, "lt": 2, "le": 2, "eq": 2, "and": 2, "or": 2, "not": 1, "select": 3,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Port:
+    """One array a kernel reads or writes.  Arrays are dense and row-major.
+
+    `shape` holds whole numbers or the kernel's size symbol; () is a scalar (one number).
+    An output with `accumulate` is added to what the array holds (contributions to a parent body).
+    """
+
+    name: str
+    shape: tuple[int | str, ...] = ()
+    unit: str = ""
+    meaning: str = ""
+    accumulate: bool = False
+
+    def length(self, n: int = 0) -> int:
+        """Numbers in the array when the size symbol equals `n`."""
+        total = 1
+        for extent in self.shape:
+            total *= n if isinstance(extent, str) else extent
+        return total
+
+
+@dataclass(frozen=True)
+class Constant:
+    """An exact rational number, written "3", "-1/3"; or "pi"."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Element:
+    """Entry of an input or of a solved array; the index is one entry per axis, or `k` in a loop."""
+
+    port: str
+    index: tuple[int | str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Temporary:
+    """Value of the statement with this number."""
+
+    number: int
+
+
+Operand = Constant | Element | Temporary
+
+
+@dataclass(frozen=True)
+class Assign:
+    """t[number] = op(args)."""
+
+    number: int
+    op: str
+    args: tuple[Operand, ...]
+
+
+@dataclass(frozen=True)
+class Sum:
+    """t[number] = sum over k < n of the value of the last statement of `body`."""
+
+    number: int
+    body: tuple[Assign, ...]
+    value: Operand
+
+
+@dataclass(frozen=True)
+class Store:
+    """output[index] = value; with `k` in the index, `body` is run for every k < n."""
+
+    port: str
+    index: tuple[int | str, ...]
+    value: Operand
+    body: tuple[Assign, ...] = ()
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Leave the kernel with `code` unless `condition` is non-zero; `message` says what failed."""
+
+    condition: Operand
+    code: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Solve:
+    """output = A^-1 B for a symmetric positive definite run-time sized A (n x n), B (n,) or (n, m).
+
+    LDL^T without pivoting; a pivot below `relative_pivot` times its own diagonal entry leaves with
+    `code`.  Fixed sizes are unrolled when the kernel is lowered and never reach this statement.
+    """
+
+    port: str
+    matrix: str
+    right: str
+    code: int
+    message: str
+    relative_pivot: float = 1e-13
+
+
+Statement = Assign | Sum | Store | Guard | Solve
+
+
+@dataclass(frozen=True)
+class KernelIR:
+    """One kernel: what it reads, what it writes, and the statements in between."""
+
+    name: str
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    statements: tuple[Statement, ...]
+    size_symbol: str | None = None
+    purpose: str = ""
+    sources: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def operation_counts(self) -> dict[str, int]:
+        """Operations by name (bodies of loops counted once)."""
+        counts: dict[str, int] = {}
+        for statement in assignments(self):
+            counts[statement.op] = counts.get(statement.op, 0) + 1
+        return dict(sorted(counts.items()))
+
+    def flops(self) -> int:
+        """Additions, subtractions, multiplications and divisions (loop bodies once)."""
+        counts = self.operation_counts()
+        return sum(counts.get(name, 0) for name in ("add", "sub", "mul", "div"))
+
+    def hash(self) -> str:
+        """SHA-256 of the stored form: equal text, equal kernel."""
+        return hashlib.sha256(to_json(self).encode()).hexdigest()
+
+
+def assignments(kernel: KernelIR) -> Iterator[Assign]:
+    """Every assignment, those inside loops too, in order."""
+    for statement in kernel.statements:
+        if isinstance(statement, Assign):
+            yield statement
+        elif isinstance(statement, (Sum, Store)):
+            yield from statement.body
+
+
+def check(kernel: KernelIR) -> None:
+    """Refuse a kernel that uses a value before it is defined, or an unknown name, op or index."""
+    readable = {port.name: port for port in kernel.inputs}
+    writable = {port.name: port for port in kernel.outputs}
+    if len(readable) + len(writable) != len(kernel.inputs) + len(kernel.outputs):
+        raise ValueError(f"{kernel.name}: two ports share a name")
+    defined: set[int] = set()
+
+    def use(operand: Operand, in_loop: bool) -> None:
+        if isinstance(operand, Temporary):
+            if operand.number not in defined:
+                raise ValueError(f"{kernel.name}: t{operand.number} is used before it is defined")
+        elif isinstance(operand, Element):
+            check_index(operand.port, operand.index, readable, in_loop)
+
+    def check_index(
+        name: str, index: tuple[int | str, ...], ports: dict[str, Port], in_loop: bool
+    ) -> None:
+        if name not in ports:
+            raise ValueError(f"{kernel.name}: no port named {name!r}")
+        if len(index) != len(ports[name].shape):
+            raise ValueError(f"{kernel.name}: {name}{list(index)} does not fit {ports[name].shape}")
+        for entry, extent in zip(index, ports[name].shape, strict=True):
+            if entry == LOOP_INDEX and not in_loop:
+                raise ValueError(f"{kernel.name}: {name}{list(index)} outside a loop")
+            if isinstance(entry, int) and isinstance(extent, int) and not 0 <= entry < extent:
+                raise ValueError(f"{kernel.name}: {name}{list(index)} is out of range")
+
+    def define(assign: Assign, in_loop: bool) -> None:
+        if OPERATIONS.get(assign.op) != len(assign.args):
+            raise ValueError(f"{kernel.name}: {assign.op} with {len(assign.args)} operands")
+        for operand in assign.args:
+            use(operand, in_loop)
+        defined.add(assign.number)
+
+    for statement in kernel.statements:
+        if isinstance(statement, Assign):
+            define(statement, False)
+        elif isinstance(statement, Sum):
+            for assign in statement.body:
+                define(assign, True)
+            use(statement.value, True)
+            defined.difference_update(assign.number for assign in statement.body)
+            defined.add(statement.number)
+        elif isinstance(statement, Store):
+            looped = LOOP_INDEX in statement.index
+            for assign in statement.body:
+                define(assign, looped)
+            use(statement.value, looped)
+            defined.difference_update(assign.number for assign in statement.body)
+            check_index(statement.port, statement.index, writable, looped)
+        elif isinstance(statement, Guard):
+            use(statement.condition, False)
+        else:
+            # A solved array is an output that later statements may read.
+            readable[statement.port] = writable[statement.port]
+
+
+# --- stored form -----------------------------------------------------------------------------
+
+
+def _operand_to_list(operand: Operand) -> Any:
+    if isinstance(operand, Constant):
+        return operand.text
+    if isinstance(operand, Temporary):
+        return operand.number
+    return [operand.port, *operand.index]
+
+
+def _operand_from_list(data: Any) -> Operand:
+    if isinstance(data, str):
+        return Constant(data)
+    if isinstance(data, int):
+        return Temporary(data)
+    return Element(data[0], tuple(data[1:]))
+
+
+def _assign_to_list(assign: Assign) -> list[Any]:
+    return [assign.number, assign.op, *(_operand_to_list(a) for a in assign.args)]
+
+
+def _assign_from_list(data: list[Any]) -> Assign:
+    return Assign(data[0], data[1], tuple(_operand_from_list(a) for a in data[2:]))
+
+
+def _statement_to_data(statement: Statement) -> Any:
+    if isinstance(statement, Assign):
+        return _assign_to_list(statement)
+    if isinstance(statement, Sum):
+        body = [_assign_to_list(a) for a in statement.body]
+        return {"sum": statement.number, "body": body, "value": _operand_to_list(statement.value)}
+    if isinstance(statement, Store):
+        body = [_assign_to_list(a) for a in statement.body]
+        data: dict[str, Any] = {
+            "store": [statement.port, *statement.index],
+            "value": _operand_to_list(statement.value),
+        }
+        return data | ({"body": body} if body else {})
+    if isinstance(statement, Guard):
+        condition = _operand_to_list(statement.condition)
+        return {"guard": condition, "code": statement.code, "message": statement.message}
+    return {
+        "solve": [statement.port, statement.matrix, statement.right],
+        "code": statement.code,
+        "message": statement.message,
+        "relative_pivot": statement.relative_pivot,
+    }
+
+
+def _statement_from_data(data: Any) -> Statement:
+    if isinstance(data, list):
+        return _assign_from_list(data)
+    body = tuple(_assign_from_list(a) for a in data.get("body", ()))
+    if "sum" in data:
+        return Sum(data["sum"], body, _operand_from_list(data["value"]))
+    if "store" in data:
+        port, *index = data["store"]
+        return Store(port, tuple(index), _operand_from_list(data["value"]), body)
+    if "guard" in data:
+        return Guard(_operand_from_list(data["guard"]), data["code"], data["message"])
+    return Solve(*data["solve"], data["code"], data["message"], data["relative_pivot"])
+
+
+def to_json(kernel: KernelIR) -> str:
+    """The stored form: one statement a line, the same bytes on every machine."""
+
+    def port(p: Port) -> list[Any]:
+        data = [p.name, list(p.shape), p.unit, p.meaning]
+        return [*data, "accumulate"] if p.accumulate else data
+
+    head = {
+        "name": kernel.name,
+        "purpose": kernel.purpose,
+        "sources": list(kernel.sources),
+        "size_symbol": kernel.size_symbol,
+        "inputs": [port(p) for p in kernel.inputs],
+        "outputs": [port(p) for p in kernel.outputs],
+    }
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+    body = ",\n".join(
+        json.dumps(_statement_to_data(s), separators=(",", ":")) for s in kernel.statements
+    )
+    return "{\n" + ",\n".join(lines) + ',\n"statements": [\n' + body + "\n]}\n"
+
+
+def from_json(text: str) -> KernelIR:
+    """Inverse of `to_json`."""
+    data = json.loads(text)
+
+    def port(p: list[Any]) -> Port:
+        return Port(p[0], tuple(p[1]), p[2], p[3], accumulate="accumulate" in p[4:])
+
+    return KernelIR(
+        name=data["name"],
+        inputs=tuple(port(p) for p in data["inputs"]),
+        outputs=tuple(port(p) for p in data["outputs"]),
+        statements=tuple(_statement_from_data(s) for s in data["statements"]),
+        size_symbol=data["size_symbol"],
+        purpose=data["purpose"],
+        sources=tuple(data["sources"]),
+    )
