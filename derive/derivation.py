@@ -41,13 +41,18 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Equation:
-    """left = right; for a definition `left` is the MatrixSymbol that `right` gives a value to."""
+    """left = right; for a definition `left` is the MatrixSymbol that `right` gives a value to.
+
+    `zeros` declares entries of `right` that vanish identically although no single term does; they
+    are not computed, and the checks evaluate `right` without them.
+    """
 
     name: str
     left: sp.Basic
     right: sp.Basic
     source: str = ""
     remark: str = ""
+    zeros: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,39 @@ class Derivation:
             if str(getattr(equation.left, "name", equation.left)) == name:
                 return equation.right
         raise KeyError(f"{self.element}: nothing defines {name!r}")
+
+
+class Solve(sp.MatrixExpr):
+    """A^-1 B.  Never inverted symbolically: lowered to an unrolled, guarded elimination.
+
+    With `symmetric` (A positive definite) the elimination is LDL^T without pivoting; otherwise LU
+    without row exchange.  A pivot below 1e-13 of its own diagonal entry (of its row for LU) leaves the
+    kernel with a failure code.
+    """
+
+    def __new__(cls, matrix: sp.Basic, right: sp.Basic, symmetric: bool = False) -> Solve:
+        return super().__new__(
+            cls, sp.sympify(matrix), sp.sympify(right), sp.sympify(bool(symmetric))
+        )
+
+    @property
+    def matrix(self) -> sp.Basic:
+        return self.args[0]
+
+    @property
+    def right(self) -> sp.Basic:
+        return self.args[1]
+
+    @property
+    def symmetric(self) -> bool:
+        return bool(self.args[2])
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return (self.args[0].shape[0], self.args[1].shape[1])
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        return (self.args[0].inv() * self.args[1])[i, j]
 
 
 def vector(name: str, length: int) -> sp.MatrixSymbol:

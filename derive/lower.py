@@ -1,0 +1,341 @@
+"""Lowers the definitions of a Derivation to a KernelIR: matrix products entry by entry, no inverse.
+
+Value numbering makes symmetric halves and repeated products one node; what no output needs is
+never emitted.  Zeros and ones of explicit matrices fold, so structure in gives sparsity out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sympy as sp
+from sympy.logic.boolalg import BooleanFalse, BooleanTrue
+
+from mstmm.graph import Graph, Node
+from mstmm.ir import KernelIR, Port
+
+from .derivation import Derivation, Equation, Quantity, Solve
+
+NodeMatrix = list[list[Node]]
+
+#: Failure code of a vanishing pivot, known to the sweep driver.
+SINGULAR = 1
+RELATIVE_PIVOT = sp.Rational(1, 10**13)
+
+_FUNCTIONS: dict[type, str] = {
+    sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "asin", sp.acos: "acos",
+    sp.atan: "atan", sp.atan2: "atan2", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh",
+    sp.exp: "exp", sp.log: "log", sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor",
+}  # fmt: skip
+
+
+def lower(
+    derivation: Derivation,
+    name: str,
+    guards: tuple[tuple[sp.Basic, int, str], ...] = (),
+) -> KernelIR:
+    """KernelIR of the derivation's definitions.
+
+    `guards` are (condition, failure code, message) over the derivation's quantities.
+    Raises NotImplementedError, naming the expression, for SymPy that has no counterpart in the IR.
+    """
+    lowering = _Lowering(derivation.inputs)
+    for equation in derivation.definitions:
+        lowering.define(equation)
+    for condition, code, message in guards:
+        lowering.graph.guard(lowering.scalar(condition), code, message)
+    values = {q.name: lowering.stored(q) for q in derivation.outputs}
+    return lowering.graph.kernel(
+        name,
+        [port(q) for q in derivation.inputs],
+        [port(q) for q in derivation.outputs],
+        values,
+        purpose=derivation.title,
+        sources=derivation.sources,
+    )
+
+
+def port(quantity: Quantity) -> Port:
+    """How a quantity is stored: upper triangle, vector or row-major matrix."""
+    if quantity.symmetric:
+        shape: tuple[int, ...] = (quantity.rows * (quantity.rows + 1) // 2,)
+    elif quantity.columns == 1:
+        shape = (quantity.rows,)
+    else:
+        shape = (quantity.rows, quantity.columns)
+    return Port(
+        quantity.name, shape, quantity.unit, quantity.meaning, accumulate=quantity.accumulate
+    )
+
+
+class _Lowering:
+    """Evaluates SymPy matrix expressions over graph nodes."""
+
+    def __init__(self, inputs: tuple[Quantity, ...]) -> None:
+        self.graph = Graph()
+        self.known: dict[str, NodeMatrix] = {q.name: self._input(q) for q in inputs}
+        self._scalars: dict[sp.Basic, Node] = {}
+
+    def _input(self, quantity: Quantity) -> NodeMatrix:
+        name, rows, columns = quantity.name, quantity.rows, quantity.columns
+        if quantity.symmetric:
+            return _mirror(self.graph.vector(name, rows * (rows + 1) // 2), rows)
+        if columns == 1:
+            return [[node] for node in self.graph.vector(name, rows)]
+        return self.graph.matrix(name, rows, columns)
+
+    def define(self, equation: Equation) -> None:
+        value = self.matrix(equation.right)
+        for i, j in equation.zeros:
+            value[i][j] = self.graph.constant(0)
+        self.known[str(equation.left.name)] = value
+
+    def stored(self, quantity: Quantity) -> list[object]:
+        value = self.known[quantity.name]
+        if quantity.symmetric:
+            return [value[i][j] for i in range(quantity.rows) for j in range(i, quantity.rows)]
+        if quantity.columns == 1:
+            return [row[0] for row in value]
+        return list(value)
+
+    # --- matrices -------------------------------------------------------------------------
+
+    def matrix(self, expression: sp.Basic) -> NodeMatrix:
+        rules: tuple[tuple[type, Callable[[sp.Basic], NodeMatrix]], ...] = (
+            (sp.MatrixSymbol, self._symbol),
+            (sp.MatrixBase, self._explicit),
+            (sp.MatAdd, self._sum),
+            (sp.MatMul, self._product),
+            (sp.Transpose, lambda e: _transpose(self.matrix(e.arg))),
+            (sp.BlockMatrix, self._blocks),
+            (sp.Identity, lambda e: self._explicit(sp.eye(int(e.rows)))),
+            (sp.ZeroMatrix, lambda e: self._explicit(sp.zeros(int(e.rows), int(e.cols)))),
+            (Solve, self._solve),
+        )
+        for kind, rule in rules:
+            if isinstance(expression, kind):
+                return rule(expression)
+        if isinstance(expression, sp.Expr) and not getattr(expression, "is_Matrix", False):
+            return [[self.scalar(expression)]]
+        raise NotImplementedError(f"cannot lower the matrix expression {expression}")
+
+    def _symbol(self, symbol: sp.MatrixSymbol) -> NodeMatrix:
+        return [list(row) for row in self.known[str(symbol.name)]]
+
+    def _explicit(self, matrix: sp.MatrixBase) -> NodeMatrix:
+        return [[self.scalar(e) for e in matrix.row(i)] for i in range(matrix.rows)]
+
+    def _sum(self, expression: sp.MatAdd) -> NodeMatrix:
+        first, *rest = [self.matrix(term) for term in expression.args]
+        for term in rest:
+            first = [
+                [a + b for a, b in zip(x, y, strict=True)] for x, y in zip(first, term, strict=True)
+            ]
+        return first
+
+    def _product(self, expression: sp.MatMul) -> NodeMatrix:
+        factor, *rest = expression.as_coeff_matrices()
+        result: NodeMatrix | None = None
+        for term in rest[0]:
+            value = self.matrix(term)
+            result = value if result is None else self._multiply(result, value)
+        assert result is not None
+        coefficient = self.scalar(factor)
+        return [[coefficient * e for e in row] for row in result]
+
+    def _multiply(self, a: NodeMatrix, b: NodeMatrix) -> NodeMatrix:
+        zero = self.graph.constant(0)
+        product = []
+        for row in a:
+            entries = []
+            for column in zip(*b, strict=True):
+                total = zero
+                for x, y in zip(row, column, strict=True):
+                    total = total + x * y
+                entries.append(total)
+            product.append(entries)
+        return product
+
+    def _blocks(self, expression: sp.BlockMatrix) -> NodeMatrix:
+        rows: NodeMatrix = []
+        blocks = expression.blocks
+        for i in range(blocks.rows):
+            parts = [self.matrix(blocks[i, j]) for j in range(blocks.cols)]
+            rows += [sum(pieces, []) for pieces in zip(*parts, strict=True)]
+        return rows
+
+    def _solve(self, expression: Solve) -> NodeMatrix:
+        matrix, right = self.matrix(expression.matrix), self.matrix(expression.right)
+        if not matrix:
+            return []
+        eliminate = self._ldl if expression.symmetric else self._lu
+        return eliminate(matrix, right)
+
+    def _ldl(self, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
+        """A = L D L^T row by row; one reciprocal per pivot."""
+        n = len(matrix)
+        lower_rows: NodeMatrix = [[] for _ in range(n)]
+        scaled: NodeMatrix = [[] for _ in range(n)]
+        reciprocal: list[Node] = []
+        for i in range(n):
+            for j in range(i):
+                value = matrix[j][i]
+                for k in range(j):
+                    value = value - lower_rows[i][k] * scaled[j][k]
+                lower_rows[i].append(value)  # L_ij D_j until divided below
+                scaled[i].append(value * reciprocal[j])
+            pivot = matrix[i][i]
+            for k in range(i):
+                pivot = pivot - lower_rows[i][k] * scaled[i][k]
+            self._guard_pivot(pivot, matrix[i][i], i, n)
+            reciprocal.append(1 / pivot)
+        columns = [self._ldl_column(scaled, reciprocal, list(c)) for c in zip(*right, strict=True)]
+        return _transpose(columns)
+
+    def _ldl_column(
+        self, unit_lower: NodeMatrix, reciprocal: list[Node], column: list[Node]
+    ) -> list[Node]:
+        n = len(column)
+        for i in range(n):
+            for k in range(i):
+                column[i] = column[i] - unit_lower[i][k] * column[k]
+        column = [value * r for value, r in zip(column, reciprocal, strict=True)]
+        for i in reversed(range(n)):
+            for k in range(i + 1, n):
+                column[i] = column[i] - unit_lower[k][i] * column[k]
+        return column
+
+    def _lu(self, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
+        n = len(matrix)
+        rows = [list(m) + list(r) for m, r in zip(matrix, right, strict=True)]
+        width = len(rows[0])
+        reciprocal: list[Node] = []
+        for i in range(n):
+            scale = self.graph.constant(0)
+            for entry in matrix[i]:
+                scale = scale + self.graph.call("abs", entry)
+            self._guard_pivot(self.graph.call("abs", rows[i][i]), scale, i, n)
+            reciprocal.append(1 / rows[i][i])
+            for k in range(i + 1, n):
+                factor = rows[k][i] * reciprocal[i]
+                rows[k] = rows[k][: i + 1] + [
+                    rows[k][j] - factor * rows[i][j] for j in range(i + 1, width)
+                ]
+        for i in reversed(range(n)):
+            for j in range(n, width):
+                value = rows[i][j]
+                for k in range(i + 1, n):
+                    value = value - rows[i][k] * rows[k][j]
+                rows[i][j] = value * reciprocal[i]
+        return [row[n:] for row in rows]
+
+    def _guard_pivot(self, pivot: Node, diagonal: Node, i: int, n: int) -> None:
+        limit = self.graph.constant(_fraction(RELATIVE_PIVOT)) * diagonal
+        if pivot is diagonal:  # a first pivot is compared with nothing but zero
+            limit = self.graph.constant(0)
+        self.graph.guard(
+            self.graph.call("lt", limit, pivot),
+            SINGULAR,
+            f"pivot {i + 1} of {n} vanishes: a motion of the hinge is undetermined",
+        )
+
+    # --- scalars --------------------------------------------------------------------------
+
+    def scalar(self, expression: sp.Basic) -> Node:
+        found = self._scalars.get(expression)
+        if found is None:
+            found = self._scalar(expression)
+            self._scalars[expression] = found
+        return found
+
+    def _scalar(self, e: sp.Basic) -> Node:
+        graph = self.graph
+        if isinstance(e, sp.matrices.expressions.matexpr.MatrixElement):
+            return self._entry(e)
+        if isinstance(e, (sp.Rational, sp.Float)):
+            return graph.constant(_fraction(e))
+        if e is sp.pi:
+            return graph.pi
+        if isinstance(e, (BooleanTrue, BooleanFalse)):
+            return graph.constant(int(bool(e)))
+        if isinstance(e, sp.Pow):
+            return graph.power(self.scalar(e.base), self.scalar(e.exp))
+        if isinstance(e, sp.Piecewise):
+            return self._piecewise(e)
+        if isinstance(e, (sp.Add, sp.Mul, sp.Min, sp.Max, sp.And, sp.Or)):
+            return self._fold(e)
+        if isinstance(e, sp.core.relational.Relational):
+            return self._relation(e)
+        if isinstance(e, sp.Not):
+            return graph.call("not", self.scalar(e.args[0]))
+        if type(e) in _FUNCTIONS:
+            return graph.call(_FUNCTIONS[type(e)], *(self.scalar(a) for a in e.args))
+        raise NotImplementedError(f"cannot lower {e} ({type(e).__name__})")
+
+    def _entry(self, e: sp.Basic) -> Node:
+        parent = e.parent
+        if isinstance(parent, sp.MatrixSymbol):
+            return self.known[str(parent.name)][int(e.i)][int(e.j)]
+        return self.matrix(parent)[int(e.i)][int(e.j)]
+
+    def _fold(self, e: sp.Basic) -> Node:
+        op = {sp.Add: "add", sp.Mul: "mul", sp.Min: "min", sp.Max: "max"}.get(type(e))
+        if op is None:
+            op = "and" if isinstance(e, sp.And) else "or"
+        if op == "mul":
+            return self._quotient(e)
+        first, *rest = [self.scalar(a) for a in sorted(e.args, key=sp.default_sort_key)]
+        for node in rest:
+            first = self.graph.call(op, first, node)
+        return first
+
+    def _quotient(self, e: sp.Mul) -> Node:
+        """Keep a/b one division instead of a * (1/b)."""
+        above, below = sp.fraction(e, exact=True)
+        result = self.graph.constant(1)
+        for factor in sorted(sp.Mul.make_args(above), key=sp.default_sort_key):
+            result = result * self.scalar(factor)
+        return result if below == 1 else result / self.scalar(below)
+
+    def _piecewise(self, e: sp.Piecewise) -> Node:
+        *cases, (value, condition) = e.args
+        if condition not in (True, sp.true):
+            raise NotImplementedError(f"a Piecewise without a last 'otherwise' branch: {e}")
+        result = self.scalar(value)
+        for value, condition in reversed(cases):
+            result = self.graph.select(self.scalar(condition), self.scalar(value), result)
+        return result
+
+    def _relation(self, e: sp.core.relational.Relational) -> Node:
+        left, right = self.scalar(e.lhs), self.scalar(e.rhs)
+        call = self.graph.call
+        return {
+            "<": lambda: call("lt", left, right),
+            "<=": lambda: call("le", left, right),
+            ">": lambda: call("lt", right, left),
+            ">=": lambda: call("le", right, left),
+            "==": lambda: call("eq", left, right),
+            "!=": lambda: call("not", call("eq", left, right)),
+        }[e.rel_op]()
+
+
+def _fraction(number: sp.Number) -> float:
+    from fractions import Fraction
+
+    if isinstance(number, sp.Rational):
+        return Fraction(int(number.p), int(number.q))  # type: ignore[return-value]
+    return float(number)
+
+
+def _transpose(a: NodeMatrix) -> NodeMatrix:
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def _mirror(upper: list[Node], n: int) -> NodeMatrix:
+    """Full symmetric matrix from its upper triangle, row by row."""
+    full: NodeMatrix = [[upper[0]] * n for _ in range(n)]
+    entries = iter(upper)
+    for i in range(n):
+        for j in range(i, n):
+            full[i][j] = full[j][i] = next(entries)
+    return full
