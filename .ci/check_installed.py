@@ -1,0 +1,25 @@
+"""Is the installed wheel whole, and is it what gets imported?  Run where the wheel is installed.
+
+Usage: python check_installed.py CHECKOUT
+"""
+
+import importlib
+import sys
+import tomllib
+from pathlib import Path
+
+checkout = Path(sys.argv[1]).resolve()
+setuptools = tomllib.loads((checkout / "pyproject.toml").read_text())["tool"]["setuptools"]
+
+for name in setuptools["packages"]:
+    module = importlib.import_module(name)
+    folder = Path(module.__file__ or "").resolve().parent
+    assert checkout not in folder.parents, f"{name} was imported from the checkout"
+    real = checkout.joinpath(*(name.split(".")[1:] or ["mstmm"]))
+    for pattern in ("*.py", *setuptools["package-data"].get(name, [])):
+        missing = {path.name for path in real.glob(pattern)} - {p.name for p in folder.iterdir()}
+        assert not missing, f"{name} lacks {sorted(missing)}"
+
+kernels = importlib.import_module("mstmm.generated._kernels")
+assert kernels.lib.mstmm_element_count > 0
+print(f"{len(setuptools['packages'])} packages, {kernels.lib.mstmm_element_count} elements")

@@ -1,0 +1,19 @@
+# Sourced by .ci/run and by every step: strict mode, the project's root, headings with times.
+set -euo pipefail
+ROOT="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+export ROOT PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONUNBUFFERED=1 MPLBACKEND=Agg
+VENV="$ROOT/.venv"
+cd "$ROOT"
+
+# step TITLE COMMAND...: runs the command under a heading, prints its time, stops at a failure.
+step() {
+    local title="$1" begin=$SECONDS status=0
+    shift
+    printf '\n=== %s\n' "$title"
+    "$@" || status=$?
+    if [ "$status" -ne 0 ]; then
+        printf '=== %s: FAILED (status %s) after %s s\n' "$title" "$status" "$((SECONDS - begin))"
+        exit "$status"
+    fi
+    printf '=== %s: %s s\n' "$title" "$((SECONDS - begin))"
+}

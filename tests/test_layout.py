@@ -1,0 +1,166 @@
+"""The rooms: what is packaged, what the links reach, and what each room may import."""
+
+from __future__ import annotations
+
+import ast
+import json
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+SETUPTOOLS = PROJECT["tool"]["setuptools"]
+ROOMS = ("derive", "templates", "generated", "runtime")
+
+# The modules that join derivation and numbers: a command line, a compile, a comparison.
+BRIDGES = {"__init__", "__main__", "compile", "crosscheck"}
+
+
+def room_folder(package: str) -> Path:
+    """The real folder of a package, by the mapping that setuptools uses."""
+    top, *rest = package.removeprefix("mstmm.").split(".")
+    return ROOT.joinpath(top, *rest)
+
+
+def python_files(room: str) -> list[Path]:
+    """The Python files of one room; `mstmm` means the face and the leaves, without the links."""
+    folder = ROOT / room
+    return sorted(
+        path
+        for path in folder.rglob("*.py")
+        if not any(parent.is_symlink() for parent in path.parents if ROOT in parent.parents)
+    )
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """(level, dotted name) of each import in a file, wherever in it; level 0 is absolute."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((0, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (
+                (node.level, f"{node.module or ''}.{alias.name}".strip(".")) for alias in node.names
+            )
+
+
+def loaded_after(statements: str) -> set[str]:
+    """The modules present in a fresh interpreter that ran `statements`."""
+    script = f"{statements}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def import_all(package: str, leaves_only: bool = False) -> str:
+    """Statements that import every module of a package (not `__main__`)."""
+    folder = room_folder(package) if package != "mstmm" else ROOT / "mstmm"
+    modules = [package]
+    for path in sorted(folder.glob("*.py") if leaves_only else folder.rglob("*.py")):
+        parts = path.relative_to(folder).with_suffix("").parts
+        if parts[-1] not in {"__init__", "__main__"} and not (leaves_only and parts[-1] in BRIDGES):
+            modules.append(".".join((package, *parts)))
+    return "\n".join(f"import {module}" for module in modules)
+
+
+def test_package_list_matches_the_tree() -> None:
+    found = {"mstmm"}
+    for room in ROOMS:
+        for init in (ROOT / room).rglob("__init__.py"):
+            found.add(".".join(("mstmm", *init.parent.relative_to(ROOT).parts)))
+    found |= {
+        ".".join(init.parent.relative_to(ROOT).parts)
+        for init in python_files("mstmm")
+        if init.name == "__init__.py"
+    }
+    assert set(SETUPTOOLS["packages"]) == found
+
+
+@pytest.mark.parametrize("room", ["mstmm", *ROOMS])
+def test_every_folder_of_code_is_a_package(room: str) -> None:
+    bare = {
+        path.parent for path in python_files(room) if not (path.parent / "__init__.py").exists()
+    }
+    assert not bare
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_link_reaches_its_room(room: str) -> None:
+    link = ROOT / "mstmm" / room
+    assert link.is_symlink()
+    assert link.readlink() == Path("..", room)
+    assert (link / "__init__.py").samefile(ROOT / room / "__init__.py")
+
+
+@pytest.mark.parametrize("room", ["templates", "generated"])
+def test_data_files_are_packaged(room: str) -> None:
+    patterns = SETUPTOOLS["package-data"][f"mstmm.{room}"]
+    known = {path for pattern in patterns for path in (ROOT / room).glob(pattern)}
+    built = {"__init__.py", "__pycache__"}
+    forgotten = {
+        path
+        for path in (ROOT / room).iterdir()
+        if path not in known and path.name not in built and path.suffix != ".so"
+    }
+    assert known
+    assert not forgotten
+
+
+def test_import_of_the_face_is_light() -> None:
+    heavy = {"numpy", "scipy", "sympy", "pydantic", "cffi", "jinja2", "typer", "rich"}
+    rooms = {f"mstmm.{room}" for room in ROOMS}
+    assert not loaded_after("import mstmm") & (heavy | rooms)
+
+
+def test_leaves_need_no_room() -> None:
+    loaded = loaded_after(import_all("mstmm", leaves_only=True))
+    assert not loaded & {"sympy", "jinja2", "cffi", *(f"mstmm.{room}" for room in ROOMS)}
+
+
+def test_runtime_needs_no_derivation() -> None:
+    loaded = loaded_after(import_all("mstmm.runtime"))
+    assert "mstmm.runtime" in loaded
+    assert not loaded & {"sympy", "jinja2", "mstmm.derive", "mstmm.templates"}
+
+
+def test_derivation_needs_no_numbers() -> None:
+    loaded = loaded_after(import_all("mstmm.derive"))
+    assert "sympy" in loaded
+    assert not loaded & {"numpy", "scipy", "cffi", "mstmm.runtime", "mstmm.generated"}
+
+
+@pytest.mark.parametrize("room", ["derive", "runtime"])
+def test_imports_inside_a_room_are_relative(room: str) -> None:
+    absolute = [
+        (path.name, name)
+        for path in python_files(room)
+        for level, name in imports(path)
+        if level == 0 and (name.split(".")[0] in ROOMS or name.startswith(f"mstmm.{room}"))
+    ]
+    assert not absolute
+
+
+def test_jinja_is_used_in_one_file() -> None:
+    users = {
+        path.relative_to(ROOT).as_posix()
+        for room in ("mstmm", *ROOMS)
+        for path in python_files(room)
+        for _, name in imports(path)
+        if name.split(".")[0] == "jinja2"
+    }
+    assert users == {"derive/render.py"}
+
+
+def test_import_contracts_hold() -> None:
+    linter = shutil.which("lint-imports", path=str(Path(sys.executable).parent))
+    assert linter, "import-linter is part of the extra 'test'"
+    done = subprocess.run(
+        [linter, "--no-cache"], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stdout
