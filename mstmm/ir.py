@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 #: Index that stands for the loop variable of an indexed sum or store.
@@ -49,12 +51,30 @@ class Port:
             total *= n if isinstance(extent, str) else extent
         return total
 
+    def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0) -> int:
+        """Row-major place of an entry; `LOOP_INDEX` in the index stands for `k`."""
+        place = 0
+        for entry, extent in zip(index, self.shape, strict=True):
+            width = n if isinstance(extent, str) else extent
+            place = place * width + (k if isinstance(entry, str) else entry)
+        return place
+
 
 @dataclass(frozen=True)
 class Constant:
     """An exact rational number, written "3", "-1/3"; or "pi"."""
 
     text: str
+
+    @property
+    def number(self) -> float:
+        """The nearest double.  ValueError if the text is no number or has no finite double."""
+        if self.text == "pi":
+            return math.pi
+        try:
+            return float(Fraction(self.text))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            raise ValueError(f"{self.text!r} is no constant that a double can hold") from None
 
 
 @dataclass(frozen=True)
