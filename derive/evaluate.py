@@ -1,0 +1,176 @@
+"""Evaluate a KernelIR without C: at any precision (mpmath), or with plain floats as C does it.
+
+Both walk the same statements in the same order; only the arithmetic differs.  Operations outside
+their real domain give NaN or an infinity as IEEE arithmetic has it, never an exception.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import mpmath
+
+from mstmm.errors import NumericalFailure
+from mstmm.ir import (
+    Assign,
+    Constant,
+    Guard,
+    KernelIR,
+    Operand,
+    Port,
+    Solve,
+    Statement,
+    Store,
+    Sum,
+    Temporary,
+)
+
+from .arithmetic import Arithmetic, FloatArithmetic, PreciseArithmetic
+
+#: What an input may be: a number, or nested or flat sequences of numbers, row-major.
+Values = Any
+
+
+class GuardFailure(NumericalFailure):
+    """A guard of the kernel did not hold, or a pivot of `solve` vanished.  `code` is what C returns."""
+
+    def __init__(self, kernel: str, code: int, message: str) -> None:
+        super().__init__(f"{kernel}: {message} (code {code})")
+        self.code = code
+        self.message = message
+
+
+def evaluate(
+    kernel: KernelIR, inputs: Mapping[str, Values], digits: int = 50, n: int | None = None
+) -> dict[str, list[mpmath.mpf]]:
+    """Outputs of the kernel at `digits` decimal digits, each a flat list, row-major.
+
+    `inputs[port]` is a number or a nested or flat sequence of int, float, Fraction, str or mpf;
+    floats are taken as the exact numbers they are.  `n` is the run-time size of a kernel that has
+    one.  An output flagged `accumulate` holds the increment; an entry that is never stored is 0.
+    Raises GuardFailure, and ValueError for a missing input, a wrong length or a missing `n`.
+    """
+    arithmetic = PreciseArithmetic(digits)
+    results = _run(kernel, inputs, arithmetic, n)
+    return {name: [mpmath.mp.make_mpf(v._mpf_) for v in row] for name, row in results.items()}
+
+
+def evaluate_floats(
+    kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
+) -> dict[str, list[float]]:
+    """Outputs of the kernel in doubles, with the operations and the order of the generated C."""
+    return _run(kernel, inputs, FloatArithmetic(), n)
+
+
+def _run(
+    kernel: KernelIR, inputs: Mapping[str, Values], arithmetic: Arithmetic, n: int | None
+) -> dict[str, list[Any]]:
+    if kernel.size_symbol is not None and n is None:
+        raise ValueError(f"{kernel.name}: give n, the run-time size {kernel.size_symbol!r}")
+    run = _Run(kernel, arithmetic, n or 0)
+    for port in kernel.inputs:
+        if port.name not in inputs:
+            raise ValueError(f"{kernel.name}: no value for the input {port.name!r}")
+        run.arrays[port.name] = run.read(port, inputs[port.name])
+    for statement in kernel.statements:
+        run.execute(statement)
+    return run.results
+
+
+class _Run:
+    """One evaluation: arrays read so far, temporaries, results."""
+
+    def __init__(self, kernel: KernelIR, arithmetic: Arithmetic, n: int) -> None:
+        self.kernel, self.arithmetic, self.n = kernel, arithmetic, n
+        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
+        self.arrays: dict[str, list[Any]] = {}
+        self.temporaries: dict[int, Any] = {}
+        zero = arithmetic.number("0")
+        self.results = {port.name: [zero] * port.length(n) for port in kernel.outputs}
+        self._constants: dict[str, Any] = {}
+
+    def read(self, port: Port, values: Values) -> list[Any]:
+        row = [self.arithmetic.number(value) for value in _flat(values)]
+        if len(row) != port.length(self.n):
+            raise ValueError(
+                f"{self.kernel.name}: {port.name} holds {port.length(self.n)} numbers "
+                f"{list(port.shape)}, not {len(row)}"
+            )
+        return row
+
+    def execute(self, statement: Statement) -> None:
+        if isinstance(statement, Assign):
+            self._assign(statement, 0)
+        elif isinstance(statement, Sum):
+            total = self.arithmetic.number("0")
+            for k in range(self.n):
+                for assign in statement.body:
+                    self._assign(assign, k)
+                total = total + self._value(statement.value, k)
+            self.temporaries[statement.number] = total
+        elif isinstance(statement, Store):
+            looped = any(isinstance(entry, str) for entry in statement.index)
+            for k in range(self.n if looped else 1):
+                self._store(statement, k)
+        elif isinstance(statement, Guard):
+            if not self.arithmetic.true(self._value(statement.condition, 0)):
+                raise GuardFailure(self.kernel.name, statement.code, statement.message)
+        else:
+            self._solve(statement)
+
+    def _assign(self, assign: Assign, k: int) -> None:
+        operation: Callable[..., Any] = self.arithmetic.operations[assign.op]
+        self.temporaries[assign.number] = operation(*(self._value(a, k) for a in assign.args))
+
+    def _value(self, operand: Operand, k: int) -> Any:
+        if isinstance(operand, Temporary):
+            return self.temporaries[operand.number]
+        if isinstance(operand, Constant):
+            if operand.text not in self._constants:
+                self._constants[operand.text] = self.arithmetic.constant(operand)
+            return self._constants[operand.text]
+        place = self.ports[operand.port].offset(operand.index, self.n, k)
+        return self.arrays[operand.port][place]
+
+    def _store(self, store: Store, k: int) -> None:
+        for assign in store.body:
+            self._assign(assign, k)
+        port = self.ports[store.port]
+        place = port.offset(store.index, self.n, k)
+        value = self._value(store.value, k)
+        row = self.results[store.port]
+        row[place] = row[place] + value if port.accumulate else value
+
+    def _solve(self, solve: Solve) -> None:
+        """LDL^T without pivoting, in the order of the generated C."""
+        n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
+        limit = self.arithmetic.number(solve.relative_pivot)
+        work = [self.arithmetic.number("0")] * (n * n)
+        divide = self.arithmetic.operations["div"]
+        for i in range(n):
+            for j in range(i + 1):
+                rest = a[i * n + j]
+                for k in range(j):
+                    rest = rest - work[i * n + k] * work[j * n + k] * work[k * n + k]
+                work[i * n + j] = divide(rest, work[j * n + j]) if j < i else rest
+            if not work[i * n + i] > limit * abs(a[i * n + i]):
+                raise GuardFailure(self.kernel.name, solve.code, solve.message)
+        m = len(b) // n if n else 0
+        x = list(b)
+        for column in range(m):
+            for i in range(n):
+                for k in range(i):
+                    x[i * m + column] = x[i * m + column] - work[i * n + k] * x[k * m + column]
+            for i in reversed(range(n)):
+                x[i * m + column] = divide(x[i * m + column], work[i * n + i])
+                for k in range(i + 1, n):
+                    x[i * m + column] = x[i * m + column] - work[k * n + i] * x[k * m + column]
+        self.arrays[solve.port] = self.results[solve.port] = x
+
+
+def _flat(values: Values) -> list[Any]:
+    """Numbers of a nested sequence, row-major; a number is a sequence of one."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        return [values]
+    return [number for entry in values for number in _flat(entry)]
