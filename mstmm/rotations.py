@@ -1,0 +1,158 @@
+"""Rotations as plain numbers: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.  No numpy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def norm(v: Sequence[float]) -> float:
+    """Euclidean length without overflow or underflow of the squares."""
+    return math.hypot(*v)
+
+
+def unit(v: Sequence[float]) -> tuple[float, ...]:
+    """v / |v|, also for very small or large entries.  A vector that already has unit length to
+    rounding is returned as it is, so that normalising twice changes nothing.
+
+    Raises ValueError for a vector without direction.
+    """
+    largest = max(abs(x) for x in v)
+    if largest == 0 or not math.isfinite(largest):
+        raise ValueError("a vector without direction")
+    length = norm(v)
+    if abs(length - 1) <= 1e-15:
+        return tuple(float(x) for x in v)
+    # A power of two scales exactly.
+    scale = 2.0 ** -math.frexp(largest)[1]
+    scaled = [x * scale for x in v]
+    length = norm(scaled)
+    return tuple(x / length for x in scaled)
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return math.fsum(x * y for x, y in zip(a, b, strict=True))
+
+
+def rows(matrix: Sequence[Sequence[float]]) -> Matrix:
+    """The matrix as nested tuples."""
+    a, b, c = (tuple(float(x) for x in row) for row in matrix)
+    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """a b."""
+    columns = list(zip(*b, strict=True))
+    return rows([[dot(row, column) for column in columns] for row in a])
+
+
+def transpose(a: Matrix) -> Matrix:
+    return rows(list(zip(*a, strict=True)))
+
+
+def apply(a: Matrix, v: Sequence[float]) -> Vector:
+    """a v."""
+    x, y, z = (dot(row, v) for row in a)
+    return (x, y, z)
+
+
+def from_quaternion(q: Sequence[float]) -> Matrix:
+    """Rotation matrix of the quaternion w, x, y, z, normalised first."""
+    w, x, y, z = unit(q)
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def _cos_sin(angle: float) -> tuple[float, float]:
+    """cos and sin, exact where the angle is the double nearest to a multiple of pi/2."""
+    quarter = round(angle / (math.pi / 2)) if abs(angle) < 1e6 else 0
+    if quarter != 0 and angle == quarter * (math.pi / 2):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def from_rpy(angles: Sequence[float]) -> Matrix:
+    """R = Rz(yaw) Ry(pitch) Rx(roll) from (roll, pitch, yaw), rad.
+
+    An angle that is the double nearest to a quarter turn gives exact zeros and ones, so that
+    frames turned by right angles stay aligned.
+    """
+    (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle) for angle in angles)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def from_orientation(orientation: Sequence[float]) -> Matrix:
+    """Rotation matrix from three numbers (roll, pitch, yaw) or four (quaternion w, x, y, z)."""
+    return from_rpy(orientation) if len(orientation) == 3 else from_quaternion(orientation)
+
+
+def about(axis: Sequence[float], angle: float) -> Matrix:
+    """Rotation by `angle` (rad) about `axis` (normalised first)."""
+    x, y, z = unit(axis)
+    c, s = _cos_sin(angle)
+    k = 1 - c
+    return (
+        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
+        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+    )
+
+
+def perpendicular(axis: Sequence[float]) -> Vector:
+    """A unit vector at right angles to `axis`: x made perpendicular, or y where x is too near."""
+    a = unit(axis)
+    for start in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        if abs(dot(a, start)) < 0.9:
+            return reject(start, a)
+    raise AssertionError("no direction is near both x and y")
+
+
+def reject(v: Sequence[float], axis: Sequence[float]) -> Vector:
+    """The unit vector along the part of `v` at right angles to `axis`.
+
+    Raises ValueError where the two are collinear.
+    """
+    a, b = unit(axis), unit(v)
+    along = dot(a, b)
+    rest = [bi - along * ai for ai, bi in zip(a, b, strict=True)]
+    if norm(rest) < 1e-12:
+        raise ValueError("the vectors are collinear")
+    x, y, z = unit(rest)
+    return (x, y, z)
+
+
+def to_quaternion(matrix: Matrix) -> Quaternion:
+    """Quaternion w, x, y, z (w >= 0) of a rotation matrix."""
+    m = matrix
+    trace = m[0][0] + m[1][1] + m[2][2]
+    squares = (trace, m[0][0], m[1][1], m[2][2])
+    largest = squares.index(max(squares))
+    if largest == 0:
+        q = [1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = [m[k][j] - m[j][k], 0.0, 0.0, 0.0]
+        q[1 + i] = 1 + m[i][i] - m[j][j] - m[k][k]
+        q[1 + j] = m[j][i] + m[i][j]
+        q[1 + k] = m[k][i] + m[i][k]
+    w, x, y, z = unit(q)
+    return (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)
