@@ -1,0 +1,85 @@
+"""Premises as the field writes them: unevaluated cross products, explicit form, linear solution.
+
+Premises are kept in matrix symbols so that they can be shown; `explicit` spells them out entry by
+entry, and `solve_linear` solves them for the matrices that the definitions state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import sympy as sp
+from sympy.matrices.expressions.matexpr import MatrixElement
+
+from .derivation import Equation, tilde
+
+#: An explicit matrix, as every derivation hands it on.
+Matrix: TypeAlias = sp.ImmutableDenseMatrix
+
+
+class Tilde(sp.MatrixExpr):  # type: ignore[misc]
+    """Cross-product matrix of a 3 x 1 matrix expression, kept unevaluated: Tilde(a) b = a x b."""
+
+    def __new__(cls, vector: sp.Basic) -> Tilde:
+        if tuple(vector.shape) != (3, 1):
+            raise ValueError(f"the cross-product matrix needs a 3 x 1 column, not {vector.shape}")
+        instance: Tilde = super().__new__(cls, vector)
+        return instance
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return (sp.Integer(3), sp.Integer(3))
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        return tilde(explicit(self.args[0]))[i, j]
+
+
+def explicit(expression: sp.Basic) -> Matrix:
+    """Entries of a matrix expression of matrix symbols, cross products and explicit matrices."""
+    return Matrix(expression.as_explicit())
+
+
+def residual(equation: Equation) -> Matrix:
+    """left - right, entry by entry (scalars as 1 x 1)."""
+    return Matrix(explicit(equation.left) - explicit(equation.right))
+
+
+def unit_vector(index: int, length: int) -> Matrix:
+    """Column with a one at `index`."""
+    return Matrix([1 if i == index else 0 for i in range(length)])
+
+
+def solve_linear(
+    premises: Sequence[Equation],
+    unknowns: Sequence[sp.MatrixSymbol],
+    knowns: Sequence[sp.MatrixSymbol],
+) -> Matrix:
+    """The matrix W with unknowns = W [knowns; 1], from premises linear in both.
+
+    Raises ValueError if a premise is not linear in them, or if the premises do not determine every
+    unknown.
+    """
+    names = {
+        entry: sp.Dummy(str(entry)) for symbol in (*unknowns, *knowns) for entry in explicit(symbol)
+    }
+    residuals = [entry for premise in premises for entry in residual(premise).xreplace(names)]
+    solved = [names[e] for symbol in unknowns for e in explicit(symbol)]
+    given = [names[e] for symbol in knowns for e in explicit(symbol)]
+    try:
+        coefficients, right = sp.linear_eq_to_matrix(residuals, [*solved, *given])
+    except sp.solvers.solveset.NonlinearError as error:
+        raise ValueError(f"a premise is not linear in the state: {error}") from error
+    left = coefficients[:, : len(solved)]
+    rest = coefficients[:, len(solved) :].row_join(-right)
+    if left.rows != left.cols or left.applyfunc(sp.expand).rank() < left.cols:
+        raise ValueError("the premises do not determine every unknown")
+    return Matrix(-left.LUsolve(rest)).applyfunc(sp.expand)
+
+
+def matrix_symbols(expression: sp.Basic) -> set[sp.MatrixSymbol]:
+    """Matrix symbols an expression depends on, through their entries too."""
+    return {
+        *expression.atoms(sp.MatrixSymbol),
+        *(e.parent for e in expression.atoms(MatrixElement)),
+    }
