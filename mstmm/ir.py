@@ -193,61 +193,125 @@ def assignments(kernel: KernelIR) -> Iterator[Assign]:
 
 
 def check(kernel: KernelIR) -> None:
-    """Refuse a kernel that uses a value before it is defined, or an unknown name, op or index."""
-    readable = {port.name: port for port in kernel.inputs}
-    writable = {port.name: port for port in kernel.outputs}
-    if len(readable) + len(writable) != len(kernel.inputs) + len(kernel.outputs):
-        raise ValueError(f"{kernel.name}: two ports share a name")
-    defined: set[int] = set()
+    """Refuse what no backend could run, with a ValueError that names kernel and place.
 
-    def use(operand: Operand, in_loop: bool) -> None:
-        if isinstance(operand, Temporary):
-            if operand.number not in defined:
-                raise ValueError(f"{kernel.name}: t{operand.number} is used before it is defined")
-        elif isinstance(operand, Element):
-            check_index(operand.port, operand.index, readable, in_loop)
+    Unknown names, operations or constants; a value used before it is defined or defined twice;
+    an index outside its array or a loop index outside a loop; a size that is not the kernel's; a
+    `solve` whose arrays do not fit; a guard whose code would read as success.
+    """
+    _Check(kernel).run()
 
-    def check_index(
-        name: str, index: tuple[int | str, ...], ports: dict[str, Port], in_loop: bool
-    ) -> None:
-        if name not in ports:
-            raise ValueError(f"{kernel.name}: no port named {name!r}")
-        if len(index) != len(ports[name].shape):
-            raise ValueError(f"{kernel.name}: {name}{list(index)} does not fit {ports[name].shape}")
-        for entry, extent in zip(index, ports[name].shape, strict=True):
-            if entry == LOOP_INDEX and not in_loop:
-                raise ValueError(f"{kernel.name}: {name}{list(index)} outside a loop")
-            if isinstance(entry, int) and isinstance(extent, int) and not 0 <= entry < extent:
-                raise ValueError(f"{kernel.name}: {name}{list(index)} is out of range")
 
-    def define(assign: Assign, in_loop: bool) -> None:
-        if OPERATIONS.get(assign.op) != len(assign.args):
-            raise ValueError(f"{kernel.name}: {assign.op} with {len(assign.args)} operands")
-        for operand in assign.args:
-            use(operand, in_loop)
-        defined.add(assign.number)
+class _Check:
+    """One walk over a kernel's statements; what is readable and defined grows as it goes."""
 
-    for statement in kernel.statements:
+    def __init__(self, kernel: KernelIR) -> None:
+        self.kernel = kernel
+        self.readable = {port.name: port for port in kernel.inputs}
+        self.writable = {port.name: port for port in kernel.outputs}
+        self.defined: set[int] = set()
+        self.ever: set[int] = set()
+        self.constants: set[str] = set()
+
+    def fail(self, text: str) -> None:
+        raise ValueError(f"{self.kernel.name}: {text}")
+
+    def run(self) -> None:
+        ports = (*self.kernel.inputs, *self.kernel.outputs)
+        if len({port.name for port in ports}) != len(ports):
+            self.fail("two ports share a name")
+        for port in ports:
+            sizes = {extent for extent in port.shape if isinstance(extent, str)}
+            if sizes - {self.kernel.size_symbol}:
+                self.fail(f"{port.name} has the shape {port.shape}")
+        for statement in self.kernel.statements:
+            self.statement(statement)
+
+    def statement(self, statement: Statement) -> None:
         if isinstance(statement, Assign):
-            define(statement, False)
+            self.assign(statement, False)
         elif isinstance(statement, Sum):
-            for assign in statement.body:
-                define(assign, True)
-            use(statement.value, True)
-            defined.difference_update(assign.number for assign in statement.body)
-            defined.add(statement.number)
+            self.body(statement.body, statement.value, True)
+            self.define(statement.number)
         elif isinstance(statement, Store):
             looped = LOOP_INDEX in statement.index
-            for assign in statement.body:
-                define(assign, looped)
-            use(statement.value, looped)
-            defined.difference_update(assign.number for assign in statement.body)
-            check_index(statement.port, statement.index, writable, looped)
-        elif isinstance(statement, Guard):
-            use(statement.condition, False)
+            self.body(statement.body, statement.value, looped)
+            self.index(statement.port, statement.index, self.writable, looped)
         else:
-            # A solved array is an output that later statements may read.
-            readable[statement.port] = writable[statement.port]
+            if statement.code == 0:
+                self.fail(f"code 0 means success, not {statement.message!r}")
+            if isinstance(statement, Guard):
+                self.use(statement.condition, False)
+            else:
+                self.solve(statement)
+
+    def body(self, body: tuple[Assign, ...], value: Operand, looped: bool) -> None:
+        if looped and self.kernel.size_symbol is None:
+            self.fail("a loop without a size symbol")
+        for assign in body:
+            self.assign(assign, looped)
+        self.use(value, looped)
+        self.defined.difference_update(assign.number for assign in body)
+
+    def assign(self, assign: Assign, looped: bool) -> None:
+        if OPERATIONS.get(assign.op) != len(assign.args):
+            self.fail(f"{assign.op} with {len(assign.args)} operands")
+        for operand in assign.args:
+            self.use(operand, looped)
+        self.define(assign.number)
+
+    def define(self, number: int) -> None:
+        if number in self.ever:
+            self.fail(f"t{number} is defined twice")
+        self.ever.add(number)
+        self.defined.add(number)
+
+    def use(self, operand: Operand, looped: bool) -> None:
+        if isinstance(operand, Temporary):
+            if operand.number not in self.defined:
+                self.fail(f"t{operand.number} is used before it is defined")
+        elif isinstance(operand, Element):
+            self.index(operand.port, operand.index, self.readable, looped)
+        elif operand.text not in self.constants:
+            try:
+                _ = operand.number
+            except ValueError as error:
+                self.fail(str(error))
+            self.constants.add(operand.text)
+
+    def index(
+        self, name: str, index: tuple[int | str, ...], ports: dict[str, Port], looped: bool
+    ) -> None:
+        if name not in ports:
+            self.fail(f"no port named {name!r}")
+        shape = ports[name].shape
+        if len(index) != len(shape):
+            self.fail(f"{name}{list(index)} does not fit {shape}")
+        for entry, extent in zip(index, shape, strict=True):
+            if isinstance(entry, str) and not (looped and entry == LOOP_INDEX):
+                self.fail(f"{name}{list(index)} outside a loop")
+            # A loop runs over the run-time size and nothing else does.
+            if isinstance(entry, str) != isinstance(extent, str):
+                self.fail(f"{name}{list(index)} does not fit {shape}")
+            if isinstance(entry, int) and isinstance(extent, int) and not 0 <= entry < extent:
+                self.fail(f"{name}{list(index)} is out of range")
+
+    def solve(self, solve: Solve) -> None:
+        size = self.kernel.size_symbol
+        for name, ports in (
+            (solve.matrix, self.readable), (solve.right, self.readable), (solve.port, self.writable)
+        ):  # fmt: skip
+            if name not in ports:
+                self.fail(f"no port named {name!r}")
+        right, output = self.readable[solve.right], self.writable[solve.port]
+        fits = size is not None and self.readable[solve.matrix].shape == (size, size)
+        fits = fits and right.shape[:1] == (size,) and len(right.shape) <= 2
+        if not fits or output.shape != right.shape or output.accumulate:
+            self.fail(f"solve: {solve.port}, {solve.matrix}, {solve.right} do not fit")
+        if solve.port in self.readable:
+            self.fail(f"{solve.port} is solved for twice")
+        # A solved array is an output that later statements may read.
+        self.readable[solve.port] = output
 
 
 # --- stored form -----------------------------------------------------------------------------
@@ -312,7 +376,8 @@ def _statement_from_data(data: Any) -> Statement:
         return Store(port, tuple(index), _operand_from_list(data["value"]), body)
     if "guard" in data:
         return Guard(_operand_from_list(data["guard"]), data["code"], data["message"])
-    return Solve(*data["solve"], data["code"], data["message"], data["relative_pivot"])
+    port, matrix, right = data["solve"]
+    return Solve(port, matrix, right, data["code"], data["message"], data["relative_pivot"])
 
 
 def to_json(kernel: KernelIR) -> str:
