@@ -205,7 +205,7 @@ class Graph:
                 return self.constant(a.value / b.value)
             if b.value.numerator in (1, -1):
                 return self.mul(a, self.constant(1 / b.value))
-        if a.value == 0:
+        if a.value == 0 and b.value != 0:
             return a
         if a.op == "neg":
             return self.neg(self.div(a.args[0], b))
@@ -303,8 +303,8 @@ class Graph:
     ) -> KernelIR:
         """Order what the outputs need (dead terms drop out) into a frozen kernel.
 
-        `values[port]` is a node, a nested list of nodes in the port's shape, or, for a port with
-        the size symbol, one node that contains `LOOP_INDEX`.
+        `values[port]` is a node, or a nested list of nodes in the port's shape.  An axis of the
+        size symbol has no list: one value, which may contain `LOOP_INDEX`, stands for all k < n.
         """
         writer = _Writer(self)
         writer.statements.extend(self._solves)
@@ -384,13 +384,13 @@ class _Writer:
         return Temporary(number)
 
     def store(self, port: Port, value: object) -> None:
-        if isinstance(value, Node) and value.looped:
-            index = tuple(LOOP_INDEX if isinstance(e, str) else 0 for e in port.shape)
-            body, operand = self._loop_body(value)
-            self.statements.append(Store(port.name, index, operand, body))
-            return
-        for index, node in _flatten(value):
-            self.statements.append(Store(port.name, index, self.operand(self.graph.node(node))))
+        for index, entry in _flatten(value, port.shape):
+            node = self.graph.node(entry)
+            if LOOP_INDEX in index:
+                body, operand = self._loop_body(node)
+                self.statements.append(Store(port.name, index, operand, body))
+            else:
+                self.statements.append(Store(port.name, index, self.operand(node)))
 
 
 def _walk(root: Node) -> list[Node]:
@@ -406,10 +406,18 @@ def _walk(root: Node) -> list[Node]:
     return list(found.values())
 
 
-def _flatten(value: object) -> list[tuple[tuple[int, ...], Node | Number]]:
-    if isinstance(value, (list, tuple)):
-        return [((i, *rest), v) for i, entry in enumerate(value) for rest, v in _flatten(entry)]
-    return [((), value)]  # type: ignore[list-item]
+def _flatten(
+    value: object, shape: tuple[int | str, ...]
+) -> list[tuple[tuple[int | str, ...], Node | Number]]:
+    """Entries with their indices; along the run-time size one value stands for all k < n."""
+    if not shape:
+        return [((), value)]  # type: ignore[list-item]
+    if isinstance(shape[0], str):
+        return [((LOOP_INDEX, *rest), v) for rest, v in _flatten(value, shape[1:])]
+    if not isinstance(value, (list, tuple)) or len(value) != shape[0]:
+        raise ValueError(f"{value!r} does not fill the shape {shape}")
+    entries = enumerate(value)
+    return [((i, *rest), v) for i, entry in entries for rest, v in _flatten(entry, shape[1:])]
 
 
 def derivative(node: Node, seeds: dict[Node, Node | Number]) -> Node:
