@@ -7,10 +7,10 @@ poles and on overflow.  Truth is 1 or 0; what is neither zero nor NaN is true.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import mpmath
 
@@ -22,7 +22,9 @@ Operation = Callable[..., Any]
 class Arithmetic(Protocol):
     """What an evaluation needs: conversion of inputs and constants, and the operations."""
 
-    operations: dict[str, Operation]
+    @property
+    def operations(self) -> Mapping[str, Operation]:
+        """Operation name -> function."""
 
     def number(self, value: Any) -> Any:
         """An input as a number of this arithmetic."""
@@ -118,7 +120,7 @@ def _power(a: float, b: float) -> float:
 class FloatArithmetic:
     """Doubles, with the values C gives."""
 
-    operations: dict[str, Operation] = {
+    operations: ClassVar[dict[str, Operation]] = {
         **_shared(float, math.isnan),
         "div": _divide,
         "pow": _power,
@@ -149,6 +151,12 @@ class FloatArithmetic:
 
 
 # --- mpmath ------------------------------------------------------------------------------------
+
+
+#: Operations that mpmath calls by the same name.
+_MPMATH_NAMES = (
+    "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp",
+)  # fmt: skip
 
 
 @lru_cache(maxsize=16)
@@ -182,10 +190,9 @@ class PreciseArithmetic:
                 return a / b
             return context.nan if a == 0 or context.isnan(a) else context.sign(a) * context.inf
 
-        unary = "sqrt sin cos tan asin acos atan sinh cosh tanh exp".split()
         self.operations: dict[str, Operation] = {
             **_shared(context.mpf, context.isnan),
-            **{name: real(getattr(context, name)) for name in unary},
+            **{name: real(getattr(context, name)) for name in _MPMATH_NAMES},
             "div": divide,
             "pow": real(context.power),
             "atan2": real(context.atan2),

@@ -33,7 +33,7 @@ Values = Any
 
 
 class GuardFailure(NumericalFailure):
-    """A guard of the kernel did not hold, or a pivot of `solve` vanished.  `code` is what C returns."""
+    """A guard did not hold, or a pivot of `solve` vanished; `code` is what C returns."""
 
     def __init__(self, kernel: str, code: int, message: str) -> None:
         super().__init__(f"{kernel}: {message} (code {code})")

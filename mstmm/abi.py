@@ -84,12 +84,13 @@ int mstmm_tape_run(const mstmm_tape *tape, const real *const *inputs, real *work
 """
 
 #: Words a C parameter may not be called: C17 keywords, what the kernels call, and their locals.
-_RESERVED = frozenset(
+_RESERVED_WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if "
     "inline int long register restrict return short signed sizeof static struct switch typedef "
     "union unsigned void volatile while real n k NULL main "
-    "sqrt sin cos tan asin acos atan atan2 sinh cosh tanh exp log pow fabs floor isnan".split()
+    "sqrt sin cos tan asin acos atan atan2 sinh cosh tanh exp log pow fabs floor isnan"
 )
+_RESERVED = frozenset(_RESERVED_WORDS.split())
 _TEMPORARY = re.compile(r"t\d+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
