@@ -343,9 +343,7 @@ class _Writer:
             return node.leaf
         return Constant("pi") if node.op == "pi" else None
 
-    def _emit(
-        self, root: Node, into: list[Statement], known: dict[int, Operand]
-    ) -> Operand:
+    def _emit(self, root: Node, into: list[Statement], known: dict[int, Operand]) -> Operand:
         stack = [root]
         while stack:
             node = stack[-1]
