@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -164,3 +165,21 @@ def test_import_contracts_hold() -> None:
         [linter, "--no-cache"], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert done.returncode == 0, done.stdout
+
+
+def test_links_between_the_pages_lead_somewhere() -> None:
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--", "*.md"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
+    dead = [
+        (name, target)
+        for name in listed.stdout.split("\0")
+        if name
+        for target in re.findall(r"\]\(([^)#\s]+)", (ROOT / name).read_text())
+        if "://" not in target and not (ROOT / name).parent.joinpath(target).exists()
+    ]
+    assert not dead
