@@ -110,9 +110,7 @@ def tensor_form(body: MassDistribution) -> Matrix:
     """M r_c x a0 + J omegadot + omega x J omega: Euler's equations written with the tensor J."""
     inertia = body.inertia
     return Matrix(
-        body.mass * tilde(body.center) * A0
-        + inertia * OMEGADOT
-        + tilde(OMEGA) * inertia * OMEGA
+        body.mass * tilde(body.center) * A0 + inertia * OMEGADOT + tilde(OMEGA) * inertia * OMEGA
     ).expand()
 
 

@@ -18,7 +18,7 @@ from .derivation import Equation, tilde
 Matrix: TypeAlias = sp.ImmutableDenseMatrix
 
 
-class Tilde(sp.MatrixExpr):  # type: ignore[misc]
+class Tilde(sp.MatrixExpr):
     """Cross-product matrix of a 3 x 1 matrix expression, kept unevaluated: Tilde(a) b = a x b."""
 
     def __new__(cls, vector: sp.Basic) -> Tilde:

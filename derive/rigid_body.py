@@ -25,7 +25,7 @@ OMEGA = vector("omega", 3)
 BODY_INPUTS = (
     Quantity(MASS, "kg", "mass"),
     Quantity(CENTER, "m", "mass centre from the input end I"),
-    Quantity(INERTIA, "kg m^2", "inertia tensor about I", symmetric=True),
+    Quantity(INERTIA, "kg*m2", "inertia tensor about I", symmetric=True),
     Quantity(OMEGA, "rad/s", "angular velocity of the body"),
 )
 
@@ -109,7 +109,7 @@ def _input_quantities(ends: list[Triple], acting: list[Triple]) -> tuple[Quantit
         quantities += [
             Quantity(point, "m", f"point of load {k + 1} from I"),
             Quantity(force, "N", f"external force {k + 1}"),
-            Quantity(moment, "N m", f"external moment {k + 1}"),
+            Quantity(moment, "N*m", f"external moment {k + 1}"),
         ]
     return tuple(quantities)
 
@@ -117,13 +117,13 @@ def _input_quantities(ends: list[Triple], acting: list[Triple]) -> tuple[Quantit
 def _output_quantities(ends: list[Triple]) -> tuple[Quantity, ...]:
     mass_matrix = sp.MatrixSymbol("mass_matrix", 6, 6)
     quantities = [
-        Quantity(mass_matrix, "kg, kg m, kg m^2", "d f_I / d a_I", symmetric=True),
-        Quantity(vector("bias", 6), "N, N m", "f_I at zero a_I and free output ends"),
+        Quantity(mass_matrix, "kg, kg*m, kg*m2", "d f_I / d a_I", symmetric=True),
+        Quantity(vector("bias", 6), "N, N*m", "f_I at zero a_I and free output ends"),
     ]
     for k, (_, shift, centripetal) in enumerate(ends):
         quantities += [
             Quantity(shift, "-, m", f"d a_O{k + 1} / d a_I"),
-            Quantity(centripetal, "m/s^2, rad/s^2", f"a_O{k + 1} at zero a_I"),
+            Quantity(centripetal, "m/s2, rad/s2", f"a_O{k + 1} at zero a_I"),
         ]
     return tuple(quantities)
 
