@@ -91,6 +91,8 @@ class _Lowering:
         self.known[str(equation.left.name)] = value
 
     def stored(self, quantity: Quantity) -> list[object]:
+        if quantity.rows * quantity.columns == 0:  # a hinge without speeds has empty gains
+            return [] if quantity.columns == 1 else [[] for _ in range(quantity.rows)]
         value = self.known[quantity.name]
         if quantity.symmetric:
             return [value[i][j] for i in range(quantity.rows) for j in range(i, quantity.rows)]
@@ -290,12 +292,12 @@ class _Lowering:
         return first
 
     def _quotient(self, e: sp.Mul) -> Node:
-        """Keep a/b one division instead of a * (1/b)."""
+        """Products times the reciprocal of the denominator, which value numbering then shares."""
         above, below = sp.fraction(e, exact=True)
         result = self.graph.constant(1)
         for factor in sorted(sp.Mul.make_args(above), key=sp.default_sort_key):
             result = result * self.scalar(factor)
-        return result if below == 1 else result / self.scalar(below)
+        return result if below == 1 else result * (1 / self.scalar(below))
 
     def _piecewise(self, e: sp.Piecewise) -> Node:
         *cases, (value, condition) = e.args

@@ -1,0 +1,22 @@
+"""Ball hinge: free rotation, coordinates a unit quaternion, speeds in outboard axes."""
+
+import sympy as sp
+
+from ..element import Hinge, Param, Symbols
+from ..quaternion import rate_of, rotation_of
+
+
+class Ball(Hinge):
+    """Relative angular velocity in outboard axes is the speed; no singular orientation."""
+
+    name = "ball"
+    title = "ball hinge"
+    coordinates = tuple(Param(n, "", "unit quaternion, outboard to inboard") for n in "wxyz")
+    speeds = tuple(Param(f"w{n}", "rad/s", "angular velocity, outboard axes") for n in "xyz")
+    sources = ("Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)",)
+
+    def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
+        return rotation_of(*q)
+
+    def rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix:
+        return rate_of(sp.Matrix(list(q)), sp.Matrix(list(u)))

@@ -1,0 +1,10 @@
+"""Fixed hinge (weld): no relative motion."""
+
+from ..element import Hinge
+
+
+class Fixed(Hinge):
+    """Both ends move as one."""
+
+    name = "fixed"
+    title = "fixed hinge"

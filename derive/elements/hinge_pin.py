@@ -1,0 +1,17 @@
+"""Pin hinge: one rotation about the hinge axis (z)."""
+
+import sympy as sp
+
+from ..element import Hinge, Param, Symbols, rotation_about
+
+
+class Pin(Hinge):
+    """Rotation about z of the hinge frame."""
+
+    name = "pin"
+    title = "pin hinge"
+    coordinates = (Param("angle", "rad", "rotation about the hinge axis"),)
+    sources = ("Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)",)
+
+    def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
+        return rotation_about(2, q.angle)

@@ -1,0 +1,16 @@
+"""Prismatic hinge: one translation along the hinge axis (z)."""
+
+import sympy as sp
+
+from ..element import Hinge, Param, Symbols
+
+
+class Prismatic(Hinge):
+    """Translation along z of the hinge frame."""
+
+    name = "prismatic"
+    title = "prismatic hinge"
+    coordinates = (Param("displacement", "m", "translation along the hinge axis"),)
+
+    def position(self, q: Symbols, p: Symbols) -> sp.Matrix:
+        return sp.Matrix([0, 0, q.displacement])

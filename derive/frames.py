@@ -1,0 +1,281 @@
+"""Poses, velocities and end points: what loads, springs and results need beyond the sweep."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from .derivation import Derivation, Equation, Quantity, tilde, vector
+from .sweep import MOTION, SHIFT, E, R, _column, _stack, _symbol
+
+A_PARENT = Quantity(_symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
+X_PARENT = Quantity(_symbol("x_I", 3), "m", "P of the parent, inertial axes")
+A = Quantity(_symbol("A", 3, 3), "", "rotation, body axes to inertial axes")
+X = Quantity(_symbol("x", 3), "m", "P of the body, inertial axes")
+V = Quantity(_symbol("v", 3), "m/s", "velocity of P, body axes")
+W = Quantity(_symbol("w", 3), "rad/s", "angular velocity, body axes")
+OFFSET = Quantity(_symbol("offset", 3), "m", "point of the body from P, body axes")
+
+
+def pose() -> Derivation:
+    """Pose of a body from that of its parent."""
+    return Derivation(
+        "frames",
+        "pose of a body",
+        (A_PARENT, X_PARENT, R, SHIFT),
+        (A, X),
+        (
+            Equation("rotation", A.symbol, A_PARENT.symbol * R.symbol),
+            Equation("position", X.symbol, X_PARENT.symbol + A_PARENT.symbol * SHIFT.symbol),
+        ),
+    )
+
+
+def velocity() -> Derivation:
+    """Velocity of P, from the parent's and the hinge's own (body axes)."""
+    v_i, w_i, own = vector("v_I", 3), vector("w_I", 3), vector("v_rel", 3)
+    carried = R.symbol.T * (v_i + tilde(_column(w_i)) * SHIFT.symbol)
+    return Derivation(
+        "frames",
+        "velocity of a body's input end",
+        (
+            R,
+            SHIFT,
+            Quantity(v_i, "m/s", "velocity of the parent's P, parent axes"),
+            Quantity(w_i, "rad/s", "angular velocity of the parent, parent axes"),
+            Quantity(own, "m/s", "relative velocity of the hinge, body axes"),
+        ),
+        (V,),
+        (Equation("velocity", V.symbol, carried + own),),
+    )
+
+
+def point() -> Derivation:
+    """Position, velocity and acceleration of a point of a body, inertial axes.
+
+    The swept motion carries gravity as an acceleration of the ground, which is put back here.
+    """
+    at, rate, second = _symbol("x_K", 3), _symbol("v_K", 3), _symbol("a_K", 3)
+    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    gravity = Quantity(_symbol("gravity", 3), "m/s2", "inertial axes")
+    lever, motion = OFFSET.symbol, MOTION.symbol
+    spin, turn = tilde(_rows(motion, 0)), tilde(_rows(motion, 3) + _rows(delta.symbol, 3))
+    linear = _rows(motion, 6) + _rows(delta.symbol, 0)
+    return Derivation(
+        "frames",
+        "motion of a point of a body",
+        (A, X, V, MOTION, delta, OFFSET, gravity),
+        (
+            Quantity(at, "m", "position, inertial axes"),
+            Quantity(rate, "m/s", "velocity, inertial axes"),
+            Quantity(second, "m/s2", "acceleration, inertial axes"),
+        ),
+        (
+            Equation("position", at, X.symbol + A.symbol * lever),
+            Equation("velocity", rate, A.symbol * (V.symbol + spin * lever)),
+            Equation(
+                "acceleration",
+                second,
+                A.symbol * (linear + turn * lever + spin * (spin * lever)) + gravity.symbol,
+            ),
+        ),
+    )
+
+
+def turning() -> Derivation:
+    """Angular velocity and acceleration of a body in inertial axes."""
+    rate, second = _symbol("w_K", 3), _symbol("alpha_K", 3)
+    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    motion = MOTION.symbol
+    return Derivation(
+        "frames",
+        "turning of a body",
+        (A, MOTION, delta),
+        (
+            Quantity(rate, "rad/s", "angular velocity, inertial axes"),
+            Quantity(second, "rad/s2", "angular acceleration, inertial axes"),
+        ),
+        (
+            Equation("angular velocity", rate, A.symbol * _rows(motion, 0)),
+            Equation(
+                "angular acceleration",
+                second,
+                A.symbol * (_rows(motion, 3) + _rows(delta.symbol, 3)),
+            ),
+        ),
+    )
+
+
+def end_frame() -> Derivation:
+    """Axes of an end of a body."""
+    own, axes = _symbol("R_end", 3, 3), _symbol("A_end", 3, 3)
+    return Derivation(
+        "frames",
+        "axes of an end",
+        (A, Quantity(own, "", "rotation, end axes to body axes")),
+        (Quantity(axes, "", "rotation, end axes to inertial axes"),),
+        (Equation("axes of the end", axes, A.symbol * own),),
+    )
+
+
+def opposite() -> Derivation:
+    """What the F end of a massless element feels when T feels F and M."""
+    x_f, x_t, force, moment = (_symbol(n, 3) for n in ("x_F", "x_T", "F", "M"))
+    back, turn = _symbol("F_back", 3), _symbol("M_back", 3)
+    return Derivation(
+        "frames",
+        "load on the other end of a force element",
+        tuple(Quantity(s) for s in (x_f, x_t, force, moment)),
+        (Quantity(back, "N", "force on F"), Quantity(turn, "N*m", "moment on F")),
+        (
+            Equation("force", back, -force),
+            Equation("moment", turn, -moment - tilde(_rows(x_t - x_f, 0)) * force),
+        ),
+    )
+
+
+def power() -> Derivation:
+    """Power of a force and moment at a point, all in the load's axes."""
+    axes, force, moment = _symbol("A_F", 3, 3), _symbol("F", 3), _symbol("M", 3)
+    v_k, w_k, total = _symbol("v_K", 3), _symbol("w_K", 3), _symbol("P", 1)
+    return Derivation(
+        "frames",
+        "power of an applied load",
+        (
+            Quantity(axes, "", "rotation, axes of the load to inertial axes"),
+            Quantity(force, "N", "force, axes of the load"),
+            Quantity(moment, "N*m", "moment, axes of the load"),
+            Quantity(v_k, "m/s", "velocity of the point, inertial axes"),
+            Quantity(w_k, "rad/s", "angular velocity, inertial axes"),
+        ),
+        (Quantity(total, "W", "power"),),
+        (
+            Equation(
+                "power",
+                total,
+                v_k.T * (axes * force) + w_k.T * (axes * moment),
+            ),
+        ),
+    )
+
+
+def gravity_energy() -> Derivation:
+    """Potential of uniform gravity, zero at the inertial origin, from the body's mass matrix."""
+    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    gravity = Quantity(_symbol("gravity", 3), "m/s2", "inertial axes")
+    matrix, energy = mass_matrix.symbol, _symbol("V", 1)
+    moment = sp.ImmutableDenseMatrix([matrix[1, 5], matrix[2, 3], matrix[0, 4]])
+    # The mixed block is -tilde(m c): entries (2,6), (3,4), (1,5) hold m c_x, m c_y, m c_z.
+    return Derivation(
+        "frames",
+        "potential energy of gravity",
+        (mass_matrix, A, X, gravity),
+        (Quantity(energy, "J", "potential energy"),),
+        (
+            Equation(
+                "V = -g . (m x + A m c)",
+                energy,
+                -(gravity.symbol.T * (matrix[0, 0] * X.symbol + A.symbol * moment)),
+            ),
+        ),
+    )
+
+
+def applied_load() -> Derivation:
+    """External force and moment at a point, subtracted from e (f_I = S a + e - applied)."""
+    axes = Quantity(_symbol("A_F", 3, 3), "", "rotation, axes of the load to inertial axes")
+    force = Quantity(_symbol("F", 3), "N", "force, axes of the load")
+    moment = Quantity(_symbol("M", 3), "N*m", "moment, axes of the load")
+    load = Quantity(E.symbol, "N, N*m", "contribution to e", accumulate=True)
+    local, turning = _symbol("F_b", 3), _symbol("M_b", 3)
+    return Derivation(
+        "frames",
+        "load applied at a point of a body",
+        (A, axes, OFFSET, force, moment),
+        (load,),
+        (
+            Equation("force in body axes", local, A.symbol.T * (axes.symbol * force.symbol)),
+            Equation("moment in body axes", turning, A.symbol.T * (axes.symbol * moment.symbol)),
+            Equation(
+                "e = -[F; offset x F + M]",
+                load.symbol,
+                _stack(-local, -(tilde(_column(OFFSET.symbol)) * local + turning)),
+            ),
+        ),
+    )
+
+
+def momentum() -> Derivation:
+    """Momentum of a body and angular momentum about the inertial origin from S and its velocity."""
+    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    linear, angular = _symbol("L", 3), _symbol("K", 3)
+    local = _symbol("h", 6)
+    return Derivation(
+        "frames",
+        "momentum of a body",
+        (mass_matrix, A, X, V, W),
+        (
+            Quantity(linear, "kg*m/s", "momentum, inertial axes", accumulate=True),
+            Quantity(
+                angular, "kg*m2/s", "about the inertial origin, inertial axes", accumulate=True
+            ),
+        ),
+        (
+            Equation("momentum at P", local, mass_matrix.symbol * _stack(V.symbol, W.symbol)),
+            Equation("momentum", linear, A.symbol * _rows(local, 0)),
+            Equation(
+                "angular momentum",
+                angular,
+                A.symbol * _rows(local, 3)
+                + tilde(_column(X.symbol)) * (A.symbol * _rows(local, 0)),
+            ),
+        ),
+    )
+
+
+def _rows(symbol: sp.MatrixSymbol, first: int) -> sp.ImmutableDenseMatrix:
+    return sp.ImmutableDenseMatrix([symbol[first + i, 0] for i in range(3)])
+
+
+def reaction() -> Derivation:
+    """f = S delta + e at P, body axes, and its components in inertial axes."""
+    s = Quantity(_symbol("S", 6, 6), "", "f = S a + e of everything outboard", symmetric=True)
+    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    f, force, moment = _symbol("f", 6), _symbol("force", 3), _symbol("moment", 3)
+    return Derivation(
+        "frames",
+        "load of the inboard on the outboard side at P",
+        (s, E, delta, A),
+        (
+            Quantity(f, "N, N*m", "body axes"),
+            Quantity(force, "N", "inertial axes"),
+            Quantity(moment, "N*m", "inertial axes"),
+        ),
+        (
+            Equation("f = S delta + e", f, s.symbol * delta.symbol + E.symbol),
+            Equation("force", force, A.symbol * _rows(f, 0)),
+            Equation("moment", moment, A.symbol * _rows(f, 3)),
+        ),
+    )
+
+
+def transport() -> Derivation:
+    """Load at P carried to P of the parent: what inverse dynamics sums up."""
+    load = Quantity(_symbol("e_I", 6), "N, N*m", "contribution to the parent", accumulate=True)
+    push = _symbol("push", 3)
+    return Derivation(
+        "frames",
+        "load carried to the parent",
+        (R, SHIFT, E),
+        (load,),
+        (
+            Equation("force, parent axes", push, R.symbol * _rows(E.symbol, 0)),
+            Equation(
+                "X^T e",
+                load.symbol,
+                _stack(
+                    push,
+                    R.symbol * _rows(E.symbol, 3) + tilde(_column(SHIFT.symbol)) * push,
+                ),
+            ),
+        ),
+    )
