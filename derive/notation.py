@@ -32,11 +32,44 @@ class Tilde(sp.MatrixExpr):
         return (sp.Integer(3), sp.Integer(3))
 
     def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
-        return tilde(explicit(self.args[0]))[i, j]
+        return explicit(self)[i, j]
+
+
+class Perp(sp.MatrixExpr):
+    """A plane column turned by +90 degrees: b . Perp(a) is the plane cross product a x b."""
+
+    def __new__(cls, vector: sp.Basic) -> Perp:
+        if tuple(vector.shape) != (2, 1):
+            raise ValueError(f"a plane vector is a 2 x 1 column, not {vector.shape}")
+        instance: Perp = super().__new__(cls, vector)
+        return instance
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return (sp.Integer(2), sp.Integer(1))
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        return explicit(self)[i, j]
 
 
 def explicit(expression: sp.Basic) -> Matrix:
     """Entries of a matrix expression of matrix symbols, cross products and explicit matrices."""
+    if isinstance(expression, sp.MatAdd):
+        first, *rest = (explicit(term) for term in expression.args)
+        return Matrix(sum(rest, first))
+    if isinstance(expression, sp.MatMul):
+        factor, (first, *others) = expression.as_coeff_matrices()
+        product = explicit(first)
+        for other in others:
+            product = product * explicit(other)
+        return Matrix(factor * product)
+    if isinstance(expression, sp.Transpose):
+        return Matrix(explicit(expression.arg).T)
+    if isinstance(expression, Tilde):
+        return tilde(explicit(expression.args[0]))
+    if isinstance(expression, Perp):
+        x, y = explicit(expression.args[0])
+        return Matrix([-y, x])
     return Matrix(expression.as_explicit())
 
 
@@ -60,9 +93,8 @@ def solve_linear(
     Raises ValueError if a premise is not linear in them, or if the premises do not determine every
     unknown.
     """
-    names = {
-        entry: sp.Dummy(str(entry)) for symbol in (*unknowns, *knowns) for entry in explicit(symbol)
-    }
+    entries = [entry for symbol in (*unknowns, *knowns) for entry in explicit(symbol)]
+    names = {entry: sp.Dummy(str(entry)) for entry in entries}
     residuals = [entry for premise in premises for entry in residual(premise).xreplace(names)]
     solved = [names[e] for symbol in unknowns for e in explicit(symbol)]
     given = [names[e] for symbol in knowns for e in explicit(symbol)]

@@ -217,7 +217,7 @@ def _relative_form() -> bool:
 
 
 def _missing_gyroscopic_term() -> bool:
-    """In body axes x, y, z are constant: (2.34) gives zero; the rate of h alone misses omega x h."""
+    """In body axes x, y, z are constant: (2.34) gives zero, and dh/dt there misses omega x h."""
     body = general()
     second_rates = ne.component_rate(ne.component_rate(POINT))
     as_printed = body.integral(tilde(POINT) * second_rates)

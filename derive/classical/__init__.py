@@ -1,0 +1,36 @@
+"""The classical transfer matrices: one file per element, each a Derivation with its premises.
+
+`CLASSICAL` names them; `guards` are the pivot guards to lower them with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..derivation import Derivation
+from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
+from .hinge_relation import PIVOT_LIMIT, VANISHING_PIVOT, guards
+
+__all__ = ["CLASSICAL", "PIVOT_LIMIT", "VANISHING_PIVOT", "classical_guards", "guards"]
+
+
+def _planar_acceleration() -> Derivation:
+    return acceleration.derivation(acceleration.PLANAR_DIRECTIONS, planar=True)
+
+
+#: Name -> derivation of the classical elements that are generated.
+CLASSICAL: dict[str, Callable[[], Derivation]] = {
+    "body_planar": body_planar.derivation,
+    "body_spatial": body_spatial.derivation,
+    "pin_planar": pin_planar.derivation,
+    "ball": ball.derivation,
+    "pin_spatial": pin_spatial.derivation,
+    "acceleration": acceleration.derivation,
+    "acceleration_planar": _planar_acceleration,
+}
+
+
+def classical_guards(derivation: Derivation) -> tuple[tuple[object, int, str], ...]:
+    """Guards of a classical element: the pivot's for a hinge, none for a body."""
+    has_margin = any(quantity.name == "margin" for quantity in derivation.outputs)
+    return guards(derivation) if has_margin else ()

@@ -1,0 +1,185 @@
+"""How a classical hinge gets its matrix: the next hinge's condition gives the free acceleration.
+
+A hinge by itself says nothing about its free accelerations.  The books take them from the effort
+condition L (m, q)_N = t of the hinge that follows the outboard body: with the state behind the
+hinge z_O = E z_I + G alpha and the force rows F of the outboard body's transfer matrix,
+
+    (L F G) alpha = t - L F E z_I,        U_hinge = E + G K,   K = (L F G)^-1 (t - L F E).
+
+The pivot L F G depends on one body only and may vanish in systems that are perfectly regular.
+`margin` measures how close it is: 1 / |(L F G)^-1| (|L| F_scale |G|) in the row-sum norm, at most
+about 1, and zero when the pivot vanishes.  `guards` leaves the kernel below `PIVOT_LIMIT`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ..derivation import Derivation, Equation, Quantity, Solve
+from ..notation import Matrix, residual, solve_linear
+from .state import BOOK, State, closed
+
+#: Relative size below which a pivot counts as vanished, and the failure code of a kernel then.
+PIVOT_LIMIT = sp.Rational(1, 10**8)
+VANISHING_PIVOT = 2
+
+
+@dataclass(frozen=True)
+class HingeStatement:
+    """What one classical hinge states; everything else follows by elimination.
+
+    `premises` give the state behind the hinge (end O) from the state before it (end I) and the
+    free accelerations; `conditions` are the next hinge's equations for m and q at the output end N
+    of the outboard body; `bias` are definitions that the premises use.
+    """
+
+    element: str
+    title: str
+    state: State
+    free: sp.MatrixSymbol
+    inputs: tuple[Quantity, ...]
+    premises: tuple[Equation, ...]
+    conditions: tuple[Equation, ...]
+    source: str
+    equation: str
+    bias: tuple[Equation, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def derivation(statement: HingeStatement) -> Derivation:
+    """Definitions of U_h (z_O = U_h z_I) and of the pivot's margin."""
+    state = statement.state
+    n, freedoms = state.length, int(statement.free.rows)
+    body = sp.MatrixSymbol("U", n, n)
+    scale = sp.MatrixSymbol("F_scale", state.accelerations, state.accelerations)
+    return Derivation(
+        element=statement.element,
+        title=statement.title,
+        inputs=(
+            Quantity(body, state.unit, "transfer matrix of the outboard body"),
+            Quantity(scale, "kg*m, kg*m2; kg, kg*m", "F_scale of the outboard body"),
+            *statement.inputs,
+        ),
+        outputs=(
+            Quantity(sp.MatrixSymbol("U_h", n, n), state.unit, "transfer matrix, z_O = U_h z_I"),
+            Quantity(sp.MatrixSymbol("margin", 1, 1), "1", "relative size of the pivot, 0 to 1"),
+        ),
+        definitions=(
+            *statement.bias,
+            *_relation(statement, body),
+            *_elimination(n, freedoms, statement.equation),
+            *_margin(statement, scale),
+        ),
+        premises=(*statement.premises, *statement.conditions),
+        sources=(f"{BOOK}, {statement.source}",),
+        notes=(
+            "State in inertial axes; the outboard body's next hinge frees as many directions.",
+            "The relation fails where the pivot vanishes: use the Riccati sweep there.",
+            *statement.notes,
+        ),
+    )
+
+
+def carried(statement: HingeStatement) -> tuple[Matrix, Matrix]:
+    """E and G of z_O = E z_I + G alpha (n x n and n x freedoms), solved from the premises."""
+    state = statement.state
+    freedoms = int(statement.free.rows)
+    rows = solve_linear(statement.premises, state.at("O"), (*state.at("I"), statement.free))
+    before = state.length - 1
+    constant = rows[:, before + freedoms :]
+    carry = closed(Matrix(rows[:, :before].row_join(constant)))
+    free = Matrix(rows[:, before : before + freedoms].col_join(sp.zeros(1, freedoms)))
+    return carry, free
+
+
+def condition(statement: HingeStatement) -> tuple[Matrix, Matrix]:
+    """L and t of the next hinge's condition L (m, q)_N = t (freedoms x efforts, freedoms x 1)."""
+    efforts = statement.state.at("N")[2:]
+    residuals = sp.Matrix.vstack(*(residual(equation) for equation in statement.conditions))
+    columns = sp.Matrix([symbol[i, 0] for symbol in efforts for i in range(int(symbol.rows))])
+    rows = residuals.jacobian(columns)
+    rest = (residuals - rows * columns).applyfunc(sp.expand)
+    if rows.rows != int(statement.free.rows):
+        raise ValueError(
+            f"{statement.element}: {rows.rows} conditions for {statement.free.rows} free directions"
+        )
+    return Matrix(rows), Matrix(-rest)
+
+
+def _relation(statement: HingeStatement, body: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    state = statement.state
+    carry, free = carried(statement)
+    rows, effort = condition(statement)
+    first, n, freedoms = state.accelerations, state.length, rows.rows
+    outboard = Matrix(first, n, lambda i, j: body[first + i, j])
+    right = Matrix(sp.zeros(freedoms, n - 1).row_join(effort))
+    return (
+        Equation("carried state", sp.MatrixSymbol("E", n, n), carry, "", "z_O at zero alpha"),
+        Equation("free directions", sp.MatrixSymbol("G", n, freedoms), free, "", "dz_O / dalpha"),
+        Equation(
+            "next hinge's condition", sp.MatrixSymbol("L", freedoms, first), rows,
+            "", "rows on (m, q) at the output end of the outboard body",
+        ),
+        Equation("next hinge's effort", sp.MatrixSymbol("T", freedoms, n), right),
+        Equation(
+            "force rows of the outboard body", sp.MatrixSymbol("F", first, n), outboard,
+            "", "rows m and q of its transfer matrix",
+        ),
+    )  # fmt: skip
+
+
+def _elimination(n: int, freedoms: int, equation: str) -> tuple[Equation, ...]:
+    carry, free = sp.MatrixSymbol("E", n, n), sp.MatrixSymbol("G", n, freedoms)
+    rows = sp.MatrixSymbol("L", freedoms, (n - 1) // 2)
+    effort, outboard = sp.MatrixSymbol("T", freedoms, n), sp.MatrixSymbol("F", (n - 1) // 2, n)
+    pivot, right = sp.MatrixSymbol("P", freedoms, freedoms), sp.MatrixSymbol("R", freedoms, n)
+    solved = sp.MatrixSymbol("KV", freedoms, n + freedoms)
+    gain, inverse = sp.MatrixSymbol("K", freedoms, n), sp.MatrixSymbol("V", freedoms, freedoms)
+    both = sp.BlockMatrix([[right, sp.Identity(freedoms)]])
+    return (
+        Equation("pivot", pivot, rows * outboard * free),
+        Equation("right side", right, effort - rows * outboard * carry),
+        Equation("free accelerations", solved, Solve(pivot, both), "", "P^-1 [R, I]"),
+        Equation("gain", gain, _columns(solved, 0, n), "", "alpha = K z_I"),
+        Equation("inverse pivot", inverse, _columns(solved, n, freedoms)),
+        Equation("transfer matrix", sp.MatrixSymbol("U_h", n, n), carry + free * gain, equation),
+    )
+
+
+def _columns(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
+    return Matrix(int(matrix.rows), count, lambda i, j: matrix[i, first + j])
+
+
+def _margin(statement: HingeStatement, scale: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    """Pivot scale |L| F_scale |G| and the margin 1 / ||P^-1| scale| (row sums)."""
+    freedoms = int(statement.free.rows)
+    _, free = carried(statement)
+    rows, _ = condition(statement)
+    moving = free[: statement.state.accelerations, :]
+    sizes = sp.MatrixSymbol("P_scale", freedoms, freedoms)
+    spread = sp.MatrixSymbol("P_spread", freedoms, freedoms)
+    inverse = sp.MatrixSymbol("V", freedoms, freedoms)
+    sums = [sp.Add(*(spread[i, j] for j in range(freedoms))) for i in range(freedoms)]
+    terms = Matrix(rows.applyfunc(sp.Abs)) * scale * Matrix(moving.applyfunc(sp.Abs))
+    magnitudes = Matrix(inverse.as_explicit().applyfunc(sp.Abs))
+    margin = Matrix([[1 / sp.Max(*sums)]])
+    return (
+        Equation("pivot scale", sizes, terms, "", "magnitude of the terms that make the pivot"),
+        Equation("spread", spread, magnitudes * sizes),
+        Equation("pivot margin", sp.MatrixSymbol("margin", 1, 1), margin),
+    )
+
+
+def guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
+    """Guards for `mstmm.derive.lower.lower`: leave with VANISHING_PIVOT below PIVOT_LIMIT."""
+    margin = next(q.symbol for q in hinge.outputs if q.name == "margin")
+    return (
+        (
+            margin[0, 0] > PIVOT_LIMIT,
+            VANISHING_PIVOT,
+            f"{hinge.element}: the pivot vanishes, the product of transfer matrices does not exist "
+            "here; use the Riccati sweep",
+        ),
+    )
