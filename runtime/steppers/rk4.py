@@ -1,0 +1,25 @@
+"""The classical fourth-order method, for fixed steps.
+
+W. Kutta, Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen, Zeitschrift
+fuer Mathematik und Physik 46 (1901) 435-453.  Dense output is the cubic Hermite interpolant; the
+slope at the step's end is the next step's first stage, so it costs nothing.
+"""
+
+from __future__ import annotations
+
+from .tableau import Tableau, frozen, hermite
+
+
+def tableau() -> Tableau:
+    """The method `rk4`."""
+    weights = [1 / 6, 1 / 3, 1 / 3, 1 / 6]
+    return Tableau(
+        name="rk4",
+        order=4,
+        A=frozen([[0.0, 0, 0, 0], [0.5, 0, 0, 0], [0.0, 0.5, 0, 0], [0.0, 0, 1, 0]]),
+        B=frozen(weights),
+        C=frozen([0.0, 0.5, 0.5, 1.0]),
+        dense=hermite(weights),
+        dense_order=4,
+        source="Kutta (1901)",
+    )

@@ -1,0 +1,203 @@
+"""What the C loop must know of a Runge-Kutta method: its coefficients, as plain arrays.
+
+A method has `s` stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage
+of the next step, then `e` extra stages that serve dense output alone.  Dense output is
+
+    y(t + theta h) = y(t) + h sum_i k_i p_i(theta),   p_i(theta) = sum_j dense[i, j] phi_j(theta)
+
+with phi = theta, theta (1 - theta), theta^2 (1 - theta), theta^2 (1 - theta)^2, ...: a basis in
+which the first column is the step itself and the others vanish at both ends, so that evaluation
+is free of cancellation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def frozen(values: ArrayLike) -> Array:
+    """A contiguous, read-only copy in double precision."""
+    array = np.array(values, dtype=np.float64, order="C")
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Tableau:
+    """One explicit Runge-Kutta method.
+
+    Attributes:
+        name: the `method=` of `simulate`.
+        order: order of the result.
+        A: (s, s), strictly lower triangular; `A[0]` is zero.
+        B: (s,) weights of the step.
+        C: (s,) nodes, `C[0] = 0`.
+        dense: (s + 1 + e, d) dense-output weights in the basis of the module's docstring.
+        dense_order: order of the dense output as a whole.
+        E: (s + 1,) weights of the error estimate; None for fixed steps only.
+        error_order: order of that estimate; a step is scaled by norm**(-1 / (error_order + 1)).
+        E_low: (s + 1,) second estimate of lower order, combined with E as
+            E^2 / sqrt(E^2 + 0.01 E_low^2) (the 8(5,3) pair); None without.
+        A_extra, C_extra: (e, s + 1 + e) and (e,) rows of the extra stages.
+        beta: exponent of the previous error in the step controller, 0 for the plain one.
+        source: where the coefficients come from.
+
+    Raises:
+        ValueError: for shapes that do not fit, or weights that contradict each other.
+    """
+
+    name: str
+    order: int
+    A: Array
+    B: Array
+    C: Array
+    dense: Array
+    dense_order: int
+    E: Array | None = None
+    error_order: int = 0
+    E_low: Array | None = None
+    A_extra: Array = field(default_factory=lambda: frozen(np.zeros((0, 0))))
+    C_extra: Array = field(default_factory=lambda: frozen(np.zeros(0)))
+    beta: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        rows, extra = self.n_stages + 1 + self.n_extra, self.n_extra
+        for label, array, shape in (
+            ("A", self.A, (self.n_stages, self.n_stages)),
+            ("C", self.C, (self.n_stages,)),
+            ("A_extra", self.A_extra, (extra, rows if extra else self.A_extra.shape[-1])),
+            ("dense", self.dense, (rows, self.n_dense)),
+            ("E", self.E, (self.n_stages + 1,)),
+            ("E_low", self.E_low, (self.n_stages + 1,)),
+        ):
+            if array is None:
+                continue
+            if array.shape != shape:
+                raise ValueError(f"tableau {self.name}: {label} is {array.shape}, expected {shape}")
+            if array.flags.writeable or not array.flags.c_contiguous:
+                raise ValueError(f"tableau {self.name}: {label} must come from frozen()")
+        self._check_consistency()
+
+    def _check_consistency(self) -> None:
+        step = np.append(self.B, np.zeros(1 + self.n_extra))
+        if np.any(np.triu(self.A)) or self.C[0] != 0.0:
+            raise ValueError(f"tableau {self.name}: the method is not explicit")
+        if abs(self.B.sum() - 1.0) > 1e-13 or np.abs(self.A.sum(1) - self.C).max() > 1e-12:
+            raise ValueError(f"tableau {self.name}: sum(B) = 1 or sum(A[i]) = C[i] does not hold")
+        if np.abs(self.dense[:, 0] - step).max() > 1e-13:
+            raise ValueError(f"tableau {self.name}: dense output does not end at the step's end")
+
+    @property
+    def n_stages(self) -> int:
+        """Stages s of the step itself."""
+        return len(self.B)
+
+    @property
+    def n_extra(self) -> int:
+        """Extra stages e of the dense output."""
+        return len(self.C_extra)
+
+    @property
+    def n_dense(self) -> int:
+        """Degree d of the dense output in theta."""
+        return int(self.dense.shape[1])
+
+    @property
+    def adaptive(self) -> bool:
+        """True if the method estimates its error."""
+        return self.E is not None
+
+    def weights(self, theta: float) -> Array:
+        """p(theta), shape (s + 1 + e,): y(t + theta h) = y(t) + h p(theta) @ k."""
+        sum_ = np.zeros(self.dense.shape[0])
+        for j in reversed(range(self.n_dense)):
+            sum_ = (sum_ + self.dense[:, j]) * (1.0 - theta if j % 2 else theta)
+        return sum_
+
+    def amplification(self, z: complex) -> complex:
+        """R(z) of one step on y' = lambda y with z = h lambda: y(t + h) = R(z) y(t)."""
+        k = np.zeros(self.n_stages, dtype=complex)
+        for i in range(self.n_stages):
+            k[i] = 1.0 + z * (self.A[i, :i] @ k[:i])
+        return complex(1.0 + z * (self.B @ k))
+
+    def real_stability_limit(self) -> float:
+        """The largest x with |R(-x')| <= 1 for all 0 <= x' <= x."""
+        return self._limit(-1.0 + 0.0j)
+
+    def imaginary_stability_limit(self) -> float:
+        """The largest x with |R(i x')| <= 1 for all 0 <= x' <= x, rounding aside."""
+        return self._limit(0.0 + 1.0j)
+
+    def _limit(self, direction: complex) -> float:
+        step, low = 1e-2, 0.0
+        while low < 100.0 and abs(self.amplification((low + step) * direction)) <= 1.0 + 1e-9:
+            low += step
+        high = low + step
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            if abs(self.amplification(middle * direction)) <= 1.0 + 1e-9:
+                low = middle
+            else:
+                high = middle
+        return low
+
+
+def hermite(B: Sequence[float] | Array, n_extra: int = 0, D: ArrayLike | None = None) -> Array:
+    """Dense weights of the cubic Hermite interpolant through both ends and their slopes.
+
+    Args:
+        B: (s,) weights of the step.
+        n_extra: number e of extra stages.
+        D: (d - 3, s + 1 + e) corrections of higher degree, which vanish at both ends with their
+            slopes, as in the 8(5,3) method of Hairer, Norsett and Wanner.
+
+    Returns:
+        (s + 1 + e, 3 or d) weights in the basis of this module.
+    """
+    s = len(B)
+    step = np.append(np.asarray(B, dtype=np.float64), np.zeros(1 + n_extra))
+    first, last = np.zeros_like(step), np.zeros_like(step)
+    first[0], last[s] = 1.0, 1.0
+    columns = [step, first - step, 2.0 * step - first - last]
+    if D is not None:
+        columns += list(np.asarray(D, dtype=np.float64))
+    return frozen(np.stack(columns, axis=1))
+
+
+def from_monomials(P: ArrayLike) -> Array:
+    """Dense weights from p_i(theta) = sum_j P[i, j] theta^(j + 1), converted in exact arithmetic.
+
+    Args:
+        P: (s + 1 + e, d) coefficients of theta, theta^2, ..., as SciPy's RK methods carry them.
+    """
+    rows = [[Fraction(float(x)) for x in row] for row in np.asarray(P, dtype=np.float64)]
+    degree = len(rows[0])
+    basis = _basis_in_monomials(degree)
+    dense = []
+    for row in rows:
+        rest, weights = list(row), [Fraction(0)] * degree
+        for j in reversed(range(degree)):  # phi_j has degree j + 1: strip the highest power first
+            weights[j] = rest[j] / basis[j][j]
+            rest = [r - weights[j] * b for r, b in zip(rest, basis[j], strict=True)]
+        dense.append([float(w) for w in weights])
+    return frozen(dense)
+
+
+def _basis_in_monomials(degree: int) -> list[list[Fraction]]:
+    """phi_j as coefficients of theta .. theta^degree."""
+    power = [Fraction(0), Fraction(1), *[Fraction(0)] * (degree - 1)]  # of theta^0 .. theta^degree
+    basis = [power[1:]]
+    for j in range(1, degree):
+        shifted = [Fraction(0), *power[:-1]]
+        power = shifted if j % 2 == 0 else [p - q for p, q in zip(power, shifted, strict=True)]
+        basis.append(power[1:])
+    return basis

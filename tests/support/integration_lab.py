@@ -1,0 +1,94 @@
+"""The C of the time integration compiled with small test systems, opened by cffi in ABI mode."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cffi
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from numpy.typing import ArrayLike
+
+import mstmm.templates
+from mstmm.runtime.build_extension import cdef
+from mstmm.runtime.integrate import Run, Status
+from mstmm.runtime.steppers import Tableau, get
+
+from .c_library import compile_library
+
+SOURCES = ("engine_integrate", "engine_step", "engine_event")
+HEADERS = ("engine_integrate", "engine_step")
+TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
+TEST_DECLARATIONS = """
+typedef struct parameters { double p[8]; double memory[4]; long calls; double last_t; } parameters;
+parameters *test_parameters(void);
+int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int n_error);
+void test_use_bounce(mstmm_system *system, parameters *at);
+void test_use_three(mstmm_system *system, parameters *at);
+void test_use_accept(mstmm_system *system, parameters *at);
+"""
+
+
+def render_integration(folder: Path) -> None:
+    """Writes the C of the time integration into `folder`."""
+    templates = Environment(
+        loader=FileSystemLoader(mstmm.templates.__path__[0]),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    for name in [f"{s}.c" for s in SOURCES] + [f"{s}.h" for s in HEADERS]:
+        (folder / name).write_text(templates.get_template(f"{name}.jinja").render())
+
+
+@dataclass
+class Problem:
+    """A test system and its parameters, which C reads."""
+
+    lab: Lab
+    system: Any
+    at: Any
+
+    def run(self, method: str | Tableau, t_end: float, y0: ArrayLike, **options: Any) -> Run:
+        """A run from t_start (0 unless given), not yet advanced."""
+        tableau = get(method) if isinstance(method, str) else method
+        options.setdefault("t_start", 0.0)
+        return Run(self.lab.ffi, self.lab.lib, self.system, tableau, t_end=t_end, y0=y0, **options)
+
+    def solved(self, method: str | Tableau, t_end: float, y0: ArrayLike, **options: Any) -> Run:
+        """A run that has finished."""
+        run = self.run(method, t_end, y0, **options)
+        assert run.advance(60.0) is Status.FINISHED, run.message()
+        return run
+
+
+class Lab:
+    """The compiled library and its test systems."""
+
+    def __init__(self, folder: Path, *flags: str) -> None:
+        render_integration(folder)
+        shutil.copy(TEST_SYSTEMS, folder)
+        sources = [folder / f"{s}.c" for s in SOURCES]
+        sources.append(folder / TEST_SYSTEMS.name)
+        self.ffi = cffi.FFI()
+        self.ffi.cdef(cdef(folder / "engine_integrate.h") + TEST_DECLARATIONS)
+        options = ("-Wno-missing-prototypes", "-O2", *flags)
+        self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
+
+    def problem(self, rhs: str, n: int, *p: float, n_error: int | None = None) -> Problem:
+        """A system of `systems.c` with its parameters."""
+        system, at = self.ffi.new("mstmm_system *"), self.lib.test_parameters()
+        assert not self.lib.test_fill(
+            system, at, rhs.encode(), n, n if n_error is None else n_error
+        )
+        for i, value in enumerate(p):
+            at.p[i] = value
+        return Problem(self, system, at)
+
+
+def same_bits(left: ArrayLike, right: ArrayLike) -> bool:
+    """Equal bit for bit."""
+    a, b = np.ascontiguousarray(left), np.ascontiguousarray(right)
+    return a.shape == b.shape and a.tobytes() == b.tobytes()
