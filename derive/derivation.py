@@ -80,7 +80,7 @@ class Solve(sp.MatrixExpr):
     """A^-1 B.  Never inverted symbolically: lowered to an unrolled, guarded elimination.
 
     With `symmetric` (A positive definite) the elimination is LDL^T without pivoting; otherwise LU
-    without row exchange.  A pivot below 1e-13 of its own diagonal entry (of its row for LU) leaves the
+    with row exchange.  A pivot below 1e-13 of its own diagonal entry (of its row for LU) leaves the
     kernel with a failure code.
     """
 

@@ -208,28 +208,42 @@ class _Lowering:
         return column
 
     def _lu(self, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
-        n = len(matrix)
-        rows = [list(m) + list(r) for m, r in zip(matrix, right, strict=True)]
-        width = len(rows[0])
+        """Elimination with row exchange by selection; the row's own size travels with the row."""
+        n, width = len(matrix), len(matrix) + len(right[0])
+        rows = [[*m, *r, self._size(m)] for m, r in zip(matrix, right, strict=True)]
         reciprocal: list[Node] = []
         for i in range(n):
-            scale = self.graph.constant(0)
-            for entry in matrix[i]:
-                scale = scale + self.graph.call("abs", entry)
-            self._guard_pivot(self.graph.call("abs", rows[i][i]), scale, i, n)
+            self._largest_first(rows, i)
+            self._guard_pivot(self.graph.call("abs", rows[i][i]), rows[i][width], i, n)
             reciprocal.append(1 / rows[i][i])
             for k in range(i + 1, n):
                 factor = rows[k][i] * reciprocal[i]
-                rows[k] = rows[k][: i + 1] + [
-                    rows[k][j] - factor * rows[i][j] for j in range(i + 1, width)
-                ]
+                for j in range(i + 1, width):
+                    rows[k][j] = rows[k][j] - factor * rows[i][j]
         for i in reversed(range(n)):
             for j in range(n, width):
                 value = rows[i][j]
                 for k in range(i + 1, n):
                     value = value - rows[i][k] * rows[k][j]
                 rows[i][j] = value * reciprocal[i]
-        return [row[n:] for row in rows]
+        return [row[n:width] for row in rows]
+
+    def _size(self, row: list[Node]) -> Node:
+        total = self.graph.constant(0)
+        for entry in row:
+            total = total + self.graph.call("abs", entry)
+        return total
+
+    def _largest_first(self, rows: NodeMatrix, i: int) -> None:
+        """Bring the row whose entry i is largest in magnitude to place i."""
+        graph = self.graph
+        for k in range(i + 1, len(rows)):
+            if rows[k][i].value == 0:
+                continue
+            swap = graph.call("lt", graph.call("abs", rows[i][i]), graph.call("abs", rows[k][i]))
+            upper = [graph.select(swap, b, a) for a, b in zip(rows[i], rows[k], strict=True)]
+            rows[k] = [graph.select(swap, a, b) for a, b in zip(rows[i], rows[k], strict=True)]
+            rows[i] = upper
 
     def _guard_pivot(self, pivot: Node, diagonal: Node, i: int, n: int) -> None:
         limit = self.graph.constant(_fraction(RELATIVE_PIVOT)) * diagonal
