@@ -9,7 +9,11 @@ strict=(-std=c17 -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Werror)
 sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 
 echo "--- warnings as errors"
-gcc "${strict[@]}" -O2 -fsyntax-only -Igenerated generated/*.c
+for compiler in gcc clang; do
+    for source in generated/*.c; do
+        "$compiler" "${strict[@]}" -O2 -Igenerated -c "$source" -o /dev/null
+    done
+done
 
 echo "--- every kernel, sanitized"
 gcc -std=c17 -g -O1 "${sanitize[@]}" -Igenerated generated/*.c .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
