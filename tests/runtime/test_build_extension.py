@@ -1,0 +1,109 @@
+"""How the declarations for Python are read out of the generated headers."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mstmm.runtime.build_extension import cdef, headers
+
+ROOT = Path(__file__).resolve().parents[2]
+INNER = """\
+#ifndef INNER_H
+#define INNER_H
+/* cdef begin */
+typedef double real;
+/* cdef end */
+#define HIDDEN 1
+/* cdef begin */
+extern const real half;
+/* cdef end */
+#endif
+"""
+OUTER = """\
+#include <math.h>
+#include "z_inner.h"
+/* cdef begin */
+int twice(const real *restrict x, real *restrict y);
+/* cdef end */
+"""
+SOURCE = """\
+#include "a_outer.h"
+const real half = 0.5;
+int twice(const real *restrict x, real *restrict y) { y[0] = 2 * x[0]; return 7; }
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project with the builder, one C file and two headers, the later one needing the earlier."""
+    (tmp_path / "generated").mkdir()
+    (tmp_path / "mstmm").mkdir()
+    (tmp_path / "generated" / "z_inner.h").write_text(INNER)
+    (tmp_path / "generated" / "a_outer.h").write_text(OUTER)
+    (tmp_path / "generated" / "twice.c").write_text(SOURCE)
+    (tmp_path / "runtime").mkdir()
+    shutil.copy(ROOT / "runtime" / "build_extension.py", tmp_path / "runtime")
+    shutil.copy(ROOT / "setup.py", tmp_path)
+    return tmp_path
+
+
+def test_headers_come_after_what_they_include(project: Path) -> None:
+    assert [header.name for header in headers(project / "generated")] == ["z_inner.h", "a_outer.h"]
+
+
+def test_headers_that_include_each_other_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.h").write_text('#include "b.h"\n')
+    (tmp_path / "b.h").write_text('#include "a.h"\n')
+    with pytest.raises(ValueError, match=r"a\.h includes itself by way of .*b\.h"):
+        headers(tmp_path)
+
+
+def test_all_blocks_are_read_and_nothing_else(project: Path) -> None:
+    text = cdef(project / "generated" / "z_inner.h")
+    assert text.splitlines() == ["typedef double real;", "extern const real half;"]
+
+
+@pytest.mark.parametrize("mark", ["/* cdef begin */", "/* cdef end */"])
+def test_a_marker_without_its_partner_is_refused(tmp_path: Path, mark: str) -> None:
+    header = tmp_path / "lonely.h"
+    header.write_text(f"int f(void);\n{mark}\n")
+    with pytest.raises(ValueError, match=r"lonely\.h: .* do not pair up"):
+        cdef(header)
+
+
+def build(project: Path) -> subprocess.CompletedProcess[str]:
+    """Builds the extension of a project in place."""
+    return subprocess.run(
+        [sys.executable, "setup.py", "-q", "build_ext", "--inplace"],
+        cwd=project,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_extension_is_built_for_every_python(project: Path) -> None:
+    (project / "mstmm" / "__init__.py").touch()
+    (project / "mstmm" / "generated").symlink_to("../generated")
+    done = build(project)
+    assert done.returncode == 0, done.stderr
+    assert (project / "mstmm" / "generated" / "_kernels.abi3.so").exists()
+    script = (
+        "from mstmm.generated._kernels import ffi, lib\n"
+        "y = ffi.new('double[1]')\n"
+        "assert lib.twice([1.5], y) == 7 and y[0] == 3.0 and lib.half == 0.5\n"
+        "assert not hasattr(lib, 'HIDDEN')\n"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=project, check=True)
+
+
+def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:
+    (project / "generated" / "twice.c").unlink()
+    done = build(project)
+    assert done.returncode != 0
+    assert "run `python -m mstmm generate`" in done.stderr
