@@ -1,8 +1,8 @@
 """Expressions of scene files: numbers, names, + - * / ^, comparisons, `pi` and a few functions.
 
-`parse` turns text into a frozen `Expression`; `Expression.build` puts it into a `mstmm.graph.Graph`,
-from where it reaches the tape, C, and its exact derivatives like every derived equation.  Nothing
-is ever evaluated as Python.
+`parse` turns text into a frozen `Expression`; `Expression.build` puts it into a
+`mstmm.graph.Graph`, from where it reaches the tape, C, and its exact derivatives like every derived
+equation.  Nothing is ever evaluated as Python.
 """
 
 from __future__ import annotations

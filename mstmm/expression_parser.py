@@ -107,10 +107,7 @@ class Term:
 
 
 def _power(base: float, exponent: float) -> float:
-    value = base**exponent
-    if isinstance(value, complex):
-        raise ValueError("not a real number")
-    return value
+    return math.pow(base, exponent)
 
 
 def _sign(x: float) -> float:
@@ -197,7 +194,7 @@ class Parser:
     def _unknown_character(self, position: int) -> ExpressionError:
         character = self.text[position]
         way_out = _WAYS_OUT.get(character, "see the grammar: numbers, names, + - * / ^, functions")
-        return self.error(f"{ascii(character)} is not part of an expression; {way_out}", position)
+        return self.error(f"{character!a} is not part of an expression; {way_out}", position)
 
     def _operand(self, kind: str, token: str, start: int, end: int) -> tuple[bool, int]:
         """A value is expected here: (still expecting a value, where to go on)."""
@@ -301,7 +298,9 @@ class Parser:
         arguments = self._operands[-count:]
         del self._operands[-count:]
         # min(a, b, c) is min(min(a, b), c)
-        groups = [arguments] if wanted is not None else [arguments[:2], *([a] for a in arguments[2:])]
+        groups = [arguments]
+        if wanted is None:
+            groups = [arguments[:2], *([a] for a in arguments[2:])]
         for members in groups:
             numbers = [m[0] for m in members]
             if members is not groups[0]:

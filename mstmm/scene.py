@@ -1,0 +1,138 @@
+"""A scene: bodies, hinges, loads, events and springs, validated and frozen.
+
+The same model is read from TOML and JSON (`load_scene`) and built in Python
+(`Scene(gravity=[...], body=[{...}], hinge=[{...}])`).  Everything that does not describe a system
+raises SceneError, one line per problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextvars import ContextVar
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, ValidationError, model_validator
+
+from . import scene_checks, scene_errors, scene_text, scene_types
+from . import scene_rules as rules
+from .rotations import Vector
+from .scene_file import load_scene, read
+from .scene_parts import (
+    Body,
+    End,
+    Event,
+    Friction,
+    Hinge,
+    Initial,
+    Law,
+    LawEntry,
+    Limits,
+    Load,
+    Spring,
+    SpringLaw,
+    Table,
+    split,
+)
+from .spec import ElementSpec
+
+__all__ = [
+    "Body", "End", "Event", "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits", "Load",
+    "Scene", "Spring", "SpringLaw", "load_scene", "read", "split",
+]  # fmt: skip
+
+#: What messages call the scene that is being read.
+_source: ContextVar[str] = ContextVar("source", default="scene")
+
+
+def _version(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value != 1:
+        raise rules.refuse(f"expected 1, the only version there is, found {rules.found(value)}")
+    return value
+
+
+class Scene(Table):
+    """Everything a simulation needs to know, SI units and radians, frozen.
+
+    `gravity` in m/s^2, inertial axes.  Lists keep the order of the file: hinge coordinates appear
+    in q and u in the order of `hinge`.
+    """
+
+    model_config = ConfigDict(title="mstmm scene")
+
+    schema_version: Annotated[int, rules.Rule("1", _version, {"const": 1})] = 1
+    gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
+    allow_unphysical_inertia: Annotated[bool, rules.flag()] = False
+    body: tuple[Body, ...] = ()
+    hinge: tuple[Hinge, ...] = ()
+    load: tuple[Load, ...] = ()
+    event: tuple[Event, ...] = ()
+    spring: tuple[Spring, ...] = ()
+
+    def __init__(self, /, **data: Any) -> None:
+        """Validate; SceneError names every problem (at most ten lines)."""
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise scene_errors.scene_error(error, type(self), data, _source.get()) from None
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any], where: str = "scene") -> Scene:
+        """Scene from the keys of a file; `where` begins every message."""
+        token = _source.set(where)
+        try:
+            return cls(**data)
+        finally:
+            _source.reset(token)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is accepted but worth knowing, one sentence each."""
+        return scene_checks.warnings(self)
+
+    def to_toml(self) -> str:
+        """The scene as TOML with every default filled in; it loads back to an equal scene."""
+        return scene_text.to_toml(self)
+
+    def check_against(self, spec: ElementSpec, where: str = "scene") -> None:
+        """Check every element of a user's type against the definition of that type."""
+        problems = scene_types.problems_with(self, spec)
+        if problems:
+            raise scene_errors.report(problems, self._tables(), where)
+
+    def check_types(
+        self, known_types: Mapping[tuple[str, str], ElementSpec], where: str = "scene"
+    ) -> None:
+        """Check that every type is built in or known, and fits its definition.
+
+        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.
+        """
+        problems = scene_types.problems(self, known_types)
+        if problems:
+            raise scene_errors.report(problems, self._tables(), where)
+
+    def _tables(self) -> dict[str, Any]:
+        return {table: getattr(self, table) for table in scene_checks.TABLES}
+
+    @model_validator(mode="after")
+    def _settle(self) -> Scene:
+        for table in ("load", "event", "spring"):
+            object.__setattr__(self, table, _named(table, getattr(self, table)))
+        problems = scene_checks.problems(self)
+        if problems:
+            raise rules.Refused(*problems)
+        return self
+
+
+def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Elements without a name get "load1" and so on, avoiding names that are taken."""
+    taken = {element.name for element in elements}
+    named = []
+    for i, element in enumerate(elements, 1):
+        if not element.name:
+            name = f"{table}{i}"
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            element = element.model_copy(update={"name": name})
+        named.append(element)
+    return tuple(named)

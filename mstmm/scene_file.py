@@ -1,0 +1,139 @@
+"""Reading scene files: TOML or JSON by suffix, each kind of unreadable file with its own message."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import SceneError
+from .spec import ElementSpec
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+MAX_BYTES = 64 * 1024 * 1024
+
+
+def load_scene(
+    path: str | os.PathLike[str],
+    known_types: Mapping[tuple[str, str], ElementSpec] | None = None,
+) -> Scene:
+    """Read and validate a scene file (.toml or .json).
+
+    `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
+    types.  When it is given every type must be built in or in it; without it types that are not
+    built in are left to `Scene.check_types`.  Raises SceneError.
+    """
+    from .scene import Scene
+
+    where, data = read(path)
+    scene = Scene.from_data(data, where)
+    if known_types is not None:
+        scene.check_types(known_types, where)
+    return scene
+
+
+def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
+    """(the path as messages show it, the tables of the file), not yet validated."""
+    try:
+        shown = os.fsdecode(os.fspath(path))
+    except TypeError:
+        raise SceneError(f"expected the path of a scene file, found {path!r:.60}") from None
+    where = shown if shown.isprintable() else ascii(shown)
+    suffix = Path(shown).suffix.lower()
+    if suffix not in (".toml", ".json"):
+        raise SceneError(
+            f"{where}: expected a scene file ending in .toml or .json; rename it if it is one"
+        )
+    text = _text(Path(shown), where)
+    data = _toml(text, where) if suffix == ".toml" else _json(text, where)
+    return where, data
+
+
+def _text(path: Path, where: str) -> str:
+    content = _content(path, where)
+    if not content.strip():
+        raise SceneError(f"{where}: the file is empty; a scene begins with gravity = [0, -9.81, 0]")
+    if b"\0" in content:
+        raise SceneError(f"{where}: this is a binary file; a scene is text (TOML or JSON)")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        number = content[: error.start].count(b"\n") + 1
+        raise SceneError(
+            f"{where}: line {number} is not UTF-8 text; save the file as UTF-8"
+        ) from None
+
+
+def _content(path: Path, where: str) -> bytes:
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise SceneError(f"{where}: this is a folder; name the scene file inside it")
+        if not stat.S_ISREG(status.st_mode):
+            raise SceneError(f"{where}: this is not a regular file; name a scene file")
+        if status.st_size > MAX_BYTES:
+            raise SceneError(
+                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is "
+                f"{MAX_BYTES // 2**20} MB; build large scenes in Python"
+            )
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise SceneError(f"{where}: there is no such file{_neighbour(path)}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"{where}: cannot be read: {reason}") from None
+
+
+def _neighbour(path: Path) -> str:
+    """A file beside the missing one with a similar name."""
+    from .scene_errors import near
+
+    try:
+        names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in (".toml", ".json")]
+    except OSError:
+        return "; check the folder"
+    hint = near(path.name, names)
+    return hint if "did you mean" in hint else "; check the path"
+
+
+def _toml(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{where}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise SceneError(f"{where}: lists or tables are nested too deeply") from None
+    except ValueError as error:
+        raise SceneError(f"{where}: not valid TOML: {error}") from None
+
+
+def _json(text: str, where: str) -> dict[str, Any]:
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        table: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in table:
+                raise SceneError(f"{where}: the key {key!r:.60} appears twice in one table")
+            table[key] = value
+        return table
+
+    def constant(name: str) -> Any:
+        raise SceneError(f"{where}: {name} is not a finite number; write a number")
+
+    try:
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
+    except json.JSONDecodeError as error:
+        raise SceneError(f"{where}: not valid JSON: {error}") from None
+    except RecursionError:
+        raise SceneError(f"{where}: lists or tables are nested too deeply") from None
+    except ValueError as error:
+        raise SceneError(f"{where}: not valid JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise SceneError(f"{where}: expected one table (an object in braces) with gravity and body")
+    return data

@@ -1,0 +1,102 @@
+"""What a name in an expression refers to."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .expression import Name
+from .scene_errors import near
+
+if TYPE_CHECKING:
+    from .scene_parts import Hinge
+
+POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Names an expression may use.
+
+    `own` is the hinge whose `q`, `u` and parameters need no prefix, `spring` means that `q` and
+    `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
+    """
+
+    hinges: Mapping[str, Hinge]
+    ends: Mapping[str, Collection[str]]
+    own: Hinge | None = None
+    spring: bool = False
+    positions: bool = False
+
+
+def problem_with(name: Name, scope: Scope) -> str | None:
+    """Why the name means nothing in this scope; None where it means something."""
+    if len(name.parts) == 1:
+        return _bare(name, scope)
+    if name.quantity in ("q", "u") and len(name.parts) == 2:
+        hinge = scope.hinges.get(name.owner)
+        if hinge is None:
+            return f"there is no hinge {name.owner!r}{near(name.owner, scope.hinges)}"
+        return _indexed(name, hinge)
+    if name.quantity in POSITIONS:
+        return _position(name, scope)
+    if name.owner in scope.hinges:
+        return f"{name.text!r} is unknown; of a hinge there is {name.owner}.q and {name.owner}.u"
+    if scope.positions and name.owner in scope.ends:
+        return f"{name.text!r} is unknown; of a body or end there is x, y, z, vx, vy, vz"
+    return f"{name.text!r} is unknown; write the name of a hinge and .q or .u"
+
+
+def _bare(name: Name, scope: Scope) -> str | None:
+    word = name.parts[0]
+    parameters: Collection[str] = scope.own.parameters if scope.own is not None else ()
+    if word == "t" or word in parameters:
+        return None if name.index is None else f"{word!r} is one number; leave out [{name.index}]"
+    if word in ("q", "u"):
+        if scope.own is not None:
+            return _indexed(name, scope.own)
+        if scope.spring:
+            return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
+        return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
+    own = ["q", "u"] if scope.own is not None or scope.spring else []
+    return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
+
+
+def _indexed(name: Name, hinge: Hinge) -> str | None:
+    """Does the hinge have this coordinate?  User types are checked with their definition."""
+    kind = hinge.builtin
+    if kind is None:
+        return None
+    entries = kind.coordinates if name.quantity == "q" else kind.speeds
+    return index_problem(name, hinge.name, len(entries))
+
+
+def index_problem(name: Name, hinge: str, count: int) -> str | None:
+    """Message if a hinge with `count` coordinates has no entry of this index."""
+    if count == 0:
+        return f'{name.text!r}: hinge "{hinge}" is fixed and has no coordinates'
+    if name.index is None and count > 1:
+        return (
+            f'{name.text!r}: hinge "{hinge}" has {count} entries; '
+            f"write {name.text}[0] to {name.text}[{count - 1}]"
+        )
+    if name.index is not None and name.index >= count:
+        return f'{name.text!r}: the last entry of hinge "{hinge}" is [{count - 1}]'
+    return None
+
+
+def _position(name: Name, scope: Scope) -> str | None:
+    if not scope.positions:
+        return (
+            f"{name.text!r}: positions and velocities of bodies are known to events and release "
+            "only; use the q and u of hinges"
+        )
+    if name.index is not None:
+        return f"{name.text!r} is one number; leave out [{name.index}]"
+    if name.owner not in scope.ends:
+        return f"there is no body {name.owner!r}{near(name.owner, scope.ends)}"
+    if len(name.parts) == 3 and name.parts[1] not in scope.ends[name.owner]:
+        options = scope.ends[name.owner]
+        return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], options)}'
+    return None

@@ -1,0 +1,451 @@
+"""What one value of a scene may be: strict, finite, and with a message that says what was expected.
+
+A `Rule` annotates a pydantic field: it checks and normalises the value as it comes from TOML, JSON
+or Python, and publishes the accepted form in the JSON Schema.  Numbers are never taken from text
+or truth values.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from . import expression
+from .errors import ExpressionError
+from .expression import Expression
+from .rotations import norm, unit
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+GROUND = "ground"
+_NAME_SHAPE = "a letter, then letters, digits or _ (64 characters at most)"
+
+Location = tuple[str | int, ...]
+
+
+class Refused(ValueError):
+    """One or several problems of a value, each with its place inside the value."""
+
+    def __init__(self, *problems: tuple[Location, str]) -> None:
+        super().__init__("; ".join(message for _, message in problems))
+        self.problems = problems
+
+
+def refuse(message: str, *place: str | int) -> Refused:
+    """The one problem `message` at `place` inside the value."""
+    return Refused((place, message))
+
+
+def found(value: object) -> str:
+    """The value as a message shows it: short, printable, in the words of a scene file."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return ascii(value) if len(value) <= 40 else f"{ascii(value[:37])[:-1]}...'"
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return "a whole number of more than 30 digits"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, (list, tuple)):
+        inside = ", ".join(found(v) for v in value[:7]) + (", ..." if len(value) > 7 else "")
+        return f"[{inside}]" if len(inside) <= 60 else f"a list of {len(value)}"
+    if isinstance(value, (int, float)):
+        return f"{float(value):.6g}"
+    return type(value).__name__
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Annotation of a field: `check` returns the normalised value or raises `Refused`."""
+
+    expected: str
+    check: Callable[[Any], Any]
+    schema: dict[str, Any]
+    dump: Callable[[Any], Any] | None = None
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        dump = self.dump
+        serialization = (
+            core_schema.plain_serializer_function_ser_schema(dump) if dump is not None else None
+        )
+        check = self.check
+        if type(None) in get_args(source):
+            return core_schema.no_info_plain_validator_function(
+                lambda value: None if value is None else check(value), serialization=serialization
+            )
+        return core_schema.no_info_plain_validator_function(check, serialization=serialization)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"description": self.expected, **self.schema}
+
+
+@dataclass(frozen=True)
+class Shorthand:
+    """Annotation of a field: a short form of a table is widened before the table is read."""
+
+    expected: str
+    widen: Callable[[Any], Any]
+    schema: dict[str, Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.widen, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        inner = handler(schema["schema"])
+        return {"description": self.expected, "anyOf": [inner, self.schema]}
+
+
+# --- numbers ---------------------------------------------------------------------------------
+
+
+def plain(value: Any) -> Any:
+    """Arrays and numbers of other libraries as Python's own (scenes built in Python)."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def finite(value: Any, expected: str, *place: str | int) -> float:
+    """A finite number, or Refused."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        hint = ""
+        if isinstance(value, str):
+            hint = "; write the number without quotes"
+        raise refuse(f"expected {expected}, found {found(value)}{hint}", *place)
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise refuse(f"expected {expected}, found {found(value)}, which is not finite", *place)
+    return result
+
+
+def _unit(name: str) -> str:
+    return f" in {name}" if name else ""
+
+
+def number(of: str = "", minimum: float | None = None, above: float | None = None) -> Rule:
+    """A finite number in the unit `of`, not below `minimum`, strictly above `above`."""
+    bound = f", {minimum:g} or more" if minimum is not None else ""
+    bound += f", more than {above:g}" if above is not None else ""
+    expected = f"a number{_unit(of)}{bound}"
+    schema: dict[str, Any] = {"type": "number"}
+    schema |= {} if minimum is None else {"minimum": minimum}
+    schema |= {} if above is None else {"exclusiveMinimum": above}
+
+    def check(value: Any) -> float:
+        result = finite(plain(value), expected)
+        _within(result, expected, minimum, above)
+        return result
+
+    return Rule(expected, check, schema)
+
+
+def _within(
+    value: float, expected: str, minimum: float | None, above: float | None, *place: str | int
+) -> None:
+    if (minimum is not None and value < minimum) or (above is not None and value <= above):
+        raise refuse(f"expected {expected}, found {found(value)}", *place)
+
+
+def _list(value: Any, expected: str) -> Sequence[Any]:
+    value = plain(value)
+    if not isinstance(value, (list, tuple)):
+        raise refuse(f"expected {expected}, found {found(value)}")
+    return value
+
+
+def _collect(
+    values: Sequence[Any], expected: str, check: Callable[[Any, int], Any]
+) -> tuple[Any, ...]:
+    """Check every entry; the problems of all entries together."""
+    problems: list[tuple[Location, str]] = []
+    results = []
+    for i, value in enumerate(values):
+        try:
+            results.append(check(value, i))
+        except Refused as refused:
+            problems.extend(refused.problems)
+    if problems:
+        raise Refused(*problems)
+    return tuple(results)
+
+
+def numbers(expected: str, *lengths: int, minimum: float | None = None) -> Rule:
+    """A list of finite numbers of one of these lengths (any length when none is given).
+
+    Without lengths a single number stands for the list with this one entry.
+    """
+    entry = "a number" + (f", {minimum:g} or more" if minimum is not None else "")
+
+    def one(value: Any, i: int) -> float:
+        result = finite(plain(value), entry, i)
+        _within(result, entry, minimum, None, i)
+        return result
+
+    def check(value: Any) -> tuple[float, ...]:
+        value = plain(value)
+        if not lengths and not isinstance(value, (list, tuple)):
+            result = finite(value, expected)
+            _within(result, expected, minimum, None)
+            return (result,)
+        entries = _list(value, expected)
+        if lengths and len(entries) not in lengths:
+            raise refuse(f"expected {expected}, found {len(entries)} entries")
+        return _collect(entries, expected, one)
+
+    item: dict[str, Any] = {"type": "number"} | ({} if minimum is None else {"minimum": minimum})
+    array: dict[str, Any] = {"type": "array", "items": item}
+    if not lengths:
+        return Rule(expected, check, {"anyOf": [item, array]})
+    forms = [array | {"minItems": n, "maxItems": n} for n in lengths]
+    return Rule(expected, check, forms[0] if len(forms) == 1 else {"anyOf": forms})
+
+
+def vector(of: str) -> Rule:
+    """Three numbers in the unit `of`."""
+    return numbers(f"three numbers{_unit(of)}", 3)
+
+
+def direction() -> Rule:
+    """Three numbers, not all zero; any length, the direction alone counts."""
+    expected = "three numbers, not all zero (a direction)"
+    inner = numbers(expected, 3)
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        if norm(result) < 1e-12:
+            raise refuse(f"expected {expected}, found {found(result)}; write for example [0, 0, 1]")
+        return result
+
+    return Rule(expected, check, inner.schema)
+
+
+def orientation() -> Rule:
+    """[roll, pitch, yaw] in rad, or a quaternion [w, x, y, z], which is normalised."""
+    expected = "[roll, pitch, yaw] in rad or a quaternion [w, x, y, z]"
+    inner = numbers(expected, 3, 4)
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        return quaternion(result, expected) if len(result) == 4 else result
+
+    return Rule(expected, check, inner.schema)
+
+
+def quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[float, ...]:
+    """q / |q|; a quaternion (practically) zero is refused."""
+    if norm(q) < 1e-6:
+        raise refuse(
+            f"expected {expected}, found a quaternion of zero length; no rotation is [1, 0, 0, 0]",
+            *place,
+        )
+    return unit(q)
+
+
+# --- names and text -----------------------------------------------------------------------------
+
+
+def name(expected: str = "a name") -> Rule:
+    """A name by the pattern of the format; "ground" is reserved."""
+
+    def check(value: Any) -> str:
+        checked = text(value, f"{expected}: {_NAME_SHAPE}")
+        if not NAME.fullmatch(checked):
+            raise refuse(f"expected {expected}: {_NAME_SHAPE}, found {found(checked)}")
+        if checked == GROUND:
+            raise refuse('"ground" is reserved for the inertial frame; choose another name')
+        return checked
+
+    return Rule(f"{expected}: {_NAME_SHAPE}", check, {"type": "string", "pattern": _pattern(NAME)})
+
+
+def _pattern(expression: re.Pattern[str]) -> str:
+    return f"^{expression.pattern}$"
+
+
+def text(value: Any, expected: str) -> str:
+    """Text, or Refused."""
+    if not isinstance(value, str):
+        raise refuse(f"expected {expected}, found {found(value)}")
+    return str(value)
+
+
+def end(ground: bool = True) -> Rule:
+    """Reference to a body ("rod1", its own origin), one of its ends ("rod1.tip") or the ground."""
+    expected = 'a body or an end of one ("rod1" or "rod1.tip")' + (' or "ground"' if ground else "")
+    shape = re.compile(rf"{NAME.pattern}(\.{NAME.pattern})?")
+
+    def check(value: Any) -> str:
+        checked = text(value, expected)
+        if not shape.fullmatch(checked):
+            raise refuse(f"expected {expected}, found {found(checked)}")
+        if checked.startswith(f"{GROUND}."):
+            raise refuse(f'the ground has no ends, found {found(checked)}; write "ground"')
+        if checked == GROUND and not ground:
+            raise refuse(f"expected {expected}, found 'ground', which does not move")
+        return checked
+
+    return Rule(expected, check, {"type": "string", "pattern": _pattern(shape)})
+
+
+def choice(*options: str) -> Rule:
+    """One of these words."""
+    expected = " or ".join(f'"{option}"' for option in options)
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value not in options:
+            raise refuse(f"expected {expected}, found {found(value)}")
+        return str(value)
+
+    return Rule(expected, check, {"enum": list(options)})
+
+
+def flag() -> Rule:
+    """true or false."""
+
+    def check(value: Any) -> bool:
+        value = plain(value)
+        if not isinstance(value, bool):
+            raise refuse(f"expected true or false, found {found(value)}")
+        return value
+
+    return Rule("true or false", check, {"type": "boolean"})
+
+
+def parameters() -> Rule:
+    """A table of named numbers, for elements of a user's own type."""
+    expected = "a table of named numbers"
+
+    def check(value: Any) -> dict[str, float]:
+        if not isinstance(value, dict):
+            raise refuse(f"expected {expected}, found {found(value)}")
+        for key in value:
+            if not isinstance(key, str) or not NAME.fullmatch(key):
+                raise refuse(f"expected names ({_NAME_SHAPE}), found {found(key)}")
+
+        def one(key: Any, _: int) -> float:
+            return finite(plain(value[key]), "a number", key)
+
+        keys = list(value)
+        return dict(zip(keys, _collect(keys, expected, one), strict=True))
+
+    schema = {"type": "object", "additionalProperties": {"type": "number"}}
+    return Rule(expected, check, schema)
+
+
+# --- expressions ----------------------------------------------------------------------------------
+
+
+def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
+    """A number or the text of an expression as a parsed expression."""
+    value = plain(value)
+    if isinstance(value, Expression):
+        return value
+    if not isinstance(value, str):
+        return expression.number(finite(value, expected, *place))
+    try:
+        return expression.parse(value)
+    except ExpressionError as error:
+        raise refuse(str(error), *place) from None
+
+
+def quantity(value: Any, expected: str, *place: str | int) -> Expression:
+    """An expression that is a number, not a condition."""
+    result = to_expression(value, expected, *place)
+    if result.is_condition:
+        raise refuse(
+            f"expected {expected}, found a comparison; write where({result.text}, 1, 0)"[:300],
+            *place,
+        )
+    return result
+
+
+def dump_expression(value: Expression | None) -> str | float:
+    """A plain number as a number, everything else as its text; a free coordinate as "free"."""
+    return "free" if value is None else _as_number(value.text)
+
+
+def _as_number(written: str) -> str | float:
+    try:
+        result = float(written)
+    except ValueError:
+        return written
+    return result if repr(result) == written else written
+
+
+_EXPRESSION_SCHEMA: dict[str, Any] = {"type": ["number", "string"]}
+
+
+def expressions(expected: str, length: int | None = None, free: bool = False) -> Rule:
+    """A list of numbers or expressions; without `length` one entry may stand alone.
+
+    With `free` the word "free" is accepted for an entry and becomes None.
+    """
+    entry = "a number or an expression" + (' or "free"' if free else "")
+
+    def one(value: Any, *place: str | int) -> Expression | None:
+        if free and (value is None or value == "free"):
+            return None
+        return quantity(value, entry, *place)
+
+    def check(value: Any) -> tuple[Expression | None, ...]:
+        value = plain(value)
+        if length is None and not isinstance(value, (list, tuple)):
+            return (one(value),)
+        entries = _list(value, expected)
+        if length is not None and len(entries) != length:
+            raise refuse(f"expected {expected}, found {len(entries)} entries")
+        return _collect(entries, expected, one)
+
+    def dump(value: Sequence[Expression | None] | None) -> list[str | float] | None:
+        return None if value is None else [dump_expression(v) for v in value]
+
+    array: dict[str, Any] = {"type": "array", "items": _EXPRESSION_SCHEMA}
+    array |= {} if length is None else {"minItems": length, "maxItems": length}
+    schema = array if length is not None else {"anyOf": [_EXPRESSION_SCHEMA, array]}
+    return Rule(expected, check, schema, dump)
+
+
+def one_expression(expected: str) -> Rule:
+    """A number or an expression."""
+
+    def check(value: Any) -> Expression:
+        return quantity(value, expected)
+
+    return Rule(expected, check, _EXPRESSION_SCHEMA, dump_expression)
+
+
+def condition(expected: str, time: bool = False) -> Rule:
+    """A comparison such as "rod1.x < 0.1"; with `time` a number alone means t >= number."""
+
+    def check(value: Any) -> Expression:
+        value = plain(value)
+        if time and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return expression.parse(f"t >= {finite(value, expected)!r}")
+        if not isinstance(value, (str, Expression)):
+            raise refuse(f"expected {expected}, found {found(value)}")
+        result = to_expression(value, expected)
+        if not result.is_condition:
+            raise refuse(f"expected {expected}, found {found(result.text)}, which is no comparison")
+        return result
+
+    def dump(value: Expression | None) -> str | None:
+        return None if value is None else value.text
+
+    schema = {"type": ["string", "number"] if time else "string"}
+    return Rule(expected, check, schema, dump)

@@ -1,0 +1,141 @@
+"""Elements of users' own types against their definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from .expression import Expression
+from .hinge_types import HINGE_TYPES, effort_unit
+from .scene_errors import Problem, near
+from .scene_names import index_problem
+from .scene_rules import Location
+from .spec import ElementSpec
+
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .scene_parts import Hinge
+
+#: Table of the scene -> (kind of the definition, built-in types).
+_KINDS = {
+    "body": ("body", ("rigid",)),
+    "hinge": ("hinge", tuple(HINGE_TYPES)),
+    "spring": ("force", ("spring",)),
+}
+
+
+def problems(
+    scene: Scene, known: Mapping[tuple[str, str], ElementSpec]
+) -> list[Problem]:
+    """Unknown types, and elements that do not fit the definition of their type."""
+    found: list[Problem] = []
+    for table, (kind, builtin) in _KINDS.items():
+        mine = [name for k, name in known if k == kind]
+        for i, element in enumerate(getattr(scene, table)):
+            if element.type in builtin:
+                continue
+            spec = known.get((kind, element.type))
+            if spec is None:
+                found.append((
+                    (table, i, "type"),
+                    f'there is no {kind} type "{element.type}"'
+                    f"{near(element.type, [*builtin, *mine])}",
+                ))  # fmt: skip
+            else:
+                found += _element(scene, table, i, spec)
+    return found
+
+
+def problems_with(scene: Scene, spec: ElementSpec) -> list[Problem]:
+    """What does not fit in the elements of this one type."""
+    return [
+        problem
+        for table, (kind, _) in _KINDS.items()
+        if kind == spec.kind
+        for i, element in enumerate(getattr(scene, table))
+        if element.type == spec.name
+        for problem in _element(scene, table, i, spec)
+    ]
+
+
+def _element(scene: Scene, table: str, i: int, spec: ElementSpec) -> Iterator[Problem]:
+    element = getattr(scene, table)[i]
+    yield from _parameters((table, i), element.parameters, spec)
+    if table == "hinge":
+        yield from _counts(("hinge", i), element, spec)
+        yield from _indices(scene, element.name, spec)
+
+
+def _parameters(
+    place: Location, given: Mapping[str, float], spec: ElementSpec
+) -> Iterator[Problem]:
+    known = {p.name: p for p in spec.parameters}
+    for name, value in given.items():
+        at = (*place, "parameters", name)
+        parameter = known.get(name)
+        if parameter is None:
+            yield at, f'{spec.name} has no parameter "{name}"{near(name, known)}'
+        elif parameter.minimum is not None and value < parameter.minimum:
+            yield at, f"expected {parameter.minimum:g} {parameter.unit} or more, found {value:g}"
+        elif parameter.maximum is not None and value > parameter.maximum:
+            yield at, f"expected {parameter.maximum:g} {parameter.unit} or less, found {value:g}"
+    for parameter in spec.parameters:
+        if parameter.default is None and parameter.name not in given:
+            unit = f" in {parameter.unit}" if parameter.unit else ""
+            meaning = f" ({parameter.meaning})" if parameter.meaning else ""
+            yield (*place, "parameters", parameter.name), f"missing; expected a number{unit}{meaning}"
+
+
+def _counts(place: Location, hinge: Hinge, spec: ElementSpec) -> Iterator[Problem]:
+    """Lengths of start values, drive and law."""
+    lists: list[tuple[Location, Any, int]] = []
+    if hinge.initial is not None:
+        lists.append((("initial", "q"), hinge.initial.q, len(spec.coordinates)))
+        lists.append((("initial", "u"), hinge.initial.u, len(spec.speeds)))
+    if hinge.drive is not None:
+        lists.append((("drive",), hinge.drive, len(spec.coordinates)))
+        if len(spec.coordinates) != len(spec.speeds):
+            yield (*place, "drive"), f"{spec.name} has speeds of its own and cannot be driven"
+    for key in type(hinge.law).model_fields:
+        values = getattr(hinge.law, key)
+        if len(values) > 1 or (values and not spec.speeds):
+            lists.append((("law", key), values, len(spec.speeds)))
+        elif values and len({s.unit for s in spec.speeds}) > 1:
+            units = ", ".join(effort_unit(s.unit) for s in spec.speeds)
+            yield (
+                (*place, "law", key),
+                f"one number cannot stand for efforts in {units}; "
+                f"give a list with {len(spec.speeds)} entries",
+            )
+    for at, values, count in lists:
+        if values is not None and len(values) != count:
+            yield (*place, *at), f"{spec.name} has {count} entries here, found {len(values)}"
+
+
+def _indices(scene: Scene, hinge: str, spec: ElementSpec) -> Iterator[Problem]:
+    """Indices of this hinge's coordinates in all expressions of the scene."""
+    for place, expression, own in _all_expressions(scene):
+        for name in expression.names:
+            if name.quantity not in ("q", "u") or (name.owner or own) != hinge:
+                continue
+            entries = spec.coordinates if name.quantity == "q" else spec.speeds
+            message = index_problem(name, hinge, len(entries))
+            if message is not None:
+                yield place, message
+
+
+def _all_expressions(scene: Scene) -> Iterator[tuple[Location, Expression, str]]:
+    """(place, expression, hinge whose q and u need no prefix)."""
+    for i, hinge in enumerate(scene.hinge):
+        for k, effort in enumerate(hinge.law.effort):
+            yield ("hinge", i, "law", "effort", k), effort, hinge.name
+        if hinge.release is not None:
+            yield ("hinge", i, "release"), hinge.release, hinge.name
+    for i, load in enumerate(scene.load):
+        for key in ("force", "moment"):
+            for k, entry in enumerate(getattr(load, key)):
+                yield ("load", i, key, k), entry, ""
+    for i, event in enumerate(scene.event):
+        yield ("event", i, "when"), event.when, ""
+    for i, spring in enumerate(scene.spring):
+        yield ("spring", i, "law", "effort"), spring.law.effort, ""
