@@ -177,7 +177,9 @@ class Graph:
         if a.op == "neg":
             return self.neg(self.add(a.args[0], b))
         opposite = self._nodes.get(("sub", None, b.number, a.number))
-        return self.neg_of(opposite) if opposite is not None else self._make("sub", (a, b))
+        if opposite is not None and ("sub", None, a.number, b.number) not in self._nodes:
+            return self.neg_of(opposite)
+        return self._make("sub", (a, b))
 
     def neg_of(self, a: Node) -> Node:
         """-a as its own node, keeping `a` shared (a difference would be flipped by `neg`)."""
