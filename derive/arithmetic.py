@@ -190,12 +190,24 @@ class PreciseArithmetic:
                 return a / b
             return context.nan if a == 0 or context.isnan(a) else context.sign(a) * context.inf
 
+        def power(a: Any, b: Any) -> Any:
+            fractional = context.isinf(b) or b != context.floor(b)
+            base = abs(a) if fractional and (context.isinf(a) or context.isinf(b)) else a
+            return context.one if base == 1 or b == 0 else real(context.power)(base, b)
+
+        def angle(a: Any, b: Any) -> Any:
+            if context.isnan(a) or context.isnan(b):
+                return context.nan
+            if context.isinf(a) and context.isinf(b):
+                a, b = context.sign(a), context.sign(b)
+            return real(context.atan2)(a, b)
+
         self.operations: dict[str, Operation] = {
             **_shared(context.mpf, context.isnan),
             **{name: real(getattr(context, name)) for name in _MPMATH_NAMES},
             "div": divide,
-            "pow": real(context.power),
-            "atan2": real(context.atan2),
+            "pow": power,
+            "atan2": angle,
             "log": lambda a: -context.inf if a == 0 else real(context.log)(a),
             "floor": lambda a: context.floor(a) if context.isfinite(a) else a,
         }

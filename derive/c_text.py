@@ -74,7 +74,7 @@ def literal(text: str) -> str:
     value = Fraction(text)
     rounded = Constant(text).number
     top, bottom = abs(value.numerator), value.denominator
-    if Fraction(rounded) == value or float(top) != top or float(bottom) != bottom:
+    if Fraction(rounded) == value or max(top, bottom) > 2**53:
         written = repr(abs(rounded))
     else:
         written = f"((real){top} / (real){bottom})"
@@ -92,7 +92,7 @@ def string(text: str) -> str:
 
 def comment(text: str) -> str:
     """Text that can stand inside a C comment on one line."""
-    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").rstrip("\\")
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").rstrip("\\ ")
 
 
 class KernelText:

@@ -49,7 +49,8 @@ def evaluate(
     `inputs[port]` is a number or a nested or flat sequence of int, float, Fraction, str or mpf;
     floats are taken as the exact numbers they are.  `n` is the run-time size of a kernel that has
     one.  An output flagged `accumulate` holds the increment; an entry that is never stored is 0.
-    Raises GuardFailure, and ValueError for a missing input, a wrong length or a missing `n`.
+    Values that no port asks for are ignored.
+    Raises GuardFailure, and ValueError for a missing input, a wrong length or no `n`.
     """
     arithmetic = PreciseArithmetic(digits)
     results = _run(kernel, inputs, arithmetic, n)

@@ -95,10 +95,16 @@ _TEMPORARY = re.compile(r"t\d+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-def cdef(*, registry: bool = True, tape: bool = False) -> str:
-    """Declarations for `cffi.FFI.cdef`: the descriptors, and on request registry and tape."""
+def cdef(*, registry: bool = True, tape: bool = False, opened: bool = True) -> str:
+    """Declarations for `cffi.FFI.cdef`: the descriptors, and on request registry and tape.
+
+    `opened` for a library opened in ABI mode, where cffi reads no constant but reads a variable;
+    False for a module that cffi compiles.
+    """
     parts = [f"typedef {REAL} real;\n", ELEMENT_DECLARATIONS]
-    parts += [REGISTRY_DECLARATIONS] if registry else []
+    if registry:
+        text = REGISTRY_DECLARATIONS
+        parts.append(text.replace("extern const int", "extern int") if opened else text)
     parts += [TAPE_DECLARATIONS] if tape else []
     return "\n".join(parts)
 
