@@ -177,9 +177,7 @@ def _distinct(names: object) -> tuple[Name, ...]:
 # --- terms as nodes, numbers and straight lines ---------------------------------------------------
 
 
-def _node(
-    graph: Graph, term: Term, args: list[Node], resolve: Callable[[Name], Node]
-) -> Node:
+def _node(graph: Graph, term: Term, args: list[Node], resolve: Callable[[Name], Node]) -> Node:
     if term.exact is not None:
         return graph.constant(term.exact)
     if term.name is not None:

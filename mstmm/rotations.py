@@ -42,6 +42,7 @@ def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
 
 
 def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    """Scalar product, rounded once."""
     return math.fsum(x * y for x, y in zip(a, b, strict=True))
 
 
@@ -58,6 +59,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def transpose(a: Matrix) -> Matrix:
+    """Rows and columns exchanged."""
     return rows(list(zip(*a, strict=True)))
 
 

@@ -15,24 +15,12 @@ from pydantic import ConfigDict, ValidationError, model_validator
 
 from . import scene_checks, scene_errors, scene_text, scene_types
 from . import scene_rules as rules
+from . import scene_rules_text as texts
 from .rotations import Vector
 from .scene_file import load_scene, read
-from .scene_parts import (
-    Body,
-    End,
-    Event,
-    Friction,
-    Hinge,
-    Initial,
-    Law,
-    LawEntry,
-    Limits,
-    Load,
-    Spring,
-    SpringLaw,
-    Table,
-    split,
-)
+from .scene_law import Friction, Law, LawEntry, Limits, SpringLaw
+from .scene_parts import Body, End, Event, Hinge, Initial, Load, Spring
+from .scene_rules import Table, split
 from .spec import ElementSpec
 
 __all__ = [
@@ -61,7 +49,7 @@ class Scene(Table):
 
     schema_version: Annotated[int, rules.Rule("1", _version, {"const": 1})] = 1
     gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
-    allow_unphysical_inertia: Annotated[bool, rules.flag()] = False
+    allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     load: tuple[Load, ...] = ()

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 from . import topology
 from .expression import Expression
-from .hinge_types import HINGE_TYPES
 from .scene_errors import Problem, near
 from .scene_names import Scope, problem_with
-from .scene_parts import split
 from .scene_physics import triangle_excess
-from .scene_rules import GROUND, Location
+from .scene_rules import GROUND, Location, split
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -64,7 +62,9 @@ def _references(scene: Scene) -> Iterator[Problem]:
             yield place, f'"{event.hinge}" is neither driven nor fixed, so it cannot be released'
 
 
-def _end(reference: str, ends: Mapping[str, Mapping[str, object]], place: Location) -> Iterator[Problem]:
+def _end(
+    reference: str, ends: Mapping[str, Mapping[str, object]], place: Location
+) -> Iterator[Problem]:
     """Is there such a body, and has it such an end?"""
     body, at = split(reference)
     if body == GROUND:
@@ -72,7 +72,7 @@ def _end(reference: str, ends: Mapping[str, Mapping[str, object]], place: Locati
     if body not in ends:
         yield place, f'there is no body "{body}"{near(body, ends)}'
     elif at and at not in ends[body]:
-        way_out = near(at, ends[body]) if ends[body] else f'; give it ends = {{ {at} = [x, y, z] }}'
+        way_out = near(at, ends[body]) if ends[body] else f"; give it ends = {{ {at} = [x, y, z] }}"
         yield place, f'body "{body}" has no end "{at}"{way_out}'
 
 
@@ -144,8 +144,3 @@ def _names(expression: Expression, scope: Scope, place: Location) -> Iterator[Pr
         message = problem_with(name, scope)
         if message is not None:
             yield place, f"{message} (in {expression.text[:80]!r})"
-
-
-def known_hinge_types() -> list[str]:
-    """The built-in hinge types, for suggestions."""
-    return list(HINGE_TYPES)

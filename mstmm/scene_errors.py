@@ -1,4 +1,4 @@
-"""From pydantic's findings to one line per problem: file, element, key, expected, found, way out."""
+"""From pydantic's findings to one line per problem: file, element, key, expected, way out."""
 
 from __future__ import annotations
 
@@ -39,10 +39,14 @@ def near(name: str, options: Iterable[str]) -> str:
         return "; there is none"
     if len(choices) > 12:
         return f"; there are {len(choices)}, from {choices[0]} to {choices[-1]}"
-    return f"; there is only {choices[0]}" if len(choices) == 1 else "; one of " + ", ".join(choices)
+    if len(choices) == 1:
+        return f"; there is only {choices[0]}"
+    return "; one of " + ", ".join(choices)
 
 
-def scene_error(error: ValidationError, model: type[BaseModel], data: Any, where: str) -> SceneError:
+def scene_error(
+    error: ValidationError, model: type[BaseModel], data: Any, where: str
+) -> SceneError:
     """The error a user sees for a scene that pydantic refused."""
     return report(list(problems(error, model)), data, where)
 

@@ -1,4 +1,4 @@
-"""Reading scene files: TOML or JSON by suffix, each kind of unreadable file with its own message."""
+"""Reading scene files: TOML or JSON by suffix, a message for each kind of unreadable file."""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ from .rotations import cross, norm, perpendicular, unit
 from .scene_rules import GROUND, Location, Refused, found, quaternion
 
 if TYPE_CHECKING:
-    from .scene_parts import Hinge, Law
+    from .scene_law import Law
+    from .scene_parts import Hinge
 
 _ZERO = (0.0, 0.0, 0.0)
 _Z = (0.0, 0.0, 1.0)
@@ -154,8 +155,8 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
             units = ", ".join(effort_unit(s.unit) for s in kind.speeds)
             problems.append((
                 place,
-                f"one number cannot stand for all coordinates of a {kind.name} hinge, whose efforts "
-                f"are in {units}; give a list with {count} entries",
+                f"one number cannot stand for all coordinates of a {kind.name} hinge, whose "
+                f"efforts are in {units}; give a list with {count} entries",
             ))  # fmt: skip
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
     if kind.quaternion is not None:
@@ -256,9 +257,7 @@ def _initial(
     if kind.quaternion is not None and len(q) == len(kind.start):
         at = kind.quaternion
         try:
-            turned = quaternion(
-                q[at : at + 4], "a quaternion w, x, y, z", "initial", "q"
-            )
+            turned = quaternion(q[at : at + 4], "a quaternion w, x, y, z", "initial", "q")
             q = q[:at] + turned + q[at + 4 :]
         except Refused as refused:
             problems += refused.problems
@@ -298,5 +297,3 @@ def near_type(name: str, known: set[str]) -> str | None:
 
     close = difflib.get_close_matches(name.lower(), sorted(known | set(HINGE_TYPES)), 1, 0.6)
     return close[0] if close else None
-
-

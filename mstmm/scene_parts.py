@@ -7,31 +7,21 @@ expressions.  SI units and radians throughout.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from . import scene_hinge, scene_physics
 from . import scene_rules as rules
+from . import scene_rules_text as texts
 from .expression import Expression, number
 from .hinge_types import HINGE_TYPES, HingeType
 from .rotations import IDENTITY, Matrix, Vector, from_orientation, reject, unit
-from .scene_rules import GROUND, NAME, Shorthand, found, refuse
+from .scene_law import Law, SpringLaw
+from .scene_rules import GROUND, NAME, Shorthand, Table, found, refuse, split
 
 Numbers = tuple[float, ...]
 Orientation = tuple[float, ...]
-
-
-class Table(BaseModel):
-    """Base of all tables: frozen, unknown keys refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-
-def split(reference: str) -> tuple[str, str]:
-    """("rod1", "tip") of "rod1.tip"; ("rod1", "") of "rod1"."""
-    body, _, at = reference.partition(".")
-    return body, at
 
 
 # --- body -----------------------------------------------------------------------------------------
@@ -69,14 +59,14 @@ class Body(Table):
     (xx, yy, zz, xy, xz, yz), tensor entries (Jxy = -int xy dm), kg m^2.
     """
 
-    name: Annotated[str, rules.name("the body's name")]
-    type: Annotated[str, rules.name("a body type")] = "rigid"
+    name: Annotated[str, texts.name("the body's name")]
+    type: Annotated[str, texts.name("a body type")] = "rigid"
     mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
     center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     inertia: Annotated[
         Numbers, rules.numbers("[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2", 3, 6)
     ] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    allow_unphysical_inertia: Annotated[bool, rules.flag()] = False
+    allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     ends: Annotated[
         dict[str, End],
         Shorthand(
@@ -85,7 +75,7 @@ class Body(Table):
             {"type": "object", "additionalProperties": {"type": "array"}},
         ),
     ] = Field(default_factory=dict)
-    parameters: Annotated[dict[str, float], rules.parameters()] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
 
     @property
     def inertia_matrix(self) -> Matrix:
@@ -125,126 +115,6 @@ class Initial(Table):
     u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
 
 
-class Friction(Table):
-    """Coulomb and Stribeck friction, regularised; efforts in N or N m, velocities m/s or rad/s.
-
-    All zero means no friction.  `static` 0 means equal to `coulomb`.
-    """
-
-    coulomb: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
-    static: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
-    stribeck_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.01
-    regularisation_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.001
-
-    @property
-    def acts(self) -> bool:
-        """True when there is any friction."""
-        return self.static > 0
-
-    @model_validator(mode="after")
-    def _settle(self) -> Friction:
-        if self.static == 0:
-            object.__setattr__(self, "static", self.coulomb)
-        if self.static < self.coulomb:
-            raise refuse(
-                f"static friction {self.static:g} is below coulomb friction {self.coulomb:g}; "
-                "leave it out, or make it at least as large", "static",
-            )  # fmt: skip
-        return self
-
-
-class Limits(Table):
-    """Stops of one coordinate: one-sided springs and dampers below `lower`, above `upper`."""
-
-    lower: Annotated[float | None, rules.number("m or rad")] = None
-    upper: Annotated[float | None, rules.number("m or rad")] = None
-    stiffness: Annotated[float, rules.number("N/m or N m/rad", minimum=0)] = 0.0
-    damping: Annotated[float, rules.number("N s/m or N m s/rad", minimum=0)] = 0.0
-
-    @property
-    def acts(self) -> bool:
-        """True when there is a stop."""
-        return self.lower is not None or self.upper is not None
-
-    @model_validator(mode="after")
-    def _check(self) -> Limits:
-        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            raise refuse(
-                f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
-            )
-        if self.acts and self.stiffness == 0:
-            raise refuse(
-                "a stop needs a stiffness above 0 (N/m or N m/rad); "
-                "write for example stiffness = 1e5", "stiffness",
-            )  # fmt: skip
-        if not self.acts and (self.stiffness > 0 or self.damping > 0):
-            raise refuse("limits need lower, upper or both", "lower")
-        return self
-
-
-class LawEntry(NamedTuple):
-    """The law of one coordinate."""
-
-    stiffness: float
-    rest: float
-    damping: float
-    effort: Expression
-    inertia: float
-    friction: Friction
-    limits: Limits
-
-
-def _one_or_list(value: Any) -> Any:
-    return [value] if isinstance(value, (dict, BaseModel)) else value
-
-
-_LIST_OF_TABLES = {"type": "array"}
-
-
-class Law(Table):
-    """What acts along the coordinates of a hinge: one entry per speed.
-
-    effort > 0 pushes the outboard body along +u; `inertia` is reflected rotor inertia.  In a file
-    one number may stand for all coordinates.
-    """
-
-    stiffness: Annotated[Numbers, rules.numbers("a number in N/m or N m/rad, 0 or more, or a list of "
-                                          "them, one per coordinate", minimum=0)] = ()  # fmt: skip
-    rest: Annotated[Numbers, rules.numbers("a number in m or rad, or a list, one per coordinate")] = ()
-    damping: Annotated[Numbers, rules.numbers("a number in N s/m or N m s/rad, 0 or more, or a list of "
-                                        "them, one per coordinate", minimum=0)] = ()  # fmt: skip
-    effort: Annotated[
-        tuple[Expression, ...],
-        rules.expressions("a number or expression in N or N m, or a list, one per coordinate"),
-    ] = ()
-    inertia: Annotated[Numbers, rules.numbers("a number in kg or kg m^2, 0 or more, or a list of them, "
-                                        "one per coordinate", minimum=0)] = ()  # fmt: skip
-    friction: Annotated[
-        tuple[Friction, ...],
-        Shorthand("a table, or a list of tables, one per coordinate", _one_or_list,
-                  _LIST_OF_TABLES),
-    ] = ()  # fmt: skip
-    limits: Annotated[
-        tuple[Limits, ...],
-        Shorthand("a table, or a list of tables, one per coordinate", _one_or_list,
-                  _LIST_OF_TABLES),
-    ] = ()  # fmt: skip
-
-    def entry(self, k: int) -> LawEntry:
-        """The law of coordinate k; a list with one entry is shared by all."""
-
-        def pick(values: tuple[Any, ...], default: Any) -> Any:
-            if not values:
-                return default
-            return values[k] if len(values) > 1 else values[0]
-
-        return LawEntry(
-            pick(self.stiffness, 0.0), pick(self.rest, 0.0), pick(self.damping, 0.0),
-            pick(self.effort, number(0)), pick(self.inertia, 0.0),
-            pick(self.friction, Friction()), pick(self.limits, Limits()),
-        )  # fmt: skip
-
-
 class Hinge(Table):
     """A hinge between an inboard end (or the ground) and an outboard body.
 
@@ -254,10 +124,10 @@ class Hinge(Table):
     coordinate is driven) and `law` has one entry per speed.
     """
 
-    name: Annotated[str, rules.name("the hinge's name")]
-    type: Annotated[str, rules.name("a hinge type")]
-    inboard: Annotated[str, rules.end()]
-    outboard: Annotated[str, rules.end()]
+    name: Annotated[str, texts.name("the hinge's name")]
+    type: Annotated[str, texts.name("a hinge type")]
+    inboard: Annotated[str, texts.end()]
+    outboard: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
     axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
@@ -268,13 +138,15 @@ class Hinge(Table):
     law: Law = Law()
     drive: Annotated[
         tuple[Expression | None, ...] | None,
-        rules.expressions('an expression of t, or a list with one per coordinate ("free" where none)',
-                    free=True),
-    ] = None  # fmt: skip
-    release: Annotated[
-        Expression | None, rules.condition('a time in s or a comparison such as "t >= 1"', time=True)
+        texts.expressions(
+            'an expression of t, or a list with one per coordinate ("free" where none)', free=True
+        ),
     ] = None
-    parameters: Annotated[dict[str, float], rules.parameters()] = Field(default_factory=dict)
+    release: Annotated[
+        Expression | None,
+        texts.condition('a time in s or a comparison such as "t >= 1"', time=True),
+    ] = None
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
 
     @property
     def builtin(self) -> HingeType | None:
@@ -339,26 +211,26 @@ class Load(Table):
     `axes` is "inertial", "body" (the loaded body's own) or the name of another body.
     """
 
-    name: Annotated[str, rules.name("the load's name")] = ""
-    on: Annotated[str, rules.end(ground=False)]
+    name: Annotated[str, texts.name("the load's name")] = ""
+    on: Annotated[str, texts.end(ground=False)]
     force: Annotated[
         tuple[Expression, Expression, Expression],
-        rules.expressions("three numbers or expressions in N", 3),
+        texts.expressions("three numbers or expressions in N", 3),
     ] = _ZERO
     moment: Annotated[
         tuple[Expression, Expression, Expression],
-        rules.expressions("three numbers or expressions in N m", 3),
+        texts.expressions("three numbers or expressions in N m", 3),
     ] = _ZERO
-    axes: Annotated[str, rules.name('"inertial", "body" or the name of a body')] = "inertial"
+    axes: Annotated[str, texts.name('"inertial", "body" or the name of a body')] = "inertial"
 
 
 class Event(Table):
     """Something that happens when a comparison begins to hold: stop, or release a hinge."""
 
-    name: Annotated[str, rules.name("the event's name")] = ""
-    when: Annotated[Expression, rules.condition('a comparison such as "rod1.x < 0.1"')]
-    do: Annotated[str, rules.choice("stop", "release")]
-    hinge: Annotated[str | None, rules.name("the hinge to release")] = None
+    name: Annotated[str, texts.name("the event's name")] = ""
+    when: Annotated[Expression, texts.condition('a comparison such as "rod1.x < 0.1"')]
+    do: Annotated[str, texts.choice("stop", "release")]
+    hinge: Annotated[str | None, texts.name("the hinge to release")] = None
 
     @model_validator(mode="after")
     def _check(self) -> Event:
@@ -369,34 +241,19 @@ class Event(Table):
         return self
 
 
-class SpringLaw(Table):
-    """Law of a spring: tension = stiffness (length - rest) + damping rate - effort.
-
-    effort > 0 pushes the two ends apart; in it `q` is the length (m), `u` its rate (m/s).
-    """
-
-    stiffness: Annotated[float, rules.number("N/m", minimum=0)] = 0.0
-    rest: Annotated[float, rules.number("m", minimum=0)] = 0.0
-    damping: Annotated[float, rules.number("N s/m", minimum=0)] = 0.0
-    effort: Annotated[
-        Expression,
-        rules.one_expression("a number or expression in N"),
-    ] = number(0)
-
-
 class Spring(Table):
     """A spring, damper and actuator between two ends, or a force element of a user's own type.
 
     `position` (m) is the place of the end that is on the ground.
     """
 
-    name: Annotated[str, rules.name("the spring's name")] = ""
-    type: Annotated[str, rules.name("a force element type")] = "spring"
-    from_: Annotated[str, rules.end()] = Field(alias="from")
-    to: Annotated[str, rules.end()]
+    name: Annotated[str, texts.name("the spring's name")] = ""
+    type: Annotated[str, texts.name("a force element type")] = "spring"
+    from_: Annotated[str, texts.end()] = Field(alias="from")
+    to: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     law: SpringLaw = SpringLaw()
-    parameters: Annotated[dict[str, float], rules.parameters()] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check(self) -> Spring:

@@ -24,9 +24,7 @@ _KINDS = {
 }
 
 
-def problems(
-    scene: Scene, known: Mapping[tuple[str, str], ElementSpec]
-) -> list[Problem]:
+def problems(scene: Scene, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
     """Unknown types, and elements that do not fit the definition of their type."""
     found: list[Problem] = []
     for table, (kind, builtin) in _KINDS.items():
@@ -83,7 +81,8 @@ def _parameters(
         if parameter.default is None and parameter.name not in given:
             unit = f" in {parameter.unit}" if parameter.unit else ""
             meaning = f" ({parameter.meaning})" if parameter.meaning else ""
-            yield (*place, "parameters", parameter.name), f"missing; expected a number{unit}{meaning}"
+            at = (*place, "parameters", parameter.name)
+            yield at, f"missing; expected a number{unit}{meaning}"
 
 
 def _counts(place: Location, hinge: Hinge, spec: ElementSpec) -> Iterator[Problem]:

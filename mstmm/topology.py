@@ -204,11 +204,12 @@ def _direction(scene: Scene, component: _Component, start: int) -> Iterator[Prob
                 )
         return
     names = [scene.body[i].name for i in sorted(component.nodes)]
-    more = f" (with {', '.join(names[1:5])}{', ...' if len(names) > 5 else ''})" if names[1:] else ""
+    more = f" (with {', '.join(names[1:5])}{', ...' if len(names) > 5 else ''})"
+    more = more if names[1:] else ""
     held = {scene.hinge[h].outboard_body for _, h in component.via.values()}
     base = next((name for name in names if name not in held), names[0])
     yield (
         ("body", start),
-        f"no hinge connects it{more} to the ground; add a hinge of type \"free\" with "
+        f'no hinge connects it{more} to the ground; add a hinge of type "free" with '
         f'inboard = "ground" and outboard = "{base}"',
     )
