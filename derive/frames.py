@@ -279,3 +279,15 @@ def transport() -> Derivation:
             ),
         ),
     )
+
+
+def rotor_energy() -> Derivation:
+    """Kinetic energy of a rotor whose inertia is reflected to one speed."""
+    inertia, speed, energy = _symbol("J", 1), _symbol("u", 1), _symbol("T", 1)
+    return Derivation(
+        "frames",
+        "kinetic energy of a reflected rotor",
+        (Quantity(inertia, "kg*m2", "reflected inertia"), Quantity(speed, "rad/s", "speed")),
+        (Quantity(energy, "J", "kinetic energy"),),
+        (Equation("T", energy, sp.Rational(1, 2) * speed.T * inertia * speed),),
+    )

@@ -21,7 +21,7 @@ from .registry import Element, builtin_elements
 FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
-    frames.reaction, frames.transport,
+    frames.reaction, frames.transport, frames.rotor_energy,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
