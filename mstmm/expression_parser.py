@@ -24,6 +24,7 @@ from .errors import ExpressionError
 
 MAX_LENGTH = 4000
 MAX_DEPTH = 100
+MAX_WORD = 64
 #: An exact constant is kept as a fraction up to this many bits, and rounded to double beyond.
 _MAX_BITS = 2100
 
@@ -221,7 +222,7 @@ class Parser:
             follows += 1
         if follows < len(self.text) and self.text[follows] == "(":
             if token not in FUNCTIONS:
-                raise self.error(f"unknown function {token!r}; {_near(token)}", start)
+                raise self.error(f"unknown function {token[:MAX_WORD]!r}; {_near(token)}", start)
             self._open(token, start)
             return True, follows + 1
         if token == "pi":
@@ -237,6 +238,8 @@ class Parser:
         parts = tuple(words.split("."))
         if len(parts) > 3:
             raise self.error("a name has at most three parts, as in body.end.x", start)
+        if any(len(part) > MAX_WORD for part in parts):
+            raise self.error(f"a word has at most {MAX_WORD} characters", start)
         return Name(parts, int(index[:-1]) if bracket else None, start)
 
     def _operator(self, kind: str, token: str, start: int) -> bool:
@@ -387,7 +390,7 @@ def _count(number: int) -> str:
 
 
 def _near(name: str) -> str:
-    close = difflib.get_close_matches(name.lower(), FUNCTIONS, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(name[:MAX_WORD].lower(), FUNCTIONS, n=1, cutoff=0.5)
     if close:
         return f"did you mean {close[0]}?"
     return "the functions are " + ", ".join(FUNCTIONS)

@@ -35,8 +35,8 @@ class HingeType:
 
 
 def effort_unit(speed_unit: str) -> str:
-    """Unit of the effort that does work on a speed: N for m/s, N m for rad/s."""
-    return {"m/s": "N", "rad/s": "N m"}.get(speed_unit, f"W/({speed_unit or '1'})")
+    """Unit of the effort that does work on a speed: N for m/s, N*m for rad/s."""
+    return {"m/s": "N", "rad/s": "N*m", "1/s": "J"}.get(speed_unit, f"W/({speed_unit or '1'})")
 
 
 def _rates(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
@@ -50,7 +50,8 @@ def _simple(name: str, title: str, coordinates: dict[str, str], *keys: str) -> H
 
 
 _POSITION = (Coordinate("x", "m"), Coordinate("y", "m"), Coordinate("z", "m"))
-_QUATERNION = tuple(Coordinate(n, "1") for n in ("qw", "qx", "qy", "qz"))
+_QUATERNION = tuple(Coordinate(n, "") for n in "wxyz")
+_POSE = _POSITION + tuple(Coordinate(f"q{n}", "") for n in "wxyz")
 _LINEAR = tuple(Coordinate(n, "m/s") for n in ("vx", "vy", "vz"))
 _ANGULAR = tuple(Coordinate(n, "rad/s") for n in ("wx", "wy", "wz"))
 
@@ -70,11 +71,11 @@ HINGE_TYPES: dict[str, HingeType] = {
         HingeType("ball", "free rotation", _QUATERNION, _ANGULAR, ("axis",), 0),
         _simple("planar", "translation in a plane and rotation about its normal",
                 {"x": "m", "y": "m", "angle": "rad"}, "axis", "axis2"),
-        HingeType("free", "six degrees of freedom", _POSITION + _QUATERNION, _LINEAR + _ANGULAR,
+        HingeType("free", "six degrees of freedom", _POSE, _LINEAR + _ANGULAR,
                   ("axis",), 3),
         _simple("gimbal", "three angles, R = Rz(angle3) Ry(angle2) Rx(angle1)",
                 {"angle1": "rad", "angle2": "rad", "angle3": "rad"}),
-        HingeType("elastic", "spring and damper in six directions", _POSITION + _QUATERNION,
+        HingeType("elastic", "spring and damper in six directions", _POSE,
                   _LINEAR + _ANGULAR, ("axis",), 3),
     )
 }  # fmt: skip

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 from . import topology
 from .expression import Expression
-from .scene_errors import Problem, near
+from .scene_errors import MAX_PROBLEMS, Problem, near
 from .scene_names import Scope, problem_with
 from .scene_physics import triangle_excess
 from .scene_rules import GROUND, Location, split
@@ -22,10 +23,12 @@ def problems(scene: Scene) -> list[Problem]:
     """Everything in which the elements of a scene do not fit each other."""
     if not scene.body:
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
-    found = [*_duplicates(scene), *_references(scene), *_inertias(scene)]
-    if found:
-        return found
-    return [*_expressions(scene), *topology.problems(scene)]
+    found = _first(_duplicates(scene), _references(scene), _inertias(scene))
+    return found or _first(_expressions(scene), topology.problems(scene))
+
+
+def _first(*findings: Iterable[Problem]) -> list[Problem]:
+    return list(islice(chain(*findings), MAX_PROBLEMS))
 
 
 def _duplicates(scene: Scene) -> Iterator[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -12,6 +13,10 @@ from .errors import SceneError
 from .scene_rules import Location, Refused, Rule, Shorthand, found
 
 MAX_LINES = 10
+#: Where to stop looking: a file in which every element is wrong should not take minutes.
+MAX_PROBLEMS = 60
+#: Nearest names are looked for among this many at most.
+_MAX_OPTIONS = 2000
 #: Keys kept free for coming releases, and what they will hold.
 RESERVED = {
     "beam": "flexible bodies",
@@ -30,7 +35,7 @@ Problem = tuple[Location, str]
 
 def near(name: str, options: Iterable[str]) -> str:
     """'; did you mean "x"?', or the options themselves where none is near and they are few."""
-    choices = list(dict.fromkeys(options))
+    choices = list(dict.fromkeys(islice(options, _MAX_OPTIONS)))
     lowered = {option.lower(): option for option in reversed(choices)}
     close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
     if close:
@@ -38,7 +43,7 @@ def near(name: str, options: Iterable[str]) -> str:
     if not choices:
         return "; there is none"
     if len(choices) > 12:
-        return f"; there are {len(choices)}, from {choices[0]} to {choices[-1]}"
+        return f"; the first of them are {', '.join(choices[:5])}"
     if len(choices) == 1:
         return f"; there is only {choices[0]}"
     return "; one of " + ", ".join(choices)
@@ -48,7 +53,7 @@ def scene_error(
     error: ValidationError, model: type[BaseModel], data: Any, where: str
 ) -> SceneError:
     """The error a user sees for a scene that pydantic refused."""
-    return report(list(problems(error, model)), data, where)
+    return report(list(islice(problems(error, model), MAX_PROBLEMS)), data, where)
 
 
 def report(found_problems: Sequence[Problem], data: Any, where: str) -> SceneError:
@@ -56,7 +61,8 @@ def report(found_problems: Sequence[Problem], data: Any, where: str) -> SceneErr
     unique = list(dict.fromkeys(found_problems))
     lines = [f"{where}: {line(place, message, data)}" for place, message in unique[:MAX_LINES]]
     if len(unique) > MAX_LINES:
-        lines.append(f"{where}: and {len(unique) - MAX_LINES} more problems like these")
+        more = "many" if len(unique) >= MAX_PROBLEMS else len(unique) - MAX_LINES
+        lines.append(f"{where}: and {more} more problems")
     return SceneError("\n".join(lines))
 
 

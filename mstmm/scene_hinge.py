@@ -160,7 +160,7 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
             ))  # fmt: skip
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
     if kind.quaternion is not None:
-        problems += _rotation_law(kind, changes)
+        problems += _rotation_law(hinge, kind, changes)
     return law.model_copy(update=changes)
 
 
@@ -176,15 +176,15 @@ def _units_differ(kind: HingeType) -> bool:
     return len({s.unit for s in kind.speeds}) > 1
 
 
-def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, str]]:
-    """A rotation stored as a quaternion has no angle to rest at or to stop."""
+def _rotation_law(hinge: Hinge, kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, str]]:
+    """A rotation stored as a quaternion has no angle to rest at (but the twist) or to stop."""
     problems: list[tuple[Location, str]] = []
-    angular = [s.unit == "rad/s" for s in kind.speeds]
-    if any(rest != 0 and turns for rest, turns in zip(law["rest"], angular, strict=False)):
+    rest = law["rest"][-3:]
+    if any(rest) and norm(cross(unit(rest), unit(hinge.axis))) > 1e-9:
         problems.append((
             ("law", "rest"),
-            f"the rotation of a {kind.name} hinge rests at its orientation; "
-            "turn orientation instead",
+            f"the rotation of a {kind.name} hinge can rest at a twist about its axis only, found "
+            f"{found(rest)}; turn orientation instead",
         ))  # fmt: skip
     if any(stop.acts for stop in law["limits"]):
         problems.append((

@@ -18,7 +18,7 @@ from .expression import Expression, number
 from .hinge_types import HINGE_TYPES, HingeType
 from .rotations import IDENTITY, Matrix, Vector, from_orientation, reject, unit
 from .scene_law import Law, SpringLaw
-from .scene_rules import GROUND, NAME, Shorthand, Table, found, refuse, split
+from .scene_rules import GROUND, NAME, Refused, Shorthand, Table, found, refuse, split
 
 Numbers = tuple[float, ...]
 Orientation = tuple[float, ...]
@@ -95,13 +95,14 @@ class Body(Table):
     def _settle(self) -> Body:
         if len(self.inertia) == 3:
             object.__setattr__(self, "inertia", (*self.inertia, 0.0, 0.0, 0.0))
+        problems = scene_physics.inertia_problems(self.inertia_matrix)
         if self.type == "rigid" and "mass" not in self.model_fields_set:
-            raise refuse("missing; expected a number in kg, 0 or more", "mass")
+            problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
         if self.type == "rigid" and self.parameters:
-            raise refuse(
-                "a rigid body has no parameters; give the type of your own body", "parameters"
-            )
-        scene_physics.refuse_impossible_inertia(self.inertia_matrix)
+            way_out = "give the type of your own body"
+            problems.append((("parameters",), f"a rigid body has no parameters; {way_out}"))
+        if problems:
+            raise Refused(*problems)
         return self
 
 

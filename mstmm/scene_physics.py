@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .rotations import Matrix, Vector
-from .scene_rules import refuse
+from .scene_rules import Location
 
 #: Relative size of a violation that is put down to rounding.
 _ROUNDING = 1e-12
@@ -54,20 +54,23 @@ def _row(x: list[float]) -> Vector:
     return (x[0], x[1], x[2])
 
 
-def refuse_impossible_inertia(inertia: Matrix) -> None:
-    """Refuse a tensor with a negative moment about some axis."""
+def inertia_problems(inertia: Matrix) -> list[tuple[Location, str]]:
+    """What is wrong with a tensor that has a negative moment about some axis."""
     for entry, label in zip((inertia[i][i] for i in range(3)), ("xx", "yy", "zz"), strict=True):
         if entry < 0:
-            raise refuse(
-                f"expected moments of inertia (kg m^2) of 0 or more, found {label} = {entry:.6g}; "
-                "remove the sign", "inertia",
-            )  # fmt: skip
+            return [(
+                ("inertia",),
+                f"expected moments of inertia of 0 kg m^2 or more, found {label} = {entry:.6g}; "
+                "remove the sign",
+            )]  # fmt: skip
     moments, scale = _scaled(inertia)
-    if moments[0] < -_ROUNDING * moments[2]:
-        raise refuse(
-            f"no body has this tensor: its principal moments are {shown(moments, scale)}, one "
-            "negative; check the products of inertia (tensor entries, Jxy = -int xy dm)", "inertia",
-        )  # fmt: skip
+    if moments[0] >= -_ROUNDING * moments[2]:
+        return []
+    return [(
+        ("inertia",),
+        f"no body has this tensor: its principal moments are {shown(moments, scale)}, one "
+        "negative; check the products of inertia (tensor entries, Jxy = -int xy dm)",
+    )]  # fmt: skip
 
 
 def triangle_excess(inertia: Matrix) -> str | None:

@@ -70,7 +70,7 @@ def build(scene: Scene) -> Topology:
     Raises SceneError, one line per problem, for closed loops, hinges written the wrong way round
     and bodies that no hinge connects to the ground.
     """
-    found = problems(scene)
+    found = list(problems(scene))
     if found:
         from .scene_errors import report
 
@@ -127,7 +127,7 @@ class _Component:
     closing: list[tuple[int, int, int]]
 
 
-def problems(scene: Scene) -> list[Problem]:
+def problems(scene: Scene) -> Iterator[Problem]:
     """Places and messages of everything that keeps the hinges from being a tree."""
     index = {body.name: i for i, body in enumerate(scene.body)}
     edges: list[list[tuple[int, int, bool]]] = [[] for _ in range(len(scene.body) + 1)]
@@ -137,13 +137,11 @@ def problems(scene: Scene) -> list[Problem]:
         edges[inboard].append((outboard, h, False))
         edges[outboard].append((inboard, h, True))
     seen = [False] * len(edges)
-    found: list[Problem] = []
     for start in range(GROUND_INDEX, len(scene.body)):
         if not seen[start]:
             component = _walk(start, edges, seen)
-            found.extend(_loops(scene, component))
-            found.extend(_direction(scene, component, start))
-    return found
+            yield from _loops(scene, component)
+            yield from _direction(scene, component, start)
 
 
 def _walk(start: int, edges: list[list[tuple[int, int, bool]]], seen: list[bool]) -> _Component:
