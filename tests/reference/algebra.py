@@ -44,6 +44,13 @@ def quaternion_matrix(q: Jet) -> Jet:
     return stack([stack([row[i] for row in rows]) for i in range(3)])
 
 
+def attitude(q: Array) -> Array:
+    """Rotation matrix of one quaternion, used normalised."""
+    w, v = q[0], np.asarray(q[1:])
+    square = float(q @ q)
+    return np.asarray(np.eye(3) + (2 * w * tilde(v) + 2 * tilde(v) @ tilde(v)) / square)
+
+
 def quaternion_product(a: Array, b: Array) -> Array:
     """Product of quaternions over the last axis."""
     w, v = a[..., :1], a[..., 1:]
@@ -98,8 +105,12 @@ def unit(v: Any) -> Array:
 
 
 def triad(axis: Any, hint: Any = None) -> Array:
-    """Columns (in-plane 1, in-plane 2, axis), right-handed; the first along `hint` if given."""
+    """Columns (in-plane 1, in-plane 2, axis), right-handed.
+
+    The first is the part of `hint` normal to the axis; without a hint that of x, or of y where
+    the axis is within 26 degrees of x.
+    """
     a = unit(axis)
-    h = np.eye(3)[int(np.argmin(np.abs(a)))] if hint is None else np.asarray(hint, float)
+    h = np.eye(3)[0 if abs(a[0]) < 0.9 else 1] if hint is None else np.asarray(hint, float)
     first = unit(h - a * (a @ h))
     return np.stack([first, np.cross(a, first), a], axis=1)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import math
 import operator
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import mpmath
@@ -23,20 +25,29 @@ _COMPARE: dict[type, Any] = {
     ast.GtE: operator.ge,
     ast.Eq: operator.eq,
 }
-_NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt sign"
-_FUNCTIONS: dict[str, Any] = {name: getattr(mpmath, name) for name in _NAMES.split()} | {
+_NAMES = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp")
+_NAMES += ("log", "sqrt")
+_OWN: dict[str, Any] = {
     "abs": abs,
     "min": min,
     "max": max,
-    "where": lambda c, a, b: a if c else b,
+    "sign": lambda x: (x > 0) - (x < 0),
+    "where": lambda condition, a, b: a if condition else b,
 }
+_FLOAT = _OWN | {name: getattr(math, name) for name in _NAMES} | {"pi": math.pi}
+_EXACT = _OWN | {name: getattr(mpmath, name) for name in _NAMES} | {"pi": mpmath.pi}
 
 
-def evaluate(text: Any, scope: Mapping[str, Any]) -> Any:
+def evaluate(text: Any, scope: Mapping[str, Any], functions: Mapping[str, Any] = _FLOAT) -> Any:
     """Value of a number or expression; `scope` maps names (and `name.q`) to numbers or lists."""
     if not isinstance(text, str):
         return text
-    return _visit(ast.parse(text.replace("^", "**").strip(), mode="eval").body, scope)
+    return _visit(_parsed(text), {**functions, **scope})
+
+
+@lru_cache(maxsize=1000)
+def _parsed(text: str) -> ast.AST:
+    return ast.parse(text.replace("^", "**").strip(), mode="eval").body
 
 
 def number(text: Any, scope: Mapping[str, Any]) -> float:
@@ -47,7 +58,8 @@ def number(text: Any, scope: Mapping[str, Any]) -> float:
 def drive(text: Any, t: float) -> tuple[float, float, float]:
     """Value, first and second derivative of an expression in t, differentiated at 60 digits."""
     with mpmath.workdps(60):
-        value, rate, second = mpmath.taylor(lambda s: mpmath.mpf(evaluate(text, {"t": s})), t, 2)
+        at = lambda s: mpmath.mpf(evaluate(text, {"t": s}, _EXACT))  # noqa: E731
+        value, rate, second = mpmath.taylor(at, t, 2)
         return float(value), float(rate), float(2 * second)
 
 
@@ -57,9 +69,9 @@ def _scalar(value: Any) -> Any:
 
 def _visit(node: ast.AST, scope: Mapping[str, Any]) -> Any:
     if isinstance(node, ast.Constant):
-        return mpmath.mpf(repr(node.value))
+        return node.value
     if isinstance(node, ast.Name):
-        return mpmath.pi if node.id == "pi" else _scalar(scope[node.id])
+        return _scalar(scope[node.id])
     if isinstance(node, ast.Attribute):
         return _scalar(scope[f"{node.value.id}.{node.attr}"])  # type: ignore[attr-defined]
     if isinstance(node, ast.Subscript):
@@ -76,5 +88,5 @@ def _visit(node: ast.AST, scope: Mapping[str, Any]) -> Any:
         )
     if isinstance(node, ast.Call):
         arguments = [_visit(a, scope) for a in node.args]
-        return _FUNCTIONS[node.func.id](*arguments)  # type: ignore[attr-defined]
+        return scope[node.func.id](*arguments)  # type: ignore[attr-defined]
     raise ValueError(f"not in the grammar: {ast.unparse(node)}")

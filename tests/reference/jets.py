@@ -21,10 +21,12 @@ class Jet:
     __slots__ = ("ddx", "dx", "x")
 
     def __init__(self, x: Any, dx: Any = 0.0, ddx: Any = 0.0) -> None:
-        x, dx, ddx = np.broadcast_arrays(
-            np.asarray(x, float), np.asarray(dx, float), np.asarray(ddx, float)
-        )
-        self.x, self.dx, self.ddx = x, dx, ddx
+        self.x = np.asarray(x, float)
+        shape = self.x.shape
+        self.dx, self.ddx = np.asarray(dx, float), np.asarray(ddx, float)
+        if self.dx.shape != shape or self.ddx.shape != shape:
+            parts = np.broadcast_arrays(self.x, self.dx, self.ddx)
+            self.x, self.dx, self.ddx = parts
 
     def __getitem__(self, key: Any) -> Jet:
         return Jet(self.x[key], self.dx[key], self.ddx[key])
@@ -33,19 +35,22 @@ class Jet:
         return Jet(-self.x, -self.dx, -self.ddx)
 
     def __add__(self, other: Any) -> Jet:
-        b = as_jet(other)
-        return Jet(self.x + b.x, self.dx + b.dx, self.ddx + b.ddx)
+        if not isinstance(other, Jet):
+            return Jet(self.x + other, self.dx, self.ddx)
+        return Jet(self.x + other.x, self.dx + other.dx, self.ddx + other.ddx)
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Jet:
-        return self + (-as_jet(other))
+        return self + (-other)
 
     def __rsub__(self, other: Any) -> Jet:
-        return as_jet(other) - self
+        return -self + other
 
     def __mul__(self, other: Any) -> Jet:
-        return _bilinear(np.multiply, self, as_jet(other))
+        if not isinstance(other, Jet):
+            return Jet(self.x * other, self.dx * other, self.ddx * other)
+        return _bilinear(np.multiply, self, other)
 
     __rmul__ = __mul__
 

@@ -73,17 +73,48 @@ def hinge_effort(tree: Tree, hinge: Hinge, q: Array, u: Array, t: float) -> Arra
     names = scope(tree, q, u, t, hinge)
     own_q, own_u = q[hinge.q], u[hinge.u]
     tau = np.array([number(e, names) for e in per_speed(law.get("effort"), count)])
-    tau = tau - np.array([number(c, names) for c in per_speed(law.get("damping"), count)]) * own_u
+    tau = tau + _friction(law, own_u)
+    damping = np.array([number(c, names) for c in per_speed(law.get("damping"), count)])
     k = np.array([number(c, names) for c in per_speed(law.get("stiffness"), count)])
     rest = np.array([number(c, names) for c in per_speed(law.get("rest"), count)])
     if hinge.type == "ball":
-        return tau + rotational_effort(own_q, hinge, k, rest)
+        return tau - damping * own_u + rotational_effort(own_q, hinge, k, rest)
     if hinge.type in ("free", "elastic"):
         rotation = quaternion_matrix(as_jet(own_q[3:])).x
-        tau[:3] -= rotation.T @ (k[:3] * (own_q[:3] - rest[:3]))
-        tau[3:] += rotational_effort(own_q[3:], hinge, k[3:], rest[3:])
+        pull = k[:3] * (own_q[:3] - rest[:3]) + damping[:3] * (rotation @ own_u[:3])
+        tau[:3] -= rotation.T @ pull
+        tau[3:] += rotational_effort(own_q[3:], hinge, k[3:], rest[3:]) - damping[3:] * own_u[3:]
         return tau
-    return tau - k * (own_q - rest)
+    return tau - damping * own_u - k * (own_q - rest) + _stops(law, own_q, own_u)
+
+
+def _friction(law: Mapping[str, Any], u: Array) -> Array:
+    """-(F_c + (F_s - F_c) exp(-(u/v_s)^2)) tanh(u/v_r) of every speed."""
+    out = np.zeros(len(u))
+    for i, entry in enumerate(_tables(law.get("friction"), len(u))):
+        coulomb = float(entry.get("coulomb") or 0.0)
+        static = float(entry.get("static") or coulomb)
+        decay = np.exp(-((u[i] / float(entry.get("stribeck_velocity") or 0.01)) ** 2))
+        smooth = np.tanh(u[i] / float(entry.get("regularisation_velocity") or 0.001))
+        out[i] = -(coulomb + (static - coulomb) * decay) * smooth
+    return out
+
+
+def _stops(law: Mapping[str, Any], q: Array, u: Array) -> Array:
+    """One-sided spring-dampers that never pull."""
+    out = np.zeros(len(u))
+    for i, entry in enumerate(_tables(law.get("limits"), len(u))):
+        for sign, key in ((1.0, "upper"), (-1.0, "lower")):
+            bound = entry.get(key)
+            if bound is not None and sign * (q[i] - bound) > 0:
+                push = float(entry.get("stiffness") or 0.0) * sign * (q[i] - bound)
+                push += float(entry.get("damping") or 0.0) * sign * u[i]
+                out[i] -= sign * max(0.0, push)
+    return out
+
+
+def _tables(value: Any, count: int) -> list[Mapping[str, Any]]:
+    return [value or {}] * count if not isinstance(value, (list, tuple)) else list(value)
 
 
 def hinge_potential(hinge: Hinge, q: Array) -> float:
@@ -99,7 +130,13 @@ def hinge_potential(hinge: Hinge, q: Array) -> float:
     if hinge.type in ("free", "elastic"):
         push = 0.5 * float((k[:3] * (own[:3] - rest[:3]) ** 2).sum())
         return push + float(rotational_potential(own[3:], hinge, k[3:], rest[3:]))
-    return 0.5 * float((k * (own - rest) ** 2).sum())
+    total = 0.5 * float((k * (own - rest) ** 2).sum())
+    for i, entry in enumerate(_tables(hinge.law.get("limits"), count)):
+        for sign, key in ((1.0, "upper"), (-1.0, "lower")):
+            if entry.get(key) is not None:
+                depth = max(0.0, sign * (own[i] - entry[key]))
+                total += 0.5 * float(entry.get("stiffness") or 0.0) * depth**2
+    return total
 
 
 def reflected_inertia(hinge: Hinge) -> Array:

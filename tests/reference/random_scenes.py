@@ -62,7 +62,7 @@ def random_body(rng: Generator, name: str) -> Scene:
 
 
 def random_law(rng: Generator, kind: str) -> Scene:
-    """Stiffness, rest, damping, effort and reflected inertia of every speed."""
+    """Stiffness, rest, damping, friction, stops, effort and reflected inertia of every speed."""
     count = SIZES[kind][1]
     law: Scene = {}
     for key, low, high in (
@@ -73,9 +73,18 @@ def random_law(rng: Generator, kind: str) -> Scene:
     ):
         if rng.random() < 0.6:
             law[key] = [float(v) for v in rng.uniform(low, high, count)]
+    if kind == "ball":
+        law.pop("rest", None)
+    elif kind in ("free", "elastic") and "rest" in law:
+        law["rest"][3:] = [0.0, 0.0, 0.0]
+    elif rng.random() < 0.3:
+        friction = {"coulomb": 0.3, "static": 0.5, "stribeck_velocity": 0.2}
+        friction["regularisation_velocity"] = 0.1
+        stops = {"lower": -0.4, "upper": 0.5, "stiffness": 30.0, "damping": 4.0}
+        law["friction"], law["limits"] = [friction] * count, [stops] * count
     if rng.random() < 0.5:
         a, b = (float(v) for v in rng.uniform(-3, 3, 2))
-        law["effort"] = [f"{a!r}*cos(2*t + {i}) + {b!r}*u[{i}]^2" for i in range(count)]
+        law["effort"] = [f"{a!r}*cos(2*t + {i}) + {b!r}*sin(u[{i}])^3" for i in range(count)]
     return law
 
 
