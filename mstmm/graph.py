@@ -483,4 +483,6 @@ def _power_rule(graph: Graph, node: Node, d: list[Node]) -> Node:
     slope = exponent * graph.power(base, exponent - 1) * d[0]
     if d[1].value == 0:
         return slope
-    return slope + node * graph.call("log", base) * d[1]
+    # Where the exponent stands still, a negative base has a slope but no logarithm.
+    still = graph.call("eq", d[1], 0)
+    return graph.select(still, slope, slope + node * graph.call("log", base) * d[1])
