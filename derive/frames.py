@@ -291,3 +291,22 @@ def rotor_energy() -> Derivation:
         (Quantity(energy, "J", "kinetic energy"),),
         (Equation("T", energy, sp.Rational(1, 2) * speed.T * inertia * speed),),
     )
+
+
+def length() -> Derivation:
+    """Distance of two points and its rate."""
+    x_f, v_f, x_t, v_t = (_symbol(n, 3) for n in ("x_F", "v_F", "x_T", "v_T"))
+    between, rate, value = _symbol("x_rel", 3), _symbol("v_rel", 3), _symbol("l", 2)
+    distance = sp.sqrt(sum(between[i, 0] ** 2 for i in range(3)))
+    along = sum(between[i, 0] * rate[i, 0] for i in range(3)) / distance
+    return Derivation(
+        "frames",
+        "distance of two points",
+        tuple(Quantity(s) for s in (x_f, v_f, x_t, v_t)),
+        (Quantity(value, "m, m/s", "distance and its rate"),),
+        (
+            Equation("relative position", between, x_t - x_f),
+            Equation("relative velocity", rate, v_t - v_f),
+            Equation("distance and rate", value, sp.ImmutableDenseMatrix([distance, along])),
+        ),
+    )

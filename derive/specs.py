@@ -22,6 +22,7 @@ FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
     frames.reaction, frames.transport, frames.rotor_energy,
+    frames.length,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.

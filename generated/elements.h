@@ -216,6 +216,8 @@ int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
+int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, real *restrict l);
 
 extern const mstmm_element mstmm_sweep_generic0;
 int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict ro,

@@ -81,8 +81,9 @@ static void point_loads(mstmm_state *state, mstmm_balance *balance)
     const mstmm_model *model = state->model;
     for (int k = 0; k < model->n_loads; k++) {
         const mstmm_load *load = &model->loads[k];
-        const real *axes = mstmm_block(model, state->workspace, load->axes) + MSTMM_BLOCK_A;
-        real force[3], moment[3];
+        real axes[9], force[3], moment[3];
+        mstmm_sweep_frames_end_frame(
+            mstmm_block(model, state->workspace, load->axes) + MSTMM_BLOCK_A, load->axes_own, axes);
         for (int j = 0; j < 3; j++) {
             force[j] = value_at(state, load->force[j]);
             moment[j] = value_at(state, load->moment[j]);
@@ -118,6 +119,19 @@ static void motion_of_end(mstmm_state *state, int index, const real *own, const 
                                alpha);
 }
 
+/* Given effort of a force element; code of a tape that failed. */
+static int given_effort(mstmm_state *state, const mstmm_force *element, const end_motion *f,
+                        const end_motion *t, real *effort)
+{
+    real length[2];
+    *effort = 0;
+    if (!element->effort) return 0;
+    mstmm_sweep_frames_length(f->x, f->v, t->x, t->v, length);
+    const real *inputs[] = {&state->t, state->q, state->u, length};
+    real *outputs[] = {effort};
+    return mstmm_tape_run(element->effort, inputs, state->slots, outputs);
+}
+
 int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance)
 {
     static const real identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -126,11 +140,12 @@ int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance)
     for (int k = 0; k < model->n_forces; k++) {
         const mstmm_force *element = &model->forces[k];
         end_motion f, t;
-        real effort = value_at(state, element->effort);
-        real force[3], moment[3], back[3], turn[3], potential, power;
+        real effort, force[3], moment[3], back[3], turn[3], potential, power;
         motion_of_end(state, element->body_f, element->axes_f, element->offset_f, &f);
         motion_of_end(state, element->body_t, element->axes_t, element->offset_t, &t);
-        int code = ((wrench_kernel)element->wrench)(element->p, &state->t, &effort, f.axes, f.x,
+        int code = given_effort(state, element, &f, &t, &effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, k, code);
+        code = ((wrench_kernel)element->wrench)(element->p, &state->t, &effort, f.axes, f.x,
                                                     f.v, f.w, t.axes, t.x, t.v, t.w, force, moment,
                                                     &potential, &power);
         if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, k, code);

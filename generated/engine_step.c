@@ -9,6 +9,9 @@
 
 enum { BLOCK = 256 }; /* components handled together, so that sums stay in the first cache */
 
+/* Two components at once, wherever they lie in memory: what every 64-bit processor has */
+typedef double lanes __attribute__((vector_size(16), aligned(8), may_alias));
+
 int mstmm_all_finite(int64_t n, const double *x) {
   double a = 0.0, b = 0.0, c = 0.0, d = 0.0; /* 0 * x is 0 for finite x and NaN otherwise */
   int64_t i = 0;
@@ -36,61 +39,58 @@ int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, doub
   return status;
 }
 
-/* out += sum of w[j] row[j], j < m <= 4: one pass over `out` for four stages */
-static void add_rows(int count, int m, const double *w, const double *const *row,
-                     double *restrict out) {
-  const double w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3];
-  const double *restrict r0 = row[0], *restrict r1 = row[1], *restrict r2 = row[2];
-  const double *restrict r3 = row[3];
-  switch (m) {
-    case 4:
-      for (int i = 0; i < count; i++)
-        out[i] += (w0 * r0[i] + w1 * r1[i]) + (w2 * r2[i] + w3 * r3[i]);
-      break;
-    case 3:
-      for (int i = 0; i < count; i++) out[i] += (w0 * r0[i] + w1 * r1[i]) + w2 * r2[i];
-      break;
-    case 2:
-      for (int i = 0; i < count; i++) out[i] += w0 * r0[i] + w1 * r1[i];
-      break;
-    default:
-      for (int i = 0; i < count; i++) out[i] += w0 * r0[i];
-  }
-}
-
-/* out = sum_j w[j stride] k_j over one block, k_j a row of n starting at k; zero weights cost nothing */
-static void block_sum(int count, int m, const double *w, int stride, const double *k, size_t n,
-                      double *restrict out) {
-  double weight[4] = {0.0};
-  const double *row[4] = {k, k, k, k};
-  int held = 0;
-  for (int i = 0; i < count; i++) out[i] = 0.0;
-  for (int j = 0; j < m; j++) {
-    weight[held] = w[(size_t)j * (size_t)stride];
-    row[held] = k + (size_t)j * n;
-    if (weight[held] != 0.0 && ++held == 4) {
-      add_rows(count, 4, weight, row, out);
-      held = 0;
+/* out[i] = sum_j w[j stride] k_j[i] for `count` components, k_j a row of n.  Every component is
+ * summed in the same order, whether eight at a time or alone. */
+static void weighted_sum(int64_t count, int m, const double *w, int stride, const double *k,
+                         int64_t n, double *restrict out) {
+  int64_t i = 0;
+  for (; i + 8 <= count; i += 8) {
+    lanes a = {0.0}, b = {0.0}, c = {0.0}, d = {0.0};
+    for (int j = 0; j < m; j++) {
+      const lanes *row = (const lanes *)(k + j * n + i);
+      const double weight = w[j * stride];
+      if (weight == 0.0) continue;
+      a += weight * row[0];
+      b += weight * row[1];
+      c += weight * row[2];
+      d += weight * row[3];
     }
+    lanes *to = (lanes *)(out + i);
+    to[0] = a;
+    to[1] = b;
+    to[2] = c;
+    to[3] = d;
   }
-  if (held) add_rows(count, held, weight, row, out);
+  for (; i + 2 <= count; i += 2) {
+    lanes a = {0.0};
+    for (int j = 0; j < m; j++)
+      if (w[j * stride] != 0.0) a += w[j * stride] * *(const lanes *)(k + j * n + i);
+    *(lanes *)(out + i) = a;
+  }
+  for (; i < count; i++) {
+    double a = 0.0;
+    for (int j = 0; j < m; j++)
+      if (w[j * stride] != 0.0) a += w[j * stride] * k[j * n + i];
+    out[i] = a;
+  }
 }
 
-static int block_length(int64_t n, int64_t start) {
-  return (int)(n - start < BLOCK ? n - start : BLOCK);
+static int64_t block_length(int64_t n, int64_t start) {
+  return n - start < BLOCK ? n - start : BLOCK;
 }
 
 /* target = base + h sum_j w[j] k_j; base NULL: zero */
 static void combine(int64_t n, int m, const double *w, int stride, const double *k, double h,
                     const double *base, double *target) {
-  double sum[BLOCK];
   for (int64_t start = 0; start < n; start += BLOCK) {
-    const int count = block_length(n, start);
-    block_sum(count, m, w, stride, k + start, (size_t)n, sum);
+    const int64_t count = block_length(n, start);
+    double *restrict out = target + start;
+    weighted_sum(count, m, w, stride, k + start, n, out);
     if (base) {
-      for (int i = 0; i < count; i++) target[start + i] = base[start + i] + h * sum[i];
+      const double *restrict from = base + start;
+      for (int64_t i = 0; i < count; i++) out[i] = from[i] + h * out[i];
     } else {
-      for (int i = 0; i < count; i++) target[start + i] = h * sum[i];
+      for (int64_t i = 0; i < count; i++) out[i] *= h;
     }
   }
 }
@@ -171,14 +171,14 @@ void mstmm_dense(const mstmm_work *work, double t, double *y) {
     return;
   }
   for (int64_t start = 0; start < n; start += BLOCK) {
-    const int count = block_length(n, start);
+    const int64_t count = block_length(n, start);
     double sum[BLOCK] = {0.0};
     for (int j = work->tableau->n_dense - 1; j >= 0; j--) {
       const double factor = j % 2 ? 1.0 - theta : theta;
       const double *restrict row = work->dense + j * n + start;
-      for (int i = 0; i < count; i++) sum[i] = factor * (sum[i] + row[i]);
+      for (int64_t i = 0; i < count; i++) sum[i] = factor * (sum[i] + row[i]);
     }
-    for (int i = 0; i < count; i++) y[start + i] = work->y[start + i] + sum[i];
+    for (int64_t i = 0; i < count; i++) y[start + i] = work->y[start + i] + sum[i];
   }
 }
 
@@ -200,29 +200,25 @@ static double combined(double h, double high, double low, int64_t n, int both) {
 
 double mstmm_error_norm(const mstmm_work *work, double *absolute) {
   const mstmm_tableau *tableau = work->tableau;
-  const int64_t n = work->system->n_error;
-  const int m = tableau->n_stages + 1;
+  const int64_t n = work->system->n_error, row = work->system->n_state;
+  const int m = tableau->n_stages + 1, both = tableau->error_low != NULL;
   double high = 0.0, low = 0.0, high_scaled = 0.0, low_scaled = 0.0;
-  double e_high[BLOCK], e_low[BLOCK];
+  double e_high[BLOCK], e_low[BLOCK] = {0.0};
   for (int64_t start = 0; start < n; start += BLOCK) {
-    const int count = block_length(n, start);
-    const double *k = work->k + start, *y = work->y + start, *y_new = work->y_new + start;
-    const size_t row = (size_t)work->system->n_state;
-    block_sum(count, m, tableau->error, 1, k, row, e_high);
-    if (tableau->error_low) block_sum(count, m, tableau->error_low, 1, k, row, e_low);
-    for (int i = 0; i < count; i++) {
+    const int64_t count = block_length(n, start);
+    const double *y = work->y + start, *y_new = work->y_new + start;
+    weighted_sum(count, m, tableau->error, 1, work->k + start, row, e_high);
+    if (both) weighted_sum(count, m, tableau->error_low, 1, work->k + start, row, e_low);
+    for (int64_t i = 0; i < count; i++) {
       const double unit = tolerance(work, start + i, larger(fabs(y[i]), fabs(y_new[i])));
       const double scale = unit > 0.0 ? 1.0 / unit : 0.0;
-      const double e = e_high[i];
-      high += e * e;
-      high_scaled += (e * scale) * (e * scale);
-      if (tableau->error_low) {
-        low += e_low[i] * e_low[i];
-        low_scaled += (e_low[i] * scale) * (e_low[i] * scale);
-      }
+      const double a = e_high[i], b = e_low[i];
+      high += a * a;
+      low += b * b;
+      high_scaled += (a * scale) * (a * scale);
+      low_scaled += (b * scale) * (b * scale);
     }
   }
-  const int both = tableau->error_low != NULL;
   const double h = work->run->real.h;
   *absolute = n ? combined(h, high, low, n, both) : 0.0;
   return n ? combined(h, high_scaled, low_scaled, n, both) : 0.0;

@@ -67,7 +67,8 @@ typedef struct {
 /* Force and moment at a point of a body. */
 typedef struct {
     int body;
-    int axes; /* body whose axes hold the components, -1 for inertial axes */
+    int axes;         /* body whose axes hold the components, -1 for inertial axes */
+    real axes_own[9]; /* those axes in the body's internal ones */
     real offset[3];
     int force[3], moment[3]; /* places among the expression values, -1 for zero */
 } mstmm_load;
@@ -76,7 +77,7 @@ typedef struct {
 typedef struct {
     int body_f, body_t;
     real axes_f[9], axes_t[9], offset_f[3], offset_t[3];
-    int effort; /* place among the expression values, -1 for none */
+    const mstmm_tape *effort; /* t, q, u, [length, its rate] -> given effort; NULL for none */
     const real *p;
     void (*wrench)(void);
 } mstmm_force;

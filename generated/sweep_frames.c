@@ -38,6 +38,8 @@ int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
+int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, real *restrict l);
 
 /* pose of a body
  * in  A_I[3][3] rotation, parent axes to inertial axes
@@ -1273,6 +1275,57 @@ static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
     {"T", 1, "J", 0, 0},
 };
 
+/* distance of two points
+ * in  x_F[3]
+ * in  v_F[3]
+ * in  x_T[3]
+ * in  v_T[3]
+ * out l[2] (m, m/s) distance and its rate
+ */
+int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, real *restrict l)
+{
+    const real t0 = x_T[2] - x_F[2];
+    const real t1 = t0 * t0;
+    const real t2 = x_T[0] - x_F[0];
+    const real t3 = t2 * t2;
+    const real t4 = x_T[1] - x_F[1];
+    const real t5 = t4 * t4;
+    const real t6 = t3 + t5;
+    const real t7 = t1 + t6;
+    const real t8 = sqrt(t7);
+    l[0] = t8;
+    const real t9 = v_T[2] - v_F[2];
+    const real t10 = t0 * t9;
+    const real t11 = v_T[0] - v_F[0];
+    const real t12 = t2 * t11;
+    const real t13 = v_T[1] - v_F[1];
+    const real t14 = t4 * t13;
+    const real t15 = t12 + t14;
+    const real t16 = t10 + t15;
+    const real t17 = 1.0 / t8;
+    const real t18 = t16 * t17;
+    l[1] = t18;
+    return 0;
+}
+
+static int mstmm_sweep_frames_length_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_length(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_length_inputs[] = {
+    {"x_F", 3, "", 0, 0},
+    {"v_F", 3, "", 0, 0},
+    {"x_T", 3, "", 0, 0},
+    {"v_T", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_length_outputs[] = {
+    {"l", 2, "m, m/s", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
     {
         .name = "pose",
@@ -1430,13 +1483,25 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "length",
+        .function = (void (*)(void))mstmm_sweep_frames_length,
+        .call = mstmm_sweep_frames_length_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_length_inputs,
+        .outputs = mstmm_sweep_frames_length_outputs,
+        .ir_hash = "acc96b57c32ce85a504c7664ce96ce869e88630dd17dc81970e0aae2ac4d045b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "b8990f423837b5799e6d1f443a1adb6097c9625e01fac6fce355bd712648c966",
+    .hash = "db2a410555a08d9329e8f2b3491f73f2e37de2711f7d14d294f19a894edc7dc4",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1446,6 +1511,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 13,
+    .n_kernels = 14,
     .kernels = mstmm_sweep_frames_kernels,
 };

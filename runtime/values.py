@@ -1,0 +1,139 @@
+"""Expressions of a scene -> tapes over t, q, u: efforts, loads, drives, events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mstmm.drive import motion
+from mstmm.expression import Expression, Name
+from mstmm.graph import Graph, Node
+from mstmm.ir import Port
+from mstmm.scene import Hinge
+from mstmm.tape import Tape, compile_tape
+
+from .layout import Layout
+
+Resolver = Callable[[Name], Node]
+
+
+class Values:
+    """Numbers that expressions give at (t, q, u): each is asked for once and known by its place."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self._graph = Graph()
+        self._nodes: list[Node] = []
+        self._places: dict[int, int] = {}
+        self.breaks: set[float] = set()
+
+    def place(self, expression: Expression, own: Hinge | None = None) -> int:
+        """Place of the expression's value; -1 for the constant zero."""
+        if expression.is_zero:
+            return -1
+        self.breaks.update(expression.time_breaks())
+        node = expression.build(self._graph, resolver(self._graph, self.layout, own))
+        if node.number not in self._places:
+            self._places[node.number] = len(self._nodes)
+            self._nodes.append(node)
+        return self._places[node.number]
+
+    def __len__(self) -> int:
+        return len(self._nodes)
+
+    def tape(self) -> Tape:
+        """t (1), q, u -> the values in the order of their places."""
+        return _tape(self._graph, "values", state_ports(self.layout), self._nodes)
+
+
+def state_ports(layout: Layout) -> list[Port]:
+    """Inputs of every tape that reads the state."""
+    return [Port("t", (1,)), Port("q", (layout.nq,)), Port("u", (layout.nu,))]
+
+
+def resolver(
+    graph: Graph,
+    layout: Layout,
+    own: Hinge | None = None,
+    length: bool = False,
+    probes: dict[tuple[str, str], int] | None = None,
+) -> Resolver:
+    """Nodes of names: t, own and other hinges' q and u, parameters, a spring's length, positions."""
+
+    def resolve(name: Name) -> Node:
+        quantity, index = name.quantity, name.index or 0
+        if name.text == "t":
+            return graph.element("t", 0)
+        if quantity in ("q", "u") and (name.owner or own is not None):
+            hinge = name.owner or (own.name if own else "")
+            first = layout.hinges[hinge].q if quantity == "q" else layout.hinges[hinge].u
+            return graph.element(quantity, first + index)
+        if quantity in ("q", "u") and length:
+            return graph.element("length", 0 if quantity == "q" else 1)
+        if own is not None and quantity in own.parameters:
+            return graph.constant(own.parameters[quantity])
+        assert probes is not None, name.text
+        parts = (name.parts[0], name.parts[1] if len(name.parts) == 3 else "")
+        component = ("x", "y", "z", "vx", "vy", "vz").index(quantity)
+        return graph.element("points", 6 * probes.setdefault(parts, len(probes)) + component)
+
+    return resolve
+
+
+def _tape(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> Tape:
+    output = Port("values", (len(nodes),))
+    return compile_tape(graph.kernel(name, inputs, [output], {"values": nodes}))
+
+
+def drive_tape(drives: Sequence[Expression]) -> Tape:
+    """t -> position, speed and acceleration of every drive."""
+    graph = Graph()
+    time = graph.element("t", 0)
+    nodes = [node for drive in drives for node in motion(drive, time)]
+    return _tape(graph, "drives", [Port("t", (1,))], nodes)
+
+
+def effort_tape(effort: Expression, layout: Layout) -> Tape:
+    """t, q, u, [length, rate] -> effort of a spring."""
+    graph = Graph()
+    node = effort.build(graph, resolver(graph, layout, length=True))
+    return _tape(graph, "effort", [*state_ports(layout), Port("length", (2,))], [node])
+
+
+def event_tape(
+    conditions: Sequence[tuple[Expression, Hinge | None]], layout: Layout
+) -> tuple[Tape, list[tuple[str, str]]]:
+    """t, q, u, positions -> g per condition, g >= 0 where it holds; and the (body, end) it reads."""
+    graph = Graph()
+    probes: dict[tuple[str, str], int] = {}
+    nodes = []
+    for condition, own in conditions:
+        comparison = condition.comparison
+        assert comparison is not None, condition.text
+        left, sign, right = comparison
+        resolve = resolver(graph, layout, own, probes=probes)
+        difference = left.build(graph, resolve) - right.build(graph, resolve)
+        nodes.append(difference if sign in (">", ">=") else -difference)
+    inputs = [*state_ports(layout), Port("points", (6 * len(probes),))]
+    return _tape(graph, "events", inputs, nodes), list(probes)
+
+
+def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
+    """`mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
+    arrays = {
+        "input_lengths": ffi.new("int[]", list(tape.input_lengths) or [0]),
+        "constants": ffi.new("real[]", list(tape.constants) or [0.0]),
+        "instructions": ffi.new("int[]", list(tape.instructions) or [0]),
+        "outputs": ffi.new("int[]", list(tape.outputs) or [0]),
+    }
+    result = ffi.new("mstmm_tape *", arrays)
+    result.n_inputs = len(tape.input_lengths)
+    result.n_constants = len(tape.constants)
+    result.n_slots = tape.slots
+    result.n_instructions = len(tape.instructions) // 5
+    result.n_outputs = len(tape.outputs) // 4
+    kept += [result, arrays]
+    return result
+
+
+__all__ = ["Values", "c_tape", "drive_tape", "effort_tape", "event_tape"]
