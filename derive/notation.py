@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import sympy as sp
 from sympy.matrices.expressions.matexpr import MatrixElement
+from sympy.solvers.solveset import NonlinearError
 
 from .derivation import Equation, tilde
 
@@ -100,7 +101,7 @@ def solve_linear(
     given = [names[e] for symbol in knowns for e in explicit(symbol)]
     try:
         coefficients, right = sp.linear_eq_to_matrix(residuals, [*solved, *given])
-    except sp.solvers.solveset.NonlinearError as error:
+    except NonlinearError as error:
         raise ValueError(f"a premise is not linear in the state: {error}") from error
     left = coefficients[:, : len(solved)]
     rest = coefficients[:, len(solved) :].row_join(-right)
