@@ -53,7 +53,7 @@ def evaluate(
     Raises GuardFailure, and ValueError for a missing input, a wrong length or no `n`.
     """
     arithmetic = PreciseArithmetic(digits)
-    results = _run(kernel, inputs, arithmetic, n)
+    results = run(kernel, inputs, arithmetic, n)
     return {name: [mpmath.mp.make_mpf(v._mpf_) for v in row] for name, row in results.items()}
 
 
@@ -61,22 +61,23 @@ def evaluate_floats(
     kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
 ) -> dict[str, list[float]]:
     """Outputs of the kernel in doubles, with the operations and the order of the generated C."""
-    return _run(kernel, inputs, FloatArithmetic(), n)
+    return run(kernel, inputs, FloatArithmetic(), n)
 
 
-def _run(
+def run(
     kernel: KernelIR, inputs: Mapping[str, Values], arithmetic: Arithmetic, n: int | None
 ) -> dict[str, list[Any]]:
+    """Outputs in any arithmetic; arguments and errors raised as for `evaluate`."""
     if kernel.size_symbol is not None and n is None:
         raise ValueError(f"{kernel.name}: give n, the run-time size {kernel.size_symbol!r}")
-    run = _Run(kernel, arithmetic, n or 0)
+    state = _Run(kernel, arithmetic, n or 0)
     for port in kernel.inputs:
         if port.name not in inputs:
             raise ValueError(f"{kernel.name}: no value for the input {port.name!r}")
-        run.arrays[port.name] = run.read(port, inputs[port.name])
+        state.arrays[port.name] = state.read(port, inputs[port.name])
     for statement in kernel.statements:
-        run.execute(statement)
-    return run.results
+        state.execute(statement)
+    return state.results
 
 
 class _Run:

@@ -1,0 +1,148 @@
+"""How far rounding can move a kernel's outputs: a running first-order error bound.
+
+Each operation in doubles adds at most half a unit in the last place (a library function a whole
+one) and passes on the errors of its operands times its slope.  The sum of all that bounds what
+compiled C may differ from the exact value by, so that a comparison of the two needs no tolerance
+chosen by hand (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, ch. 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from mstmm.ir import Constant, KernelIR
+
+from .arithmetic import Operation, PreciseArithmetic
+from .evaluate import Values, run
+
+#: Unit roundoff of a double.
+UNIT = 2.0**-53
+
+_DIGITS = 40
+
+
+class Bounded:
+    """An exact value and a bound of its absolute error, in units of the unit roundoff."""
+
+    __slots__ = ("error", "value")
+
+    def __init__(self, value: Any, error: Any) -> None:
+        self.value, self.error = value, error
+
+    def __add__(self, other: Bounded) -> Bounded:
+        return _rounded(self.value + other.value, self.error + other.error)
+
+    def __sub__(self, other: Bounded) -> Bounded:
+        return _rounded(self.value - other.value, self.error + other.error)
+
+    def __mul__(self, other: Bounded) -> Bounded:
+        passed = abs(self.value) * other.error + abs(other.value) * self.error
+        return _rounded(self.value * other.value, passed)
+
+    def __neg__(self) -> Bounded:
+        return Bounded(-self.value, self.error)
+
+    def __abs__(self) -> Bounded:
+        return Bounded(abs(self.value), self.error)
+
+    def __gt__(self, other: Bounded) -> bool:
+        return bool(self.value > other.value)
+
+
+def _rounded(value: Any, error: Any, steps: int = 1) -> Bounded:
+    return Bounded(value, error + steps * abs(value))
+
+
+def rounding_bounds(
+    kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
+) -> dict[str, list[tuple[float, float]]]:
+    """(value, bound) of every output: C computes the value to within the bound.
+
+    Inputs are taken as exact.  Holds to first order, and as long as rounding turns no comparison.
+    Arguments and errors raised are those of `evaluate`.
+    """
+    results = run(kernel, inputs, _BoundedArithmetic(), n)
+    slack = 1.001 * UNIT
+    return {
+        name: [(float(v.value), slack * float(v.error) + 1e-300) for v in row]
+        for name, row in results.items()
+    }
+
+
+class _BoundedArithmetic:
+    """The operations of the IR on `Bounded` numbers."""
+
+    def __init__(self) -> None:
+        self._exact = exact = PreciseArithmetic(_DIGITS)
+        one = exact.operations
+        two = exact.number(2)
+
+        def smooth(name: str, slope: Callable[[Any, Any], Any]) -> Operation:
+            def call(a: Bounded) -> Bounded:
+                value = one[name](a.value)
+                # An exact operand passes nothing on, even where the slope has no bound.
+                passed = abs(slope(a.value, value)) * a.error if a.error else a.error
+                return _rounded(value, passed, 2)
+
+            return call
+
+        def divide(a: Bounded, b: Bounded) -> Bounded:
+            value = one["div"](a.value, b.value)
+            return _rounded(value, one["div"](a.error + abs(value) * b.error, abs(b.value)))
+
+        def power(a: Bounded, b: Bounded) -> Bounded:
+            value = one["pow"](a.value, b.value)
+            passed = a.error and abs(one["div"](b.value * value, a.value)) * a.error
+            passed += b.error and abs(one["log"](a.value) * value) * b.error
+            return _rounded(value, passed, 2)
+
+        def angle(a: Bounded, b: Bounded) -> Bounded:
+            passed = abs(b.value) * a.error + abs(a.value) * b.error
+            passed = passed and passed / (a.value * a.value + b.value * b.value)
+            return _rounded(one["atan2"](a.value, b.value), passed, 2)
+
+        def exactly(name: str) -> Operation:
+            return lambda *args: Bounded(one[name](*(a.value for a in args)), exact.number(0))
+
+        def choose(c: Bounded, a: Bounded, b: Bounded) -> Bounded:
+            return a if self.true(c) else b
+
+        self.operations: dict[str, Operation] = {
+            "neg": lambda a: -a,
+            "add": lambda a, b: a + b,
+            "sub": lambda a, b: a - b,
+            "mul": lambda a, b: a * b,
+            "div": divide,
+            "pow": power,
+            "sqrt": smooth("sqrt", lambda a, v: one["div"](1, two * v)),
+            "sin": smooth("sin", lambda a, v: one["cos"](a)),
+            "cos": smooth("cos", lambda a, v: one["sin"](a)),
+            "tan": smooth("tan", lambda a, v: 1 + v * v),
+            "asin": smooth("asin", lambda a, v: one["div"](1, one["sqrt"](1 - a * a))),
+            "acos": smooth("acos", lambda a, v: one["div"](1, one["sqrt"](1 - a * a))),
+            "atan": smooth("atan", lambda a, v: 1 / (1 + a * a)),
+            "atan2": angle,
+            "sinh": smooth("sinh", lambda a, v: one["cosh"](a)),
+            "cosh": smooth("cosh", lambda a, v: one["sinh"](a)),
+            "tanh": smooth("tanh", lambda a, v: 1 - v * v),
+            "exp": smooth("exp", lambda a, v: v),
+            "log": smooth("log", lambda a, v: one["div"](1, a)),
+            "abs": abs,
+            "min": lambda a, b: a if b > a else b,
+            "max": lambda a, b: b if b > a else a,
+            "select": choose,
+            **{name: exactly(name) for name in ("sign", "floor", "lt", "le", "eq")},
+            **{name: exactly(name) for name in ("and", "or", "not")},
+        }
+
+    def number(self, value: Any) -> Bounded:
+        exact = self._exact.number(value)
+        return Bounded(exact, self._exact.number(0))
+
+    def constant(self, constant: Constant) -> Bounded:
+        value = self._exact.constant(constant)
+        return _rounded(value, self._exact.number(0), int(value != constant.number))
+
+    def true(self, value: Any) -> bool:
+        return self._exact.true(value.value)
