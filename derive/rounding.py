@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import mpmath
+
 from mstmm.ir import Constant, KernelIR
 
 from .arithmetic import Operation, PreciseArithmetic
@@ -56,8 +58,8 @@ def _rounded(value: Any, error: Any, steps: int = 1) -> Bounded:
 
 def rounding_bounds(
     kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
-) -> dict[str, list[tuple[float, float]]]:
-    """(value, bound) of every output: C computes the value to within the bound.
+) -> dict[str, list[tuple[mpmath.mpf, float]]]:
+    """(value at 40 digits, bound) of every output: C computes the value to within the bound.
 
     Inputs are taken as exact.  Holds to first order, and as long as rounding turns no comparison.
     Arguments and errors raised are those of `evaluate`.
@@ -65,7 +67,7 @@ def rounding_bounds(
     results = run(kernel, inputs, _BoundedArithmetic(), n)
     slack = 1.001 * UNIT
     return {
-        name: [(float(v.value), slack * float(v.error) + 1e-300) for v in row]
+        name: [(mpmath.mp.make_mpf(v.value._mpf_), slack * float(v.error) + 1e-300) for v in row]
         for name, row in results.items()
     }
 

@@ -21,7 +21,7 @@ def test_doubles_stay_within_the_bound(seed: int) -> None:
     exact, got = evaluate(kernel, inputs), evaluate_floats(kernel, inputs)
     for name, row in rounding_bounds(kernel, inputs).items():
         for (value, bound), reference, number in zip(row, exact[name], got[name], strict=True):
-            assert abs(value - reference) <= UNIT * abs(reference)
+            assert abs(value - reference) <= 1e-35
             assert abs(number - reference) <= bound
             assert bound < 1e-9
 
@@ -48,7 +48,7 @@ def test_cancellation_is_seen() -> None:
     kernel = graph.kernel("cancel", [Port("x")], [Port("y")], {"y": (x + 1) - 1})
     ((value, bound),) = rounding_bounds(kernel, {"x": 1e-10})["y"]
     (got,) = evaluate_floats(kernel, {"x": 1e-10})["y"]
-    assert value == 1e-10
+    assert float(value) == 1e-10
     assert abs(got - 1e-10) > 1e-18
     assert abs(got - 1e-10) <= bound < 2.1 * UNIT
 

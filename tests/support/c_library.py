@@ -59,7 +59,9 @@ class CLibrary:
         lib: Any = self.ffi.dlopen(str(path))
         self.lib = lib
         table = [lib.mstmm_elements[i] for i in range(lib.mstmm_element_count)]
+        #: Descriptors by name, and by kind_name.
         self.elements: dict[str, Any] = {self.text(e.name): e for e in table}
+        self.elements |= {f"{self.text(e.kind)}_{self.text(e.name)}": e for e in table}
 
     def text(self, pointer: Any) -> str:
         """A C string as text."""

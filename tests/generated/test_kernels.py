@@ -1,0 +1,92 @@
+"""The committed C of every element computes its committed IR, compiled and as a tape."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.c_library import CLibrary, compile_library, same
+
+from mstmm import abi
+from mstmm.derive.evaluate import GuardFailure, evaluate_floats
+from mstmm.derive.rounding import rounding_bounds
+from mstmm.ir import KernelIR, Port
+from mstmm.spec import ElementSpec
+from mstmm.stored import element_from_json
+from mstmm.tape import compile_tape
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+MANIFEST = json.loads((GENERATED / "manifest.json").read_text())
+SPECS: dict[str, ElementSpec] = {
+    stem: element_from_json((GENERATED / f"{stem}.json").read_text())
+    for stem in (f"{entry['kind']}_{entry['name']}" for entry in MANIFEST["elements"])
+}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
+    """Compiled with every warning an error, and without contraction, so that bits can agree."""
+    stems = [*SPECS, "registry", "engine_tape"]
+    target = tmp_path_factory.mktemp("generated") / "all.so"
+    return CLibrary(compile_library([GENERATED / f"{stem}.c" for stem in stems], target))
+
+
+def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
+    assert MANIFEST["abi"] == abi.ABI
+    for entry, (stem, spec) in zip(MANIFEST["elements"], SPECS.items(), strict=True):
+        assert (entry["hash"], entry["kind"], entry["name"]) == (spec.hash(), spec.kind, spec.name)
+        assert entry["kernels"] == {kernel.name: kernel.hash() for kernel in spec.kernels}
+        descriptor = library.elements[stem]
+        assert library.text(descriptor.hash) == spec.hash()
+        assert descriptor.abi == abi.ABI
+        counts = (descriptor.nq, descriptor.nu, descriptor.np, descriptor.n_kernels)
+        groups = (spec.coordinates, spec.speeds, spec.parameters, spec.kernels)
+        assert counts == tuple(len(group) for group in groups)
+
+
+def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
+    """Values a kernel could meet: rotations for 3 x 3, definite inertias for 21 numbers.
+
+    Special points are zeros, no rotation, and a unit inertia.
+    """
+    length = port.length()
+    if port.shape == (3, 3):
+        turn = np.eye(3) if special else np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        return [float(v) for v in turn.ravel()]
+    if length == 21:
+        half = np.zeros((6, 6)) if special else rng.normal(size=(6, 6))
+        return [float(v) for v in (half @ half.T + np.eye(6))[np.triu_indices(6)]]
+    return [0.0] * length if special else [float(v) for v in rng.uniform(-1, 1, length)]
+
+
+def agree(library: CLibrary, stem: str, kernel: KernelIR, inputs: dict[str, list[float]]) -> bool:
+    """Compare C, tape, floats and exact values; False if a guard stopped all of them alike."""
+    compiled = library.call(stem, kernel.name, inputs)
+    code, rows = library.run_tape(compile_tape(kernel), [inputs[p.name] for p in kernel.inputs])
+    assert code == compiled.code
+    try:
+        floats = evaluate_floats(kernel, inputs)
+    except GuardFailure as failure:
+        assert compiled.code == failure.code
+        return False
+    assert compiled.code == 0
+    for (name, row), interpreted in zip(floats.items(), rows, strict=True):
+        assert same(compiled.outputs[name], row), name
+        assert same(interpreted, row), name
+    if all(np.isfinite(row).all() for row in floats.values()):
+        for name, limits in rounding_bounds(kernel, inputs).items():
+            for got, (value, bound) in zip(compiled.outputs[name], limits, strict=True):
+                assert abs(got - value) <= bound, name
+    return True
+
+
+@pytest.mark.parametrize("stem", SPECS)
+def test_c_tape_and_ir_agree(stem: str, library: CLibrary, rng: np.random.Generator) -> None:
+    for kernel in SPECS[stem].kernels:
+        passed = 0
+        for special in (True, False, False, False):
+            inputs = {port.name: drawn(port, rng, special) for port in kernel.inputs}
+            passed += agree(library, stem, kernel, inputs)
+        assert passed, f"{kernel.name}: no drawn point passes its guards"
