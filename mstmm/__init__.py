@@ -1,1 +1,60 @@
-"""mstmm: transfer matrix method for multibody systems."""
+"""mstmm: transfer matrix method for multibody systems.
+
+    import mstmm
+    scene = mstmm.load_scene("arm.toml")
+    model = mstmm.compile(scene)
+    result = model.simulate(t_end=10.0)
+
+Names are loaded when they are first used: importing mstmm loads neither numpy nor SymPy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import (
+    ElementError,
+    EnvironmentFailure,
+    ExpressionError,
+    MstmmError,
+    NumericalFailure,
+    SceneError,
+)
+
+if TYPE_CHECKING:
+    from .compile import compile_scene as compile
+    from .runtime.model import Model
+    from .runtime.result import Result, load_result
+    from .scene import Scene
+    from .scene_file import load_scene
+
+__version__ = "0.1.0"
+
+#: Public name -> (module, name there).
+_LAZY = {
+    "Scene": (".scene", "Scene"),
+    "load_scene": (".scene_file", "load_scene"),
+    "compile": (".compile", "compile_scene"),
+    "Model": (".runtime.model", "Model"),
+    "Result": (".runtime.result", "Result"),
+    "load_result": (".runtime.result", "load_result"),
+}
+
+__all__ = [
+    "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
+    "NumericalFailure", "Result", "Scene", "SceneError", "compile", "load_result", "load_scene",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'mstmm' has no attribute {name!r}")
+    module, attribute = _LAZY[name]
+    value = getattr(import_module(module, __name__), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

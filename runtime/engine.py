@@ -1,0 +1,179 @@
+"""Calls into the looped engine: numpy in, numpy out, failures as sentences that name the element."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import NumericalFailure, SceneError
+
+from .pack import Packed
+
+Array = NDArray[np.float64]
+
+_UNDETERMINED, _FORCE, _EXPRESSION, _HINGE = 1, 2, 3, 4
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A point with axes: body position in the topology (-1 ground), axes (9), offset (3), internal."""
+
+    body: int
+    axes: tuple[float, ...]
+    offset: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a batch of n states shows; inertial axes.
+
+    points: (n, probes, 24): position, velocity, acceleration, angular velocity, angular
+    acceleration, rotation matrix (row by row).  loads: (n, bodies, 6) force and moment of each
+    inboard hinge.  efforts, udot: (n, nu).  sums: (n, 10): kinetic, gravity and spring energy,
+    power, momentum (3), angular momentum about the inertial origin (3).
+    """
+
+    points: Array
+    loads: Array
+    efforts: Array
+    udot: Array
+    sums: Array
+
+
+class Engine:
+    """The compiled engine on one packed scene.  Safe to call from several threads."""
+
+    def __init__(self, packed: Packed) -> None:
+        self.packed = packed
+        self.ffi, self.lib = packed.ffi, packed.lib
+        self.nq, self.nu = packed.layout.nq, packed.layout.nu
+        self._local = threading.local()
+
+    def workspace(self) -> Any:
+        """This thread's workspace as `real *`."""
+        size = int(self.packed.model.workspace)
+        if getattr(self._local, "size", None) != size:
+            self._local.array = np.zeros(size)
+            self._local.pointer = self.pointer(self._local.array)
+            self._local.size = size
+        return self._local.pointer
+
+    def pointer(self, array: Array) -> Any:
+        """`real *` to a contiguous array of doubles."""
+        return self.ffi.from_buffer("real[]", array)
+
+    def start_memory(self) -> Array:
+        """Memory at the start: nothing released, no turns counted."""
+        return np.zeros(max(1, self.packed.n_memory))
+
+    def batch(self, name: str, value: ArrayLike, width: int, lead: tuple[int, ...] | None = None) -> Array:
+        """(n, width) contiguous copy of the last axis; SceneError for a misfit or a non-number."""
+        array = np.ascontiguousarray(np.asarray(value, dtype=np.float64))
+        if array.ndim == 0 or array.shape[-1] != width:
+            raise SceneError(f"{name} has shape {array.shape}, expected (..., {width})")
+        if lead is not None and array.shape[:-1] != lead:
+            array = np.ascontiguousarray(np.broadcast_to(array, (*lead, width)))
+        if not np.isfinite(array).all():
+            raise SceneError(f"{name} holds a number that is not finite")
+        return array.reshape(-1, width)
+
+    def accelerations(
+        self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
+    ) -> tuple[Array, Array]:
+        """(qdot, udot) of n states; q (n, nq), u (n, nu), memory (n, m), efforts (n, nu) or None."""
+        n = len(q)
+        times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=np.float64), (n,)))
+        qdot, udot = np.empty((n, self.nq)), np.empty((n, self.nu))
+        failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
+        code = self.lib.mstmm_accelerations_many(
+            self.packed.model, self.workspace(), n, self.pointer(times), self.pointer(q),
+            self.pointer(u), self.pointer(memory),
+            self.ffi.NULL if efforts is None else self.pointer(efforts),
+            self.pointer(qdot), self.pointer(udot), failure, at,
+        )  # fmt: skip
+        if code:
+            raise NumericalFailure(self.failure_text(failure, float(times[at[0]])))
+        self._finite("acceleration", udot, times)
+        return qdot, udot
+
+    def _finite(self, what: str, array: Array, times: Array) -> None:
+        if not np.isfinite(array).all():
+            row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
+            name = self.packed.layout.u_names[column]
+            raise NumericalFailure(f"the {what} of {name} is not finite at t = {times[row]:.9g} s")
+
+    def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
+        """Efforts (nu,) of one state that `udot` needs beyond the laws' own."""
+        efforts = np.empty(self.nu)
+        failure = self.ffi.new("mstmm_failure *")
+        code = self.lib.mstmm_inverse_dynamics(
+            self.packed.model, self.workspace(), t, self.pointer(q), self.pointer(u),
+            self.pointer(memory), self.pointer(udot), self.pointer(efforts), failure,
+        )  # fmt: skip
+        if code:
+            raise NumericalFailure(self.failure_text(failure, t))
+        return efforts
+
+    def probes(self, probes: Sequence[Probe]) -> Any:
+        """`mstmm_probe[]`."""
+        records = self.ffi.new("mstmm_probe[]", max(1, len(probes)))
+        for record, probe in zip(records, probes, strict=False):
+            record.body = probe.body
+            record.axes = list(probe.axes)
+            record.offset = list(probe.offset)
+        return records
+
+    def observe(
+        self, t: Array, q: Array, u: Array, memory: Array, probes: Sequence[Probe] = ()
+    ) -> Observation:
+        """Everything observable of n states."""
+        n = len(t)
+        bodies, numbers = len(self.packed.topology.links), int(self.lib.MSTMM_PROBE_NUMBERS)
+        result = Observation(
+            np.empty((n, len(probes), numbers)), np.empty((n, bodies, 6)),
+            np.empty((n, self.nu)), np.empty((n, self.nu)),
+            np.empty((n, int(self.lib.MSTMM_SUM_NUMBERS))),
+        )  # fmt: skip
+        records = self.probes(probes)
+        wanted = self.ffi.new("mstmm_observation *")
+        wanted.n_probes, wanted.probes = len(probes), records
+        for name in ("points", "loads", "efforts", "udot", "sums"):
+            setattr(wanted, name, self.pointer(getattr(result, name)))
+        failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
+        code = self.lib.mstmm_observe_many(
+            self.packed.model, self.workspace(), n,
+            *(self.pointer(np.ascontiguousarray(x)) for x in (t, q, u, memory)),
+            wanted, failure, at,
+        )  # fmt: skip
+        if code:
+            raise NumericalFailure(self.failure_text(failure, float(t[at[0]])))
+        return result
+
+    # --- words ----------------------------------------------------------------------------------
+
+    def hinge_name(self, position: int) -> str:
+        """Name of the inboard hinge of the body at this place of the topology."""
+        packed = self.packed
+        return packed.scene.hinge[packed.topology.links[position].hinge].name
+
+    def failure_text(self, failure: Any, t: float) -> str:
+        """A failure of the engine as a sentence: element, cause, time, one way out."""
+        at = f"at t = {t:.9g} s"
+        reason, element = int(failure.reason), int(failure.element)
+        if reason == _UNDETERMINED:
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
+                "what it carries has no inertia in that direction (a thin rod on a ball, a point "
+                "mass, collinear axes); give the body inertia or fix that motion"
+            )
+        if reason == _FORCE:
+            name = self.packed.scene.spring[element].name
+            return f'spring "{name}" {at}: its direction is undefined because its ends coincide'
+        if reason == _HINGE:
+            return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
+        return f"an expression of the scene cannot be evaluated {at}"

@@ -1,0 +1,197 @@
+"""Model: a compiled scene.  Accelerations, mass matrix, inverse dynamics, equilibrium, simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene import Scene
+
+from . import parameters as named_parameters
+from .engine import Engine
+from .layout import Layout
+from .pack import Known, pack
+from .simulate import Settings
+
+if TYPE_CHECKING:
+    from .result import Result
+
+Array = NDArray[np.float64]
+
+
+class Model:
+    """A scene ready to compute.  Made by `mstmm.compile`.
+
+    `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
+    quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+    """
+
+    def __init__(self, scene: Scene, known: Known | None = None, why: str = "") -> None:
+        self.scene, self.known = scene, known
+        self.engine_choice = why
+        self._engine = Engine(pack(scene, known))
+        self._static = self._without_motion()
+
+    @property
+    def layout(self) -> Layout:
+        """Places of hinges in q and u."""
+        return self._engine.packed.layout
+
+    @property
+    def nq(self) -> int:
+        return self._engine.nq
+
+    @property
+    def nu(self) -> int:
+        return self._engine.nu
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
+        from .simulate import SceneSystem
+
+        q, u = np.zeros(self.nq), np.zeros(self.nu)
+        for hinge in self.scene.hinge:
+            slots = self.layout.hinges[hinge.name]
+            kind = HINGE_TYPES.get("free" if slots.quaternion is not None and hinge.type == "fixed" else hinge.type)
+            if kind is not None and slots.nq:
+                q[slots.q_slice] = kind.start
+            if hinge.initial is not None and hinge.initial.q:
+                q[slots.q_slice] = hinge.initial.q
+            if hinge.initial is not None and hinge.initial.u:
+                u[slots.u_slice] = hinge.initial.u
+        y = SceneSystem(self._engine).start(0.0, q, u)
+        return y[: self.nq], y[self.nq : self.nq + self.nu]
+
+    def _memory(self, n: int) -> Array:
+        return np.ascontiguousarray(np.tile(self._engine.start_memory(), (n, 1)))
+
+    def accelerations(
+        self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, efforts: ArrayLike | None = None
+    ) -> Array:
+        """udot (..., nu) from q (..., nq), u (..., nu), t (s) and extra efforts (..., nu; N, N*m).
+
+        Driven coordinates take the drive's value whatever q and u say.  Raises SceneError for a
+        shape that does not fit, NumericalFailure naming the hinge whose motion is undetermined.
+        """
+        lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
+        engine = self._engine
+        coordinates, speeds = engine.batch("q", q, self.nq, lead), engine.batch("u", u, self.nu, lead)
+        extra = None if efforts is None else engine.batch("efforts", efforts, self.nu, lead)
+        times = np.broadcast_to(np.asarray(t, dtype=np.float64), lead).reshape(-1)
+        _, udot = engine.accelerations(times, coordinates, speeds, self._memory(len(speeds)), extra)
+        return udot.reshape(*lead, self.nu)
+
+    def inverse_dynamics(
+        self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: float = 0.0
+    ) -> Array:
+        """Efforts (nu,) beyond the laws' own that give `udot`; for driven coordinates the drive's.
+
+        Newton-Euler inverse dynamics over the tree, O(bodies).
+        """
+        engine = self._engine
+        one = [
+            engine.batch(name, value, width)[0].copy()
+            for name, value, width in (("q", q, self.nq), ("u", u, self.nu), ("udot", udot, self.nu))
+        ]
+        return engine.inverse_dynamics(t, one[0], one[1], one[2], engine.start_memory())
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Symmetric (nu, nu) mass matrix, kg, kg*m, kg*m2; driven coordinates as if free."""
+        engine, still = self._static, np.zeros(self.nu)
+        coordinates = engine.batch("q", q, self.nq)[0].copy()
+        memory = engine.start_memory()
+        columns = [
+            engine.inverse_dynamics(0.0, coordinates, still, unit, memory)
+            for unit in np.eye(self.nu)
+        ]
+        matrix = np.array(columns).reshape(self.nu, self.nu).T
+        return np.asarray((matrix + matrix.T) / 2)
+
+    def _without_motion(self) -> Engine:
+        """The same tree without gravity, laws, drives and loads: inertia alone."""
+        bare = pack(self.scene, self.known)
+        model = bare.model
+        for k in range(3):
+            model.gravity[k] = 0.0
+        model.n_laws = model.n_drives = model.n_values = 0
+        model.n_loads = model.n_forces = model.needs_pose = 0
+        return Engine(bare)
+
+    def equilibrium(
+        self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
+    ) -> Array:
+        """q (nq,) at which every acceleration vanishes at rest, by Newton from `q` (or the start).
+
+        Raises NumericalFailure naming the coordinates that nothing determines, or if Newton finds
+        no equilibrium near the start.
+        """
+        from .equilibrium import equilibrium
+
+        start = self.initial_state()[0] if q is None else self._engine.batch("q", q, self.nq)[0]
+        return equilibrium(self, start, t, tolerance)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every number of the scene that has a name, such as "rod1.mass"."""
+        return named_parameters.read(self.scene)
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Model:
+        """The same scene with other numbers; nothing is compiled again.
+
+        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
+        """
+        return Model(named_parameters.changed(self.scene, changes), self.known, self.engine_choice)
+
+    def simulate(
+        self,
+        t_end: float,
+        method: str = "dop853",
+        step: float | None = None,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        output_times: ArrayLike | Sequence[float] | None = None,
+        *,
+        t_start: float = 0.0,
+        initial: tuple[ArrayLike, ArrayLike] | None = None,
+        max_step: float = 0.0,
+        certify: bool = False,
+        progress: Callable[[float, float], None] | None = None,
+        checkpoint: str | None = None,
+        resume: bool = False,
+    ) -> Result:
+        """Integrate to `t_end` (s).
+
+        Args:
+            method: rk4 (with `step`), dopri5, dop853, or scipy-NAME for solve_ivp on the same kernels.
+            step: fixed step in s; otherwise `rtol` and `atol` control the step.
+            output_times: times of the samples (s, increasing); otherwise every accepted step.
+            initial: (q, u) instead of the scene's own start.
+            certify: estimate the error by a second, more accurate run.
+            progress: called with (t, t_end) about every 0.1 s.
+            checkpoint: file that keeps the run's state when it is interrupted; `resume` continues it.
+
+        Returns a Result, also after a failure: `success`, `message` and everything computed so far.
+        Raises SceneError for settings that make no sense.
+        """
+        from .result import simulate
+
+        times = None
+        if output_times is not None:
+            times = tuple(float(x) for x in np.atleast_1d(np.asarray(output_times, dtype=float)))
+        if not np.isfinite(t_end) or t_end < t_start:
+            raise SceneError(f"t_end = {t_end!r}: expected a time in s, not before t_start")
+        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step)
+        q, u = self.initial_state() if initial is None else initial
+        return simulate(
+            self, settings, self._engine.batch("q", q, self.nq)[0],
+            self._engine.batch("u", u, self.nu)[0],
+            certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
+        )  # fmt: skip
+
+
+__all__ = ["Model", "NumericalFailure"]

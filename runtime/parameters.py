@@ -1,0 +1,101 @@
+"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]"."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mstmm.errors import SceneError
+from mstmm.scene import Scene
+
+_TABLES = ("body", "hinge", "load", "event", "spring")
+_INDEX = re.compile(r"(.*)\[(\d+)\]")
+
+
+def _data(scene: Scene) -> dict[str, Any]:
+    return tomllib.loads(scene.to_toml())
+
+
+def _named(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    for table in _TABLES:
+        for element in data.get(table, []):
+            yield element["name"], element
+
+
+def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
+    if isinstance(value, bool):
+        return
+    if isinstance(value, (int, float)):
+        yield path, float(value)
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            yield from _numbers(f"{path}.{key}", entry)
+    elif isinstance(value, list):
+        for i, entry in enumerate(value):
+            yield from _numbers(f"{path}[{i}]", entry)
+
+
+def read(scene: Scene) -> dict[str, float]:
+    """Every number by its name, in the scene's order."""
+    data = _data(scene)
+    found = dict(_numbers("gravity", data["gravity"]))
+    for name, element in _named(data):
+        found.update(_numbers(name, element))
+    return found
+
+
+def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
+    """The scene with other numbers, validated afresh.
+
+    A name without an index stands for all entries of a list of one.  Raises SceneError for unknown
+    names and for values that the scene refuses.
+    """
+    data = _data(scene)
+    known: dict[str, float] | None = None
+    for path, value in changes.items():
+        if not _set(data, path, value):
+            known = known or read(scene)
+            near = difflib.get_close_matches(path, known, 1, 0.5)
+            hint = f'; did you mean "{near[0]}"?' if near else ""
+            raise SceneError(f'parameter "{path}": there is no such number in the scene{hint}')
+    return Scene.from_data(data)
+
+
+def _set(data: dict[str, Any], path: str, value: float) -> bool:
+    parts = path.split(".")
+    owners = _owners(data, parts)
+    return any(_assign(owner, parts, value) for owner in owners)
+
+
+def _owners(data: dict[str, Any], parts: list[str]) -> list[Any]:
+    if parts[0].startswith("gravity"):
+        return [data]
+    name = parts.pop(0)
+    return [element for owner, element in _named(data) if owner == name]
+
+
+def _assign(target: Any, parts: list[str], value: float) -> bool:
+    """Write `value` at the end of the path; False where the path leads nowhere."""
+    for i, part in enumerate(parts):
+        match = _INDEX.fullmatch(part)
+        key, index = (match[1], int(match[2])) if match else (part, None)
+        if not isinstance(target, dict) or key not in target:
+            return False
+        holder: Any = target
+        place: Any = key
+        if isinstance(holder[key], list) and (index is not None or len(holder[key]) == 1):
+            holder, place = holder[key], index or 0
+            if place >= len(holder):
+                return False
+        elif index is not None:
+            return False
+        if i == len(parts) - 1:
+            if isinstance(holder[place], (dict, list)):
+                return False
+            holder[place] = float(value)
+            return True
+        target = holder[place]
+    return False

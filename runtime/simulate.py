@@ -1,0 +1,223 @@
+"""One run of a model: the scene as the integrator's system, advanced in slices until it ends."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import SceneError
+
+from . import values
+from .engine import Engine, Probe
+from .integrate import Run, Statistics, Status
+from .pack import resize
+from .steppers import get
+
+Array = NDArray[np.float64]
+
+#: Seconds between looks at progress, Ctrl-C and checkpoints.
+SLICE = 0.1
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`."""
+
+    t_end: float
+    t_start: float = 0.0
+    method: str = "dop853"
+    step: float | None = None
+    rtol: float = 1e-9
+    atol: float = 1e-12
+    output_times: tuple[float, ...] | None = None
+    max_step: float = 0.0
+    max_steps: int = 0
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,)."""
+
+    t: Array
+    q: Array
+    u: Array
+    memory: Array
+    work: Array
+    event: NDArray[np.int64]
+    status: Status | None  # None: interrupted
+    message: str
+    settings: Settings
+    statistics: Statistics
+    fail_time: float | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def success(self) -> bool:
+        """True if the run reached its end or an event stopped it, with finite numbers throughout."""
+        done = self.status in (Status.FINISHED, Status.STOPPED)
+        return done and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())
+
+
+class SceneSystem:
+    """`mstmm_system` of a model: events, power and memory of its own."""
+
+    def __init__(self, engine: Engine) -> None:
+        packed, ffi = engine.packed, engine.ffi
+        self.engine, self.kept = engine, []  # type: ignore[var-annotated]
+        conditions, actions, self.event_names = _conditions(engine)
+        self.memory = engine.start_memory()
+        model = packed.model
+        self.run = run = ffi.new("mstmm_scene_run *")
+        run.model = model
+        run.with_power = int(bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces))
+        run.memory = engine.pointer(self.memory)
+        quaternions = ffi.new("int[]", packed.layout.quaternions or [0])
+        run.quaternions, run.n_quaternions = quaternions, len(packed.layout.quaternions)
+        self.kept += [model, quaternions]
+        if conditions:
+            self._events(conditions, actions)
+        self.workspace = np.zeros(int(model.workspace))
+        run.workspace = engine.pointer(self.workspace)
+        self.system = ffi.new("mstmm_system *")
+        engine.lib.mstmm_scene_system(run, self.system)
+
+    def _events(self, conditions: list[Any], actions: list[tuple[int, int]]) -> None:
+        engine, ffi, run = self.engine, self.engine.ffi, self.run
+        tape, ends = values.event_tape(conditions, engine.packed.layout)
+        resize(engine.packed, tape.slots)
+        run.event_tape = values.c_tape(ffi, tape, self.kept)
+        probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
+        records = engine.probes(probes)
+        numbers = np.zeros(6 * len(probes) + int(engine.lib.MSTMM_PROBE_NUMBERS))
+        run.probes, run.n_probes = records, len(probes)
+        run.probe_values = engine.pointer(numbers)
+        table = ffi.new("mstmm_event_action[]", len(actions))
+        for record, (action, release) in zip(table, actions, strict=True):
+            record.action, record.release = action, release
+        run.events, run.n_events = table, len(actions)
+        self.kept += [records, numbers, table]
+
+    @property
+    def with_power(self) -> bool:
+        """True if the state ends with the work of everything that is not stored."""
+        return bool(self.run.with_power)
+
+    def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
+        """State vector at t with driven coordinates, quaternions and memory in order."""
+        y = np.concatenate([np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))])
+        y = np.ascontiguousarray(y)
+        self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
+        return y
+
+    def components(self) -> list[str]:
+        """A name per component of the state."""
+        layout = self.engine.packed.layout
+        names = [f"coordinate {n}" for n in layout.q_names] + [f"speed {n}" for n in layout.u_names]
+        return [*names, "work"] if self.with_power else names
+
+
+def _conditions(engine: Engine) -> tuple[list[Any], list[tuple[int, int]], list[str]]:
+    """(condition, own hinge), (action, memory place) and name of every event and release."""
+    packed, lib = engine.packed, engine.lib
+    conditions: list[Any] = []
+    actions: list[tuple[int, int]] = []
+    names: list[str] = []
+    for event in packed.scene.event:
+        conditions.append((event.when, None))
+        stops = event.do == "stop"
+        release = -1 if stops else packed.releases[str(event.hinge)]
+        actions.append((lib.MSTMM_FIRE_STOP if stops else lib.MSTMM_FIRE_RESTART, release))
+        names.append(f'event "{event.name}"')
+    for hinge in packed.scene.hinge:
+        if hinge.release is not None:
+            conditions.append((hinge.release, hinge))
+            actions.append((lib.MSTMM_FIRE_RESTART, packed.releases[hinge.name]))
+            names.append(f'release of hinge "{hinge.name}"')
+    return conditions, actions, names
+
+
+def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
+    """The integrator at the start of the run."""
+    tableau = get(settings.method)
+    if settings.step is None and not tableau.adaptive:
+        raise SceneError(
+            f"method {settings.method!r} takes fixed steps: give step in s, or choose dopri5 or dop853"
+        )
+    breaks = [
+        b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end
+    ]
+    return Run(
+        system.engine.ffi, system.engine.lib, system.system, tableau,
+        t_start=settings.t_start, t_end=settings.t_end,
+        y0=system.start(settings.t_start, q, u), rtol=settings.rtol, atol=settings.atol,
+        step=settings.step, output_times=settings.output_times, breaks=breaks,
+        max_step=settings.max_step, max_steps=settings.max_steps,
+    )  # fmt: skip
+
+
+@contextmanager
+def _interruptible() -> Iterator[list[bool]]:
+    """Ctrl-C sets the flag instead of raising, so that no sample is lost."""
+    flag = [False]
+    if threading.current_thread() is not threading.main_thread():
+        yield flag
+        return
+
+    def note(*_: object) -> None:
+        flag[0] = True
+
+    previous = signal.signal(signal.SIGINT, note)
+    try:
+        yield flag
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def advance(
+    run: Run, observe: Callable[[Run], None] | None = None
+) -> Status | None:
+    """Run to the end; None if Ctrl-C came first.  `observe` is called between slices."""
+    with _interruptible() as interrupted:
+        while True:
+            status = run.advance(SLICE)
+            if status is not Status.RUNNING:
+                return status
+            if observe is not None:
+                observe(run)
+            if interrupted[0]:
+                return None
+
+
+def trajectory(
+    system: SceneSystem, run: Run, settings: Settings, status: Status | None
+) -> Trajectory:
+    """Samples of a run, split into coordinates, speeds and work."""
+    samples = run.samples
+    nq, nu = system.engine.nq, system.engine.nu
+    y = samples.y
+    work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
+    failure = run.failure
+    message = (
+        f"interrupted at t = {run.t:.9g} s" if status is None else _message(system, run)
+    )
+    return Trajectory(
+        samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
+        message, settings, run.statistics, None if failure is None else failure.time,
+    )  # fmt: skip
+
+
+def _message(system: SceneSystem, run: Run) -> str:
+    failure = run.failure
+    if failure is not None and failure.status in (Status.RHS_FAILED, Status.EVENT_FAILED):
+        return (
+            system.engine.failure_text(system.run.failure, failure.time)
+            + f"; last good state at t = {run.t:.9g} s"
+        )
+    return run.message(system.components(), system.event_names)
