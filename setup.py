@@ -1,5 +1,8 @@
-"""Builds the compiled kernels; everything else is in pyproject.toml."""
+"""Builds the compiled kernels, one binary for every Python from 3.11; the rest is pyproject.toml."""
 
 from setuptools import setup
 
-setup(cffi_modules=["runtime/build_extension.py:ffibuilder"])
+setup(
+    cffi_modules=["runtime/build_extension.py:ffibuilder"],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+)

@@ -18,3 +18,13 @@ done
 echo "--- every kernel, sanitized"
 gcc -std=c17 -g -O1 "${sanitize[@]}" -Igenerated generated/*.c .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
 "$scratch/kernels"
+
+echo "--- the engine under its tests, sanitized"
+git clone -q "$ROOT" "$scratch/checkout"
+printf '#!/bin/sh\nexec gcc "$@" %s\n' "${sanitize[*]}" >"$scratch/cc"
+chmod +x "$scratch/cc"
+export CC="$scratch/cc" PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks=0
+cd "$scratch/checkout"
+"$VENV/bin/python" setup.py -q build_ext --inplace
+LD_PRELOAD="$(gcc -print-file-name=libasan.so)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
+    tests/generated tests/runtime

@@ -3,5 +3,5 @@
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 [ -x "$VENV/bin/python" ] || python3 -m venv "$VENV"
-"$VENV/bin/pip" install -q -e '.[dev]'
+"$VENV/bin/pip" install -q -e '.[dev,docs]'
 "$VENV/bin/pip" check
