@@ -99,7 +99,7 @@ class Scene(Table):
             raise scene_errors.report(problems, self._tables(), where)
 
     def _tables(self) -> dict[str, Any]:
-        return {table: getattr(self, table) for table in scene_checks.TABLES}
+        return {table: getattr(self, table) for table in scene_errors.TABLES}
 
     @model_validator(mode="after")
     def _settle(self) -> Scene:

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 
 from . import topology
 from .expression import Expression
-from .scene_errors import MAX_PROBLEMS, Problem, near
+from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, problem_with
 from .scene_physics import triangle_excess
 from .scene_rules import GROUND, Location, split
 
 if TYPE_CHECKING:
     from .scene import Scene
-
-TABLES = ("body", "hinge", "load", "event", "spring")
 
 
 def problems(scene: Scene) -> list[Problem]:

@@ -30,6 +30,9 @@ RESERVED = {
     "include": "imports",
 }
 
+#: The lists of tables of a scene.
+TABLES = ("body", "hinge", "load", "event", "spring")
+
 Problem = tuple[Location, str]
 
 
@@ -134,7 +137,7 @@ def line(place: Location, message: str, data: Any) -> str:
     """'hinge "shoulder": axis: message'."""
     parts = list(place)
     label = ""
-    if len(parts) >= 2 and isinstance(parts[1], int):
+    if len(parts) >= 2 and parts[0] in TABLES and isinstance(parts[1], int):
         table, index = str(parts.pop(0)), int(parts.pop(0))
         label = f"{table} {_element(data, table, index)}: "
     key = ""

@@ -86,9 +86,9 @@ def _axes(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) -
     """axis, axis2, normal and lead, each where the type has it."""
     for key in ("axis2", "lead"):
         if key not in kind.keys and getattr(hinge, key) is not None:
-            problems.append(((key,), f"a {kind.name} hinge has no {key}; leave it out"))
+            problems.append(((key,), f"{a_hinge(kind.name)} has no {key}; leave it out"))
     if hinge.normal is not None and kind.name != "planar":
-        problems.append((("normal",), f"a {kind.name} hinge has no normal; write axis"))
+        problems.append((("normal",), f"{a_hinge(kind.name)} has no normal; write axis"))
     if "axis" not in kind.keys and hinge.axis != _Z:
         way_out = "turn it by orientation" if kind.name == "gimbal" else "leave it out"
         problems.append((("axis",), f"a {kind.name} hinge has no axis; {way_out}"))
@@ -155,7 +155,7 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
             units = ", ".join(effort_unit(s.unit) for s in kind.speeds)
             problems.append((
                 place,
-                f"one number cannot stand for all coordinates of a {kind.name} hinge, whose "
+                f"one number cannot stand for all coordinates of {a_hinge(kind.name)}, whose "
                 f"efforts are in {units}; give a list with {count} entries",
             ))  # fmt: skip
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
@@ -164,12 +164,17 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
     return law.model_copy(update=changes)
 
 
+def a_hinge(type_name: str) -> str:
+    """The type with its article."""
+    return f"{'an' if type_name[0] in 'aeio' else 'a'} {type_name} hinge"
+
+
 def entries_of(type_name: str, coordinates: tuple[Any, ...]) -> str:
     """How many entries a list has and what they are."""
     names = ", ".join(f"{c.name} ({c.unit})" for c in coordinates)
     count = len(coordinates)
     entries = "entry" if count == 1 else "entries"
-    return f"{count} {entries} for a {type_name} hinge" + (f": {names}" if names else "")
+    return f"{count} {entries} for {a_hinge(type_name)}" + (f": {names}" if names else "")
 
 
 def _units_differ(kind: HingeType) -> bool:
@@ -183,13 +188,13 @@ def _rotation_law(hinge: Hinge, kind: HingeType, law: dict[str, Any]) -> list[tu
     if any(rest) and norm(cross(unit(rest), unit(hinge.axis))) > 1e-9:
         problems.append((
             ("law", "rest"),
-            f"the rotation of a {kind.name} hinge can rest at a twist about its axis only, found "
+            f"the rotation of {a_hinge(kind.name)} can rest at a twist about its axis only, found "
             f"{found(rest)}; turn orientation instead",
         ))  # fmt: skip
     if any(stop.acts for stop in law["limits"]):
         problems.append((
             ("law", "limits"),
-            f"a {kind.name} hinge has no limits; use pin, universal or gimbal hinges",
+            f"{a_hinge(kind.name)} has no limits; use pin, universal or gimbal hinges",
         ))  # fmt: skip
     return problems
 
@@ -206,7 +211,7 @@ def _drive(
     if kind.quaternion is not None:
         instead = "gimbal or universal" if kind.name == "ball" else "gimbal, planar or prismatic"
         problems.append((
-            ("drive",), f"a {kind.name} hinge cannot be driven; use {instead} hinges"
+            ("drive",), f"{a_hinge(kind.name)} cannot be driven; use {instead} hinges"
         ))  # fmt: skip
     elif len(drive) != len(kind.speeds):
         problems.append((

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .scene_errors import TABLES
+
 if TYPE_CHECKING:
     from .scene import Scene
 
@@ -19,7 +21,7 @@ def to_toml(scene: Scene) -> str:
         for key, value in data.items()
         if not isinstance(value, tuple) or key == "gravity"
     ]
-    for table in ("body", "hinge", "load", "event", "spring"):
+    for table in TABLES:
         for element in data[table]:
             lines += ["", f"[[{table}]]"]
             lines += [

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .errors import SceneError
-
 if TYPE_CHECKING:
     from .scene import Scene
 
@@ -70,18 +68,22 @@ def build(scene: Scene) -> Topology:
     Raises SceneError, one line per problem, for closed loops, hinges written the wrong way round
     and bodies that no hinge connects to the ground.
     """
-    found = list(problems(scene))
-    if found:
+    tree = _tree(scene)
+    if tree is None:
         from .scene_errors import report
 
-        raise report(found, {"body": scene.body, "hinge": scene.hinge}, "scene")
-    return _tree(scene)
+        tables = {"body": scene.body, "hinge": scene.hinge}
+        raise report(list(problems(scene)), tables, "scene")
+    return tree
 
 
-def _tree(scene: Scene) -> Topology:
+def _tree(scene: Scene) -> Topology | None:
+    """The tree, or None if the hinges are not one."""
     index = {body.name: i for i, body in enumerate(scene.body)}
     children: list[list[int]] = [[] for _ in range(len(scene.body) + 1)]
     hinge_of = [0] * len(scene.body)
+    if len(scene.hinge) != len(scene.body):
+        return None
     for h, hinge in enumerate(scene.hinge):
         child = index[hinge.outboard_body]
         hinge_of[child] = h
@@ -95,7 +97,7 @@ def _tree(scene: Scene) -> Topology:
         order.append(body)
         stack.extend(children[body])
     if len(order) != len(scene.body):
-        raise SceneError("scene: the hinges do not form a tree")
+        return None
     position = [0] * len(order)
     for place, body in enumerate(order):
         position[body] = place

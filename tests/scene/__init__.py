@@ -1,0 +1,1 @@
+"""Tests of scenes, expressions and the tree."""

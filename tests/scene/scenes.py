@@ -1,0 +1,53 @@
+"""Small scenes as data, to be changed one key at a time."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+Data = dict[str, Any]
+
+
+def body(name: str = "rod1", **changes: Any) -> Data:
+    return {
+        "name": name,
+        "mass": 1.0,
+        "center_of_mass": [0.5, 0, 0],
+        "inertia": [0.001, 0.084, 0.084],
+        "ends": {"tip": [1, 0, 0]},
+    } | changes
+
+
+def hinge(name: str = "shoulder", **changes: Any) -> Data:
+    return {"name": name, "type": "pin", "inboard": "ground", "outboard": "rod1"} | changes
+
+
+def arm(**changes: Any) -> Data:
+    """Two rods on pins, a load, an event and a spring."""
+    return {
+        "schema_version": 1,
+        "gravity": [0, -9.81, 0],
+        "body": [body(), body("rod2")],
+        "hinge": [hinge(), hinge("elbow", inboard="rod1.tip", outboard="rod2")],
+        "load": [{"on": "rod2.tip", "force": [0, "10*cos(t)", 0]}],
+        "event": [{"when": "rod2.tip.x < 0.1", "do": "stop"}],
+        "spring": [{"from": "ground", "to": "rod1.tip", "law": {"stiffness": 100.0}}],
+    } | changes
+
+
+def one(**changes: Any) -> Data:
+    """One rod on one hinge; `changes` are to the hinge."""
+    return {"gravity": [0, 0, -9.81], "body": [body()], "hinge": [hinge(**changes)]}
+
+
+def changed(data: Data, *path: str | int, to: Any) -> Data:
+    """A copy with one value replaced; `to=...` (Ellipsis) removes the key."""
+    copied = copy.deepcopy(data)
+    inside: Any = copied
+    for part in path[:-1]:
+        inside = inside[part]
+    if to is ...:
+        del inside[path[-1]]
+    else:
+        inside[path[-1]] = to
+    return copied

@@ -1,0 +1,125 @@
+"""Elements of users' own types against their definitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mstmm.errors import SceneError
+from mstmm.scene import Scene, load_scene
+from mstmm.spec import ElementSpec, Param
+from scene.scenes import arm, body, changed, hinge, one
+
+KNEE = ElementSpec(
+    "hinge",
+    "knee",
+    "knee",
+    (Param("roll", "rad"), Param("slide", "m")),
+    (Param("roll_rate", "rad/s"), Param("slide_rate", "m/s")),
+    (Param("radius", "m", "radius of the roll", minimum=0.0), Param("offset", "m", default=0.0)),
+    (),
+)
+OWN_SPEEDS = ElementSpec("hinge", "cardan", "", (Param("a"), Param("b")), (Param("w"),), (), ())
+FLYWHEEL = ElementSpec("body", "flywheel", "", (), (), (Param("spin", "rad/s", maximum=1e4),), ())
+ROPE = ElementSpec("force", "rope", "", (), (), (Param("length", "m"),), ())
+KNOWN = {(s.kind, s.name): s for s in (KNEE, OWN_SPEEDS, FLYWHEEL, ROPE)}
+
+
+def knee(**changes: Any) -> dict[str, Any]:
+    return one(**({"type": "knee", "parameters": {"radius": 0.1}} | changes))
+
+
+def test_a_user_type_is_kept_with_its_numbers() -> None:
+    scene = Scene(**knee(initial={"q": [1, 2]}, law={"damping": [1, 2]}, axis=[1, 0, 0]))
+    scene.check_types(KNOWN)
+    scene.check_against(KNEE)
+    joint = scene.hinge[0]
+    assert joint.builtin is None
+    assert joint.parameters == {"radius": 0.1}
+    assert joint.initial is not None and (joint.initial.q, joint.initial.u) == ((1, 2), None)
+
+
+def test_bodies_and_forces_of_user_types() -> None:
+    data = arm(body=[body(), {"name": "rod2", "type": "flywheel", "parameters": {"spin": 5}}])
+    data["load"], data["event"] = [], []
+    data["spring"] = [{"from": "rod1", "to": "rod2", "type": "rope", "parameters": {"length": 1}}]
+    Scene(**data).check_types(KNOWN)
+
+
+BAD = [
+    (
+        knee(parameters={}),
+        "parameters.radius: missing; expected a number in m (radius of the roll)",
+    ),
+    (knee(parameters={"radius": -1}), "parameters.radius: expected 0 m or more, found -1"),
+    (knee(parameters={"radius": 1, "ofset": 1}), 'no parameter "ofset"; did you mean "offset"?'),
+    (knee(initial={"q": [1]}), "initial.q: knee has 2 entries here, found 1"),
+    (knee(initial={"u": [1, 2, 3]}), "initial.u: knee has 2 entries here, found 3"),
+    (knee(drive=["t", "t", "t"]), "drive: knee has 2 entries here, found 3"),
+    (knee(law={"damping": [1, 2, 3]}), "law.damping: knee has 2 entries here, found 3"),
+    (knee(law={"damping": 1}), "one number cannot stand for efforts in N*m, N"),
+    (knee(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "shoulder" is [1]'),
+    (knee(law={"effort": ["q", 0]}), "write q[0] to q[1]"),
+    (one(type="cardan", drive=["t", "t"]), "cardan has speeds of its own and cannot be driven"),
+    (one(type="pinn"), 'there is no hinge type "pinn"; did you mean "pin"?'),
+    (one(type="kne"), 'there is no hinge type "kne"; did you mean "knee"?'),
+    (one(type="spring"), 'there is no hinge type "spring"'),
+    (
+        changed(one(), "body", 0, "type", to="rigidd"),
+        'no body type "rigidd"; did you mean "rigid"?',
+    ),
+    (
+        one() | {"spring": [{"from": "ground", "to": "rod1", "type": "sprong"}]},
+        'spring "spring1": type: there is no force type "sprong"; did you mean "spring"?',
+    ),
+    (
+        knee() | {"event": [{"when": "shoulder.u[2] > 1", "do": "stop"}]},
+        "event \"event1\": when: 'shoulder.u[2]'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("data", "fragment"), BAD)
+def test_what_does_not_fit_the_definition(data: dict[str, Any], fragment: str) -> None:
+    scene = Scene(**data)
+    with pytest.raises(SceneError) as caught:
+        scene.check_types(KNOWN, "arm.toml")
+    assert fragment in str(caught.value)
+    assert str(caught.value).startswith("arm.toml: ")
+
+
+def test_check_against_looks_at_its_own_type_only() -> None:
+    scene = Scene(**knee(initial={"q": [1]}))
+    scene.check_against(FLYWHEEL)
+    with pytest.raises(SceneError, match=r'^scene: hinge "shoulder": initial\.q'):
+        scene.check_against(KNEE)
+
+
+def test_keys_of_built_in_types_are_refused() -> None:
+    for key, value in (("lead", 1), ("axis2", [1, 0, 0]), ("normal", [1, 0, 0])):
+        with pytest.raises(SceneError, match=f"{key}: only built-in types take {key}"):
+            Scene(**knee(**{key: value}))
+    with pytest.raises(SceneError, match=r'law: law belongs to type "spring"; use parameters'):
+        rope = {"from": "ground", "to": "rod1", "type": "rope", "law": {"stiffness": 1}}
+        Scene(**one(), spring=[rope])
+
+
+def test_loading_checks_types_when_they_are_known(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(Scene(**one(type="pinn")).to_toml())
+    assert load_scene(path).hinge[0].type == "pinn"
+    with pytest.raises(
+        SceneError, match=r'arm\.toml: hinge "shoulder": type: there is no hinge type'
+    ):
+        load_scene(path, known_types={})
+    pinn = ElementSpec("hinge", "pinn", "", (), (), (), ())
+    assert load_scene(path, known_types={("hinge", "pinn"): pinn}).hinge[0].type == "pinn"
+
+
+def test_parameters_are_names_in_expressions() -> None:
+    Scene(**knee(law={"effort": ["radius*t", "offset2"]}, parameters={"radius": 1, "offset2": 2}))
+    with pytest.raises(SceneError, match="'radios' is unknown; did you mean \"radius\""):
+        Scene(**knee(law={"effort": ["radios*t", 0]}))
+    assert hinge()["name"] == "shoulder"
