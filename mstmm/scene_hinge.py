@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from .drive import motion_at
@@ -12,7 +13,7 @@ from .rotations import cross, norm, perpendicular, unit
 from .scene_rules import GROUND, Location, Refused, found, quaternion
 
 if TYPE_CHECKING:
-    from .scene_law import Law
+    from .scene_law import Law, LawEntry
     from .scene_parts import Hinge
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -140,10 +141,10 @@ def _not_collinear(
 def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
     """The law with one entry per speed."""
     law, count = hinge.law, len(kind.speeds)
-    entry = type(law)().entry(0)
+    neutral = _neutral(type(law))
     changes: dict[str, Any] = {}
     for key in type(law).model_fields:
-        values, default = getattr(law, key), getattr(entry, key)
+        values, default = getattr(law, key), getattr(neutral, key)
         place: Location = ("law", key)
         if len(values) > 1 and len(values) != count:
             problems.append((
@@ -160,8 +161,14 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
             ))  # fmt: skip
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
     if kind.quaternion is not None:
-        problems += _rotation_law(hinge, kind, changes)
+        problems += _rotation_law(kind, changes)
     return law.model_copy(update=changes)
+
+
+@cache
+def _neutral(law: type[Law]) -> LawEntry:
+    """The law that does nothing."""
+    return law().entry(0)
 
 
 def a_hinge(type_name: str) -> str:
@@ -181,15 +188,14 @@ def _units_differ(kind: HingeType) -> bool:
     return len({s.unit for s in kind.speeds}) > 1
 
 
-def _rotation_law(hinge: Hinge, kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, str]]:
-    """A rotation stored as a quaternion has no angle to rest at (but the twist) or to stop."""
+def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, str]]:
+    """A rotation stored as a quaternion has no angle to rest at or to stop."""
     problems: list[tuple[Location, str]] = []
-    rest = law["rest"][-3:]
-    if any(rest) and norm(cross(unit(rest), unit(hinge.axis))) > 1e-9:
+    if any(law["rest"][-3:]):
         problems.append((
             ("law", "rest"),
-            f"the rotation of {a_hinge(kind.name)} can rest at a twist about its axis only, found "
-            f"{found(rest)}; turn orientation instead",
+            f"the rotation of {a_hinge(kind.name)} rests where it is not turned; "
+            "write 0 there and turn orientation instead",
         ))  # fmt: skip
     if any(stop.acts for stop in law["limits"]):
         problems.append((

@@ -97,6 +97,9 @@ _TABLES = rules.Shorthand(
 )
 
 
+_NO_EFFORT, _NO_FRICTION, _NO_LIMITS = number(0), Friction(), Limits()
+
+
 class Law(Table):
     """What acts along the coordinates of a hinge: one entry per speed.
 
@@ -116,7 +119,7 @@ class Law(Table):
     limits: Annotated[tuple[Limits, ...], _TABLES] = ()
 
     def entry(self, k: int) -> LawEntry:
-        """The law of coordinate k; a list with one entry is shared by all."""
+        """The law of coordinate k; a list with one entry is shared by all, none means no effect."""
 
         def pick(values: tuple[Any, ...], default: Any) -> Any:
             if not values:
@@ -125,8 +128,8 @@ class Law(Table):
 
         return LawEntry(
             pick(self.stiffness, 0.0), pick(self.rest, 0.0), pick(self.damping, 0.0),
-            pick(self.effort, number(0)), pick(self.inertia, 0.0),
-            pick(self.friction, Friction()), pick(self.limits, Limits()),
+            pick(self.effort, _NO_EFFORT), pick(self.inertia, 0.0),
+            pick(self.friction, _NO_FRICTION), pick(self.limits, _NO_LIMITS),
         )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ _TRIANGLE_ROUNDING = 1e-6
 def principal_moments(inertia: Matrix) -> Vector:
     """Eigenvalues of a symmetric 3x3 tensor, ascending (cyclic Jacobi rotations)."""
     a = [list(row) for row in inertia]
-    for _ in range(30):
+    for _ in range(30):  # five suffice; the bound is for entries that are not finite
         if a[0][1] == a[0][2] == a[1][2] == 0:
             break
         for p, q in ((0, 1), (0, 2), (1, 2)):
