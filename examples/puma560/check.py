@@ -19,7 +19,6 @@ model parameters reported for the PUMA 560 robot", IEEE ICRA 1994, pp. 1608-1613
 from __future__ import annotations
 
 import tomllib
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -148,12 +147,10 @@ TOOLBOX_CORIOLIS = np.array(  # times SPEEDS: the torque of the speeds alone
 
 
 def model_of(data: dict[str, Any]) -> mstmm.Model:
-    """Compile; the warning about link 3 must come, and no other."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        model = mstmm.compile(mstmm.Scene(**data))
-    assert caught and all("link3" in str(warning.message) for warning in caught)
-    return model
+    """Compile; the scene must warn about link 3, and about nothing else."""
+    scene = mstmm.Scene(**data)
+    assert scene.warnings and all("link3" in warning for warning in scene.warnings)
+    return mstmm.compile(scene)
 
 
 def roll(angle: float) -> Array:

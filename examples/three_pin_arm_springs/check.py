@@ -57,7 +57,7 @@ def main() -> None:
         result = run(softer(scale))
         errors.append(float(abs(angles(result) - pins.q).max()))
         gaps = np.stack([result.q[:, 7 * i : 7 * i + 3] for i in range(3)], axis=1)
-    stiffness = 1e4 * SCALES[-1]
+    stiffness = 1e5 * SCALES[-1]
     ratio = np.linalg.norm(gaps, axis=2) * stiffness / np.linalg.norm(loads, axis=2)
     orders = [float(np.log(a / b) / np.log(4)) for a, b in pairwise(errors)]
     print("angle errors", " ".join(f"{e:.2e}" for e in errors), "rad")
