@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +14,11 @@ if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
+Needed = Callable[[Array], Array]
 
 _STEP = 1e-6  # of the difference quotients, rad or m
-_MAX_ITERATIONS = 60
+_UPHILL_STEP = 0.5  # longest step away from an unstable equilibrium, rad or m
+_MAX_ITERATIONS = 100
 
 
 def moved(model: Model, q: Array, increment: Array) -> Array:
@@ -50,8 +53,12 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
             _refuse_undetermined(model, slope, free)
             return q
         step = np.zeros(model.nu)
-        step[free] = np.linalg.lstsq(slope, -residual, rcond=1e-9)[0]
-        q, residual = _damped(model, q, step, needed, size)
+        downhill, step[free] = _step(slope, residual)
+        if downhill:
+            q, residual = _damped(model, q, step, needed, size)
+        else:
+            q = moved(model, q, _limited(step, _UPHILL_STEP))
+            residual = needed(q)
     raise NumericalFailure(
         f"no equilibrium found near the start: after {_MAX_ITERATIONS} steps an effort of "
         f"{size:.3g} (N or N*m) is left; give another start, q = ..."
@@ -69,24 +76,42 @@ def _free_speeds(model: Model) -> list[int]:
     return free
 
 
-def _slope(model: Model, q: Array, needed: object, free: list[int]) -> Array:
+def _slope(model: Model, q: Array, needed: Needed, free: list[int]) -> Array:
     columns = []
     for j in free:
         increment = np.zeros(model.nu)
         increment[j] = _STEP
         ahead, behind = moved(model, q, increment), moved(model, q, -increment)
-        columns.append((needed(ahead) - needed(behind)) / (2 * _STEP))  # type: ignore[operator]
+        columns.append((needed(ahead) - needed(behind)) / (2 * _STEP))
     return np.array(columns).reshape(len(free), len(free)).T
 
 
+def _step(slope: Array, residual: Array) -> tuple[bool, Array]:
+    """(whether the stiffness is positive definite, step towards equilibrium).
+
+    Where it is not, the step goes down along the directions that would run uphill, so that an
+    unstable equilibrium is left behind (for forces without potential this is only a heuristic).
+    """
+    values, directions = np.linalg.eigh((slope + slope.T) / 2)
+    floor = 1e-9 * float(np.abs(values).max(initial=1e-300))
+    if values.min(initial=np.inf) > -floor:
+        return True, np.asarray(np.linalg.lstsq(slope, -residual, rcond=1e-9)[0])
+    softened = np.maximum(np.abs(values), floor)
+    return False, np.asarray(-directions @ ((directions.T @ residual) / softened))
+
+
+def _limited(step: Array, longest: float) -> Array:
+    return np.asarray(step / max(1.0, float(np.abs(step).max(initial=0.0)) / longest))
+
+
 def _damped(
-    model: Model, q: Array, step: Array, needed: object, size: float
+    model: Model, q: Array, step: Array, needed: Needed, size: float
 ) -> tuple[Array, Array]:
     """A Newton step, at most one unit long, halved until the residual falls."""
-    step = step / max(1.0, float(np.abs(step).max(initial=0.0)))
+    step = _limited(step, 1.0)
     for _ in range(20):
         trial = moved(model, q, step)
-        residual = needed(trial)  # type: ignore[operator]
+        residual = needed(trial)
         if float(np.abs(residual).max(initial=0.0)) < size:
             break
         step = step / 2
