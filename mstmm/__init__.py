@@ -23,7 +23,8 @@ from .errors import (
 )
 
 if TYPE_CHECKING:
-    from .compile import compile_scene as compile
+    from .compilation import compile_scene as compile
+    from .compilation import generate_file, register
     from .runtime.model import Model
     from .runtime.result import Result, load_result
     from .scene import Scene
@@ -35,7 +36,9 @@ __version__ = "0.1.0"
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene_file", "load_scene"),
-    "compile": (".compile", "compile_scene"),
+    "compile": (".compilation", "compile_scene"),
+    "register": (".compilation", "register"),
+    "generate_file": (".compilation", "generate_file"),
     "Model": (".runtime.model", "Model"),
     "Result": (".runtime.result", "Result"),
     "load_result": (".runtime.result", "load_result"),
@@ -43,7 +46,8 @@ _LAZY = {
 
 __all__ = [
     "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
-    "NumericalFailure", "Result", "Scene", "SceneError", "compile", "load_result", "load_scene",
+    "NumericalFailure", "Result", "Scene", "SceneError", "compile",
+    "generate_file", "load_result", "load_scene", "register",
 ]  # fmt: skip
 
 

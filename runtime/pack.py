@@ -184,6 +184,8 @@ class _Packing:
     def _hinge_functions(self, record: Any, kernel: Element) -> None:
         for name in ("hinge", "forward", "condense", "recover"):
             setattr(record, name, kernel.functions.get(name, self.ffi.NULL))
+        if kernel.tape is not None:
+            record.tape = self._c_tape(kernel.tape)
         record.generic = int(record.condense == self.ffi.NULL)
 
     def _body_functions(self, record: Any, body: Any, place: Placement) -> None:

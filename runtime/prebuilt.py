@@ -8,6 +8,7 @@ from typing import Any
 
 from mstmm import abi
 from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.tape import Tape
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Element:
     functions: dict[str, Any]
     guards: dict[str, dict[int, str]]
     descriptor: Any
+    tape: Tape | None = None  # hinge kernel of an element without a library
+    owner: Any = None  # keeps the library or the arrays of the descriptor alive
 
 
 @cache

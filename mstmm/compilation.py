@@ -1,0 +1,87 @@
+"""Scene -> Model: chooses the engine and says why.  With `crosscheck`, the bridge between rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import ElementError, SceneError
+from .scene import Scene
+from .spec import ElementSpec
+
+if TYPE_CHECKING:
+    from .derive.registry import Element
+    from .runtime.model import Model
+
+ENGINES = ("auto", "looped")
+SWEEPS = ("riccati", "product")
+
+
+@dataclass(frozen=True)
+class Generated:
+    """An element of the kernel store: its kernels, its folder, and how it runs."""
+
+    spec: ElementSpec
+    folder: Path
+    how: str
+
+
+def compile_scene(scene: Scene, engine: str = "auto", sweep: str = "riccati") -> Model:
+    """Model of a scene, ready to compute.
+
+    Args:
+        scene: validated scene (`load_scene`, or `Scene(...)`).
+        engine: "auto" or "looped" (element kernels driven by a loop; any size, no compiler).
+        sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
+            matrices, chains only, guarded).
+
+    Raises SceneError for hinges that do not form a tree and types that nobody defines.
+    """
+    if engine not in ENGINES:
+        raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
+    if sweep not in SWEEPS:
+        raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
+    from .runtime import store
+    from .runtime.model import Model
+
+    elements, definitions = store.known(store.needed(scene))
+    scene.check_types(definitions)
+    why = "looped: the only engine of this release"
+    return Model(scene, known=elements, why=why)
+
+
+def generate(elements: Iterable[Element]) -> list[Generated]:
+    """Check, derive, generate and compile elements into the user's kernel store.
+
+    Raises ElementError naming the equation that is wrong, EnvironmentFailure if the store cannot be
+    written.  A name that a built-in element has is refused.
+    """
+    from .derive.checks import check
+    from .derive.render import element_source, header
+    from .derive.specs import spec_of
+    from .runtime import prebuilt, store
+
+    made = []
+    for element in elements:
+        check(element)
+        spec = spec_of(element)
+        if (spec.kind, spec.name) in prebuilt.elements():
+            raise ElementError(f"{spec.kind} {spec.name!r} is built in; choose another name")
+        files = {"mstmm.h": header(), f"{spec.kind}_{spec.name}.c": element_source(spec)}
+        place, how = store.keep(spec, files)
+        made.append(Generated(spec, place, how))
+    return made
+
+
+def generate_file(path: str | Path) -> list[Generated]:
+    """`generate` for every element that a Python file defines.  The file is executed: trust it."""
+    from .derive.registry import load_file
+
+    return generate(load_file(path))
+
+
+def register(element: type[Element]) -> Generated:
+    """Make a hinge, body or force element of your own known to scenes by its name."""
+    return generate([element()])[0]

@@ -1,0 +1,185 @@
+"""The user's kernel store: elements generated from files outside the package, one folder each.
+
+A folder `hinge_knee/` holds the stored element (JSON), its C text and, where a compiler was found,
+a shared library.  Loading reads these files and executes none of the definitions.  Hinges without
+a library are interpreted from their IR.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cffi
+import platformdirs
+
+from mstmm import abi
+from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.scene import Scene
+from mstmm.spec import ElementSpec
+from mstmm.stored import element_from_json, element_to_json
+from mstmm.tape import compile_tape
+
+from . import prebuilt, toolchain
+from .prebuilt import Element
+
+Key = tuple[str, str]
+
+
+def folder() -> Path:
+    """The store: $MSTMM_KERNELS, or a folder of the user's."""
+    named = os.environ.get("MSTMM_KERNELS")
+    return Path(named) if named else Path(platformdirs.user_data_path("mstmm")) / "kernels"
+
+
+def _place(key: Key) -> Path:
+    return folder() / f"{key[0]}_{key[1]}"
+
+
+def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
+    """Write a generated element (`files`: name -> C text) and compile it.
+
+    Returns its folder and a sentence on how it will run.  Raises EnvironmentFailure if the folder
+    cannot be written, or if a body or force element cannot be compiled.
+    """
+    place = _place((spec.kind, spec.name))
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        for name, text in {**files, "element.json": element_to_json(spec)}.items():
+            temporary = place / f".{name}.{os.getpid()}"
+            temporary.write_text(text, encoding="utf-8")
+            os.replace(temporary, place / name)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"the kernel store {folder()} cannot be written ({error.strerror}); "
+            "set MSTMM_KERNELS to a folder of your own"
+        ) from error
+    opened.cache_clear()
+    try:
+        library = place / _library(spec)
+        if not library.exists():
+            source = place / f"{spec.kind}_{spec.name}.c"
+            toolchain.build([source], library)
+            _remove_old(place, library)
+        return place, "compiled"
+    except EnvironmentFailure as error:
+        if spec.kind != "hinge":
+            raise
+        return place, f"interpreted, several times slower than compiled: {error}"
+
+
+def _library(spec: ElementSpec) -> str:
+    return f"{spec.hash()[:16]}-{abi.ABI}{toolchain.library_suffix()}"
+
+
+def _remove_old(place: Path, current: Path) -> None:
+    for path in place.glob(f"*{toolchain.library_suffix()}"):
+        if path != current:
+            path.unlink(missing_ok=True)
+
+
+def specs() -> dict[Key, ElementSpec]:
+    """Every element in the store; files that cannot be read are passed over."""
+    found: dict[Key, ElementSpec] = {}
+    for path in sorted(folder().glob("*/element.json")):
+        try:
+            spec = element_from_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        found[spec.kind, spec.name] = spec
+    return found
+
+
+def spec(key: Key) -> ElementSpec | None:
+    """One element of the store, None if it is not there.  ElementError if its file is damaged."""
+    path = _place(key) / "element.json"
+    if not path.is_file():
+        return None
+    try:
+        return element_from_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ElementError(
+            f"{path}: the stored element is damaged ({error}); generate it again: mstmm generate FILE"
+        ) from error
+
+
+@cache
+def opened(key: Key, content: str) -> Element:
+    """The element of the store with this hash, ready to be called."""
+    stored = spec(key)
+    assert stored is not None and stored.hash() == content
+    library = _place(key) / _library(stored)
+    if library.is_file():
+        return _from_library(stored, library)
+    if stored.kind == "hinge":
+        return _interpreted(stored)
+    raise EnvironmentFailure(
+        f"{stored.kind} {stored.name!r} is not compiled; install a C compiler and run: "
+        "mstmm generate FILE"
+    )
+
+
+def _from_library(stored: ElementSpec, library: Path) -> Element:
+    separate = cffi.FFI()
+    separate.cdef(abi.cdef(registry=False))
+    symbol = abi.element_symbol(stored.kind, stored.name)
+    separate.cdef(f"extern mstmm_element {symbol};")  # cffi reads no constant this way
+    try:
+        lib = separate.dlopen(str(library))
+        address = int(separate.cast("uintptr_t", separate.addressof(lib, symbol)))
+    except (OSError, AttributeError) as error:
+        raise EnvironmentFailure(
+            f"{library} cannot be opened ({error}); delete it and run: mstmm generate FILE"
+        ) from error
+    ffi, _ = prebuilt.module()
+    element = prebuilt.describe(ffi, ffi.cast("mstmm_element *", address))
+    return replace(element, owner=(separate, lib))
+
+
+def _interpreted(stored: ElementSpec) -> Element:
+    ffi, _ = prebuilt.module()
+    kernel = next(k for k in stored.kernels if k.name == "hinge")
+    names = {
+        "q": stored.coordinates, "u": stored.speeds, "p": stored.parameters,
+    }  # fmt: skip
+    arrays: dict[str, Any] = {"nq": len(names["q"]), "nu": len(names["u"]), "np": len(names["p"])}
+    kept: list[Any] = []
+    for letter, group in names.items():
+        for what, texts in (
+            ("names", [p.name for p in group]),
+            ("units", [p.unit for p in group]),
+        ):
+            strings = [ffi.new("char[]", t.encode()) for t in texts]
+            array = ffi.new("const char *[]", strings or [ffi.NULL])
+            kept += [strings, array]
+            arrays[f"{letter}_{what}"] = array
+    descriptor = ffi.new("mstmm_element *", arrays)
+    return Element(
+        stored.kind, stored.name, arrays["nq"], arrays["nu"],
+        tuple(p.name for p in stored.parameters), {}, {}, descriptor,
+        tape=compile_tape(kernel), owner=kept,
+    )  # fmt: skip
+
+
+def needed(scene: Scene) -> list[Key]:
+    """Types of a scene that are not built in."""
+    pairs = [("body", b.type) for b in scene.body]
+    pairs += [("hinge", h.type) for h in scene.hinge if h.builtin is None]
+    pairs += [("force", s.type) for s in scene.spring]
+    return sorted({key for key in pairs if key not in prebuilt.elements()})
+
+
+def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpec]]:
+    """Elements and definitions of the store for these types, those that there are."""
+    elements: dict[Key, Element] = {}
+    definitions: dict[Key, ElementSpec] = {}
+    for key in keys:
+        stored = spec(key)
+        if stored is not None:
+            definitions[key] = stored
+            elements[key] = opened(key, stored.hash())
+    return elements, definitions
