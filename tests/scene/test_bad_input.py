@@ -189,7 +189,10 @@ BAD: list[tuple[Data, str]] = [
         "whose efforts are in N, N*m; give a list with 2",
     ),
     (one(type="free", law={"damping": 1}), "give a list with 6 entries"),
-    (one(type="ball", law={"rest": [1, 0, 0]}), "can rest at a twist about its axis only"),
+    (
+        one(type="ball", law={"rest": [1, 0, 0]}),
+        "the rotation of a ball hinge rests where it is not turned",
+    ),
     (one(type="ball", law={"limits": {"lower": 0, "stiffness": 1}}), "a ball hinge has no limits"),
     (
         one(law={"friction": {"coulomb": -1}}),

@@ -1,0 +1,122 @@
+"""Random damage to scenes: a Scene or a SceneError of printable lines, never anything else."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import hypothesis.strategies as st
+from hypothesis import HealthCheck, given, settings
+from reference.random_scenes import random_scene
+
+from mstmm.errors import SceneError
+from mstmm.scene import Scene, load_scene
+from scene.scenes import arm
+
+KEYS = (
+    "name type mass inertia ends tip axis axis2 lead normal initial q u law drive release "
+    "effort friction limits lower upper stiffness parameters position orientation inboard outboard on when "
+    "do hinge body from to gravity beam \x00 é"
+).split(" ")
+LEAVES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.just(10**400),
+    st.floats(),
+    st.text(max_size=8),
+    st.sampled_from(
+        "free ground rod1 rod1.tip t sin(t) q[0] rod1.x<1 nan ball universal planar gimbal screw "
+        "fixed t^2 shoulder.q release stop".split()
+    ),
+)
+VALUES = st.recursive(
+    LEAVES,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=7), st.dictionaries(st.sampled_from(KEYS), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+def places(data: Any, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every place in nested tables and lists."""
+    found = [here] if here else []
+    items = data.items() if isinstance(data, dict) else enumerate(data)
+    for key, value in items:
+        inner = (*here, key)
+        found += places(value, inner) if isinstance(value, (dict, list)) else [inner]
+    return found
+
+
+def damaged(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:
+    """Replace, remove or add a few values."""
+    data = copy.deepcopy(data)
+    for _ in range(draw.draw(st.integers(1, 3))):
+        place = draw.draw(st.sampled_from(places(data)))
+        inside: Any = data
+        for part in place[:-1]:
+            inside = inside[part]
+        action = draw.draw(st.sampled_from(["replace", "remove", "add"]))
+        if action == "remove":
+            del inside[place[-1]]
+        elif action == "add" and isinstance(inside, dict):
+            inside[draw.draw(st.sampled_from(KEYS))] = draw.draw(VALUES)
+        else:
+            inside[place[-1]] = draw.draw(VALUES)
+        if not places(data):
+            break
+    return data
+
+
+def check(make: Any) -> None:
+    try:
+        scene = make()
+    except SceneError as error:
+        lines = str(error).split("\n")
+        assert 1 <= len(lines) <= 11
+        assert all(line.isprintable() and len(line) < 1500 for line in lines)
+        return
+    assert Scene(**tomllib.loads(scene.to_toml())) == scene
+    assert Scene(**scene.model_dump()) == scene
+
+
+SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture)
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=SLOW)
+@given(st.data())
+def test_damaged_scenes(draw: st.DataObject) -> None:
+    data = damaged(arm(), draw)
+    check(lambda: Scene(**data))
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=SLOW)
+@given(st.integers(0, 2**32 - 1), st.data())
+def test_damaged_random_scenes(seed: int, draw: st.DataObject) -> None:
+    data = damaged(random_scene(seed, most=4, laws=False), draw)
+    check(lambda: Scene(**data))
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=SLOW)
+@given(st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5))
+def test_arbitrary_tables(data: dict[str, Any]) -> None:
+    check(lambda: Scene(**data))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=SLOW)
+@given(st.data())
+def test_damaged_files(tmp_path: Path, draw: st.DataObject) -> None:
+    """Bytes of a good file with some of them changed."""
+    suffix = draw.draw(st.sampled_from([".toml", ".json"]))
+    good = Scene(**arm()).to_toml() if suffix == ".toml" else json.dumps(arm())
+    content = bytearray(good.encode())
+    for _ in range(draw.draw(st.integers(1, 4))):
+        at = draw.draw(st.integers(0, len(content) - 1))
+        content[at : at + draw.draw(st.integers(0, 3))] = draw.draw(st.binary(max_size=3))
+    path = tmp_path / f"damaged{suffix}"
+    path.write_bytes(content)
+    check(lambda: load_scene(path))
