@@ -124,6 +124,18 @@ def test_leaves_need_no_room() -> None:
     assert not loaded & {"sympy", "jinja2", "cffi", *(f"mstmm.{room}" for room in ROOMS)}
 
 
+def test_leaves_name_no_room() -> None:
+    # Not even inside a function: what joins the rooms is listed above.
+    named = [
+        (path.name, name)
+        for path in python_files("mstmm")
+        if path.stem not in BRIDGES
+        for _, name in imports(path)
+        if {*name.split(".")[:2]} & {"sympy", "jinja2", "cffi", *ROOMS}
+    ]
+    assert not named
+
+
 def test_runtime_needs_no_derivation() -> None:
     loaded = loaded_after(import_all("mstmm.runtime"))
     assert "mstmm.runtime" in loaded
