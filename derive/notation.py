@@ -66,6 +66,8 @@ def explicit(expression: sp.Basic) -> Matrix:
         return Matrix(factor * product)
     if isinstance(expression, sp.Transpose):
         return Matrix(explicit(expression.arg).T)
+    if isinstance(expression, sp.MatPow):
+        return Matrix(explicit(expression.base) ** int(expression.exp))
     if isinstance(expression, Tilde):
         return tilde(explicit(expression.args[0]))
     if isinstance(expression, Perp):

@@ -7,11 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import sympy as sp
+
+from mstmm.spec import ElementSpec
+
 from ..derivation import Derivation
+from ..lower import lower
 from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
 from .hinge_relation import PIVOT_LIMIT, VANISHING_PIVOT, guards
 
-__all__ = ["CLASSICAL", "PIVOT_LIMIT", "VANISHING_PIVOT", "classical_guards", "guards"]
+__all__ = [
+    "CLASSICAL",
+    "PIVOT_LIMIT",
+    "VANISHING_PIVOT",
+    "classical_guards",
+    "classical_spec",
+    "guards",
+]
 
 
 def _planar_acceleration() -> Derivation:
@@ -30,7 +42,16 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
 }
 
 
-def classical_guards(derivation: Derivation) -> tuple[tuple[object, int, str], ...]:
+def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards of a classical element: the pivot's for a hinge, none for a body."""
     has_margin = any(quantity.name == "margin" for quantity in derivation.outputs)
     return guards(derivation) if has_margin else ()
+
+
+def classical_spec(name: str) -> ElementSpec:
+    """What generation needs of a classical element: one kernel, `transfer`."""
+    derivation = CLASSICAL[name]()
+    kernel = lower(derivation, "transfer", classical_guards(derivation))
+    return ElementSpec(
+        "classical", name, derivation.title, (), (), (), (kernel,), derivation.sources
+    )

@@ -32,7 +32,11 @@ def statement() -> HingeStatement:
         ),
         source="(5.39) to (5.49)",
         equation="(5.49)",
-        notes=("Behind the last body the free tip takes the place of the next ball (tau_n = 0).",),
+        notes=(
+            "With u_kl the blocks of U: "
+            "omegadot_O = -u_32^-1 (u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n).",
+            "Behind the last body the free tip takes the place of the next ball (tau_n = 0).",
+        ),
     )
 
 

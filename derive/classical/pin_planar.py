@@ -32,7 +32,11 @@ def statement() -> HingeStatement:
         conditions=(Equation("moment of the next pin", PLANAR.at("N")[2], NEXT_EFFORT, "(5.32)"),),
         source="(5.28) to (5.38)",
         equation="(5.38)",
-        notes=("Behind the last body the free tip takes the place of the next pin (tau_n = 0).",),
+        notes=(
+            "With u_kl the blocks of U: "
+            "thetadd_O = -(u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n) / u_32.",
+            "Behind the last body the free tip takes the place of the next pin (tau_n = 0).",
+        ),
     )
 
 

@@ -1,0 +1,61 @@
+"""A KernelIR as readable lines, one statement each; indices count from zero as the arrays do."""
+
+from __future__ import annotations
+
+from mstmm.ir import Assign, Constant, Element, Guard, KernelIR, Operand, Statement, Store, Sum
+
+_INFIX = {
+    "add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "**", "lt": "<", "le": "<=", "eq": "==",
+    "and": "and", "or": "or",
+}  # fmt: skip
+_PREFIX = {"neg": "-", "not": "not "}
+
+
+def listing(kernel: KernelIR) -> list[str]:
+    """Every statement, in order."""
+    lines: list[str] = []
+    for statement in kernel.statements:
+        lines += _lines(statement)
+    return lines
+
+
+def _lines(statement: Statement) -> list[str]:
+    if isinstance(statement, Assign):
+        return [_assign(statement)]
+    if isinstance(statement, Sum):
+        body = [f"    {_assign(a)}" for a in statement.body]
+        head = f"t{statement.number} = sum over k < n of {_operand(statement.value)}"
+        return [f"{head} with", *body] if body else [head]
+    if isinstance(statement, Store):
+        place = statement.port + "".join(f"[{i}]" for i in statement.index)
+        looped = "k" in statement.index
+        line = f"{place} = {_operand(statement.value)}" + ("  for k < n" if looped else "")
+        return [*(f"    {_assign(a)}" for a in statement.body), line]
+    if isinstance(statement, Guard):
+        condition = _operand(statement.condition)
+        return [f"leave with code {statement.code} unless {condition}: {statement.message}"]
+    return [
+        f"{statement.port} = solve({statement.matrix}, {statement.right})  "
+        f"else code {statement.code}: {statement.message}"
+    ]
+
+
+def _assign(assign: Assign) -> str:
+    operands = [_operand(a) for a in assign.args]
+    if assign.op in _INFIX:
+        value = f" {_INFIX[assign.op]} ".join(operands)
+    elif assign.op in _PREFIX:
+        value = _PREFIX[assign.op] + operands[0]
+    elif assign.op == "select":
+        value = f"{operands[1]} if {operands[0]} else {operands[2]}"
+    else:
+        value = f"{assign.op}({', '.join(operands)})"
+    return f"t{assign.number} = {value}"
+
+
+def _operand(operand: Operand) -> str:
+    if isinstance(operand, Constant):
+        return operand.text
+    if isinstance(operand, Element):
+        return operand.port + "".join(f"[{i}]" for i in operand.index)
+    return f"t{operand.number}"

@@ -1,0 +1,62 @@
+"""Names as people write them: rdd_IO is r with two dots and subscript IO, omegadot is omega-dot."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+#: Greek letters by name, capitals included.
+GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ",
+    "eta": "η", "theta": "θ", "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ",
+    "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω",
+    "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ", "Lambda": "Λ", "Sigma": "Σ", "Phi": "Φ",
+    "Psi": "Ψ", "Omega": "Ω", "pi": "π",
+}  # fmt: skip
+
+_DOTS = (("ddot", 2), ("dot", 1), ("dd", 2), ("d", 1))
+
+
+@dataclass(frozen=True)
+class ShownName:
+    """base letter (or word, then `upright`), number of dots, subscript."""
+
+    base: str
+    dots: int = 0
+    subscript: str = ""
+    upright: bool = False
+
+
+def shown_name(name: str) -> ShownName:
+    """Split a port's or symbol's name into what is shown."""
+    head, _, subscript = name.partition("_")
+    base, dots = _undotted(head)
+    if _is_letter(base):
+        return ShownName(base, dots, subscript)
+    numbered = re.fullmatch(r"([A-Za-z]+?)(\d+)", head)
+    if numbered and _is_letter(numbered[1]):
+        return ShownName(numbered[1], 0, ",".join(filter(None, (numbered[2], subscript))))
+    short = len(subscript) <= 2
+    return ShownName(head if short else name, 0, subscript if short else "", upright=True)
+
+
+def _undotted(head: str) -> tuple[str, int]:
+    for suffix, dots in _DOTS:
+        if head.endswith(suffix) and _is_letter(head.removesuffix(suffix)):
+            return head.removesuffix(suffix), dots
+    return head, 0
+
+
+def _is_letter(text: str) -> bool:
+    return len(text) == 1 or text in GREEK
+
+
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def shown_unit(unit: str) -> str:
+    """kg*m2 as kg·m²; a quantity without a unit shows a dash."""
+    if not unit:
+        return "–"
+    text = re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), unit)
+    return text.replace("*", "·")
