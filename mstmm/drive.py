@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from .errors import ExpressionError
 from .expression import Expression
 from .expression_parser import MEANING
 from .graph import Graph, Node, derivative
+
+#: Longest numerator or denominator of a constant; fractions are stored as decimal text.
+_MAX_BITS = 12_000
 
 _MEANING: dict[str, Callable[..., float]] = MEANING | {
     "select": MEANING["where"],
@@ -22,11 +26,41 @@ _MEANING: dict[str, Callable[..., float]] = MEANING | {
 def motion(drive: Expression, time: Node) -> tuple[Node, Node, Node]:
     """Position, speed and acceleration of a drive as nodes of the graph of `time`.
 
-    The drive may depend on `t` alone.  Derivatives are exact on every smooth piece.
+    The drive may depend on `t` alone.  Derivatives are exact on every smooth piece.  Raises
+    ExpressionError where their constants cannot be stored.
     """
     position = drive.build(time.graph, lambda _: time)
     speed = derivative(position, {time: 1})
-    return position, speed, derivative(speed, {time: 1})
+    acceleration = derivative(speed, {time: 1})
+    for node in (position, speed, acceleration):
+        _refuse_long_constants(node, drive)
+    return position, speed, acceleration
+
+
+def _refuse_long_constants(root: Node, drive: Expression) -> None:
+    """Derivatives multiply constants exactly; hundreds of them make numbers nobody can store."""
+    seen: set[int] = set()
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if node.number in seen:
+            continue
+        seen.add(node.number)
+        stack.extend(node.args)
+        exact = node.value
+        if exact is None:
+            continue
+        if max(exact.numerator.bit_length(), exact.denominator.bit_length()) > _MAX_BITS:
+            raise ExpressionError(
+                f"the derivatives of {drive.text[:60]!r} hold a constant of thousands of digits; "
+                "write the product of its constants as one number"
+            )
+        try:
+            float(exact)
+        except OverflowError:
+            raise ExpressionError(
+                f"the derivatives of {drive.text[:60]!r} hold a constant beyond 1.8e308; scale it"
+            ) from None
 
 
 def motion_at(drive: Expression, t: float) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from .drive import motion_at
+from .errors import ExpressionError
 from .expression import Expression
 from .hinge_types import HINGE_TYPES, HingeType, effort_unit
 from .rotations import cross, norm, perpendicular, unit
@@ -233,13 +234,24 @@ def _drive(
             problems.append((
                 place, f"a drive depends on t alone, found {other!r}; use law.effort for feedback"
             ))  # fmt: skip
-        elif not all(math.isfinite(x) for x in motion_at(entry, 0.0)):
-            problems.append((
-                place,
-                f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "
-                "begin with a smooth motion, for example t^2",
-            ))  # fmt: skip
+        else:
+            problems += _unsmooth(entry, place)
     return drive
+
+
+def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
+    """A drive whose start is not finite or whose derivatives cannot be formed."""
+    try:
+        start = motion_at(entry, 0.0)
+    except ExpressionError as error:
+        return [(place, str(error))]
+    if all(math.isfinite(x) for x in start):
+        return []
+    return [(
+        place,
+        f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "
+        "begin with a smooth motion, for example t^2",
+    )]  # fmt: skip
 
 
 def _initial(

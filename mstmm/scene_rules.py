@@ -38,7 +38,7 @@ def refuse(message: str, *place: str | int) -> Refused:
     return Refused((place, message))
 
 
-def found(value: object) -> str:
+def found(value: object, depth: int = 0) -> str:
     """The value as a message shows it: short, printable, in the words of a scene file."""
     if value is None:
         return "nothing"
@@ -51,7 +51,10 @@ def found(value: object) -> str:
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, (list, tuple)):
-        inside = ", ".join(found(v) for v in value[:7]) + (", ..." if len(value) > 7 else "")
+        if depth == 2:
+            return f"a list of {len(value)}"
+        inside = ", ".join(found(v, depth + 1) for v in value[:7])
+        inside += ", ..." if len(value) > 7 else ""
         return f"[{inside}]" if len(inside) <= 60 else f"a list of {len(value)}"
     if isinstance(value, (int, float)):
         return f"{float(value):.6g}"

@@ -221,6 +221,8 @@ BAD: list[tuple[Data, str]] = [
     (one(drive=["t", "t"]), "drive: expected 1 entry for a pin hinge: angle (rad), found 2"),
     (one(drive="sqrt(t)"), "is not finite at t = 0"),
     (one(drive="t > 1"), "found a comparison"),
+    (one(drive="t" + "*1.1e-300" * 400), "hold a constant of thousands of digits"),
+    (one(drive="t*1e300*1e300"), "hold a constant beyond 1.8e308; scale it"),
     (one(drive=NAN), "which is not finite"),
     (one(drive={}), "drive: expected a number or an expression"),
     (one(drive="sin(t)", initial={"q": [0]}), "a drive stands instead of initial"),

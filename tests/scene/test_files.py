@@ -134,6 +134,8 @@ def test_bad_toml(tmp_path: Path, content: str | bytes, fragment: str) -> None:
         ('{"gravity": [0, 1e999, 0]}', "gravity[1]: expected a number, found inf"),
         ('{"gravity": 1, "gravity": 2}', "the key 'gravity' appears twice"),
         ('{"gravity": [0, 0, ' + "1" * 5000 + "]}", "not valid JSON"),
+        ('{"gravity": ' + "[" * 400 + "]" * 400 + "}", "gravity: expected three numbers"),
+        ('{"gravity": ' + '[{"a":' * 200 + "1" + "}]" * 200 + "}", "found 1 entries"),
         ('{"a": ' + "[" * 200000, "nested too deeply"),
         ('{"gravity": [0, 0, 0], "\\u0000": 1}', "unknown key"),
     ],

@@ -18,8 +18,8 @@ from scene.scenes import arm
 
 KEYS = (
     "name type mass inertia ends tip axis axis2 lead normal initial q u law drive release "
-    "effort friction limits lower upper stiffness parameters position orientation inboard outboard on when "
-    "do hinge body from to gravity beam \x00 é"
+    "effort friction limits lower upper stiffness parameters position orientation inboard "
+    "outboard on when do hinge body from to gravity beam \x00 é"
 ).split(" ")
 LEAVES = st.one_of(
     st.none(),

@@ -151,7 +151,7 @@ def test_a_copy_that_lost_its_hinges_is_refused_too() -> None:
         topology.build(scene.model_copy(update={"hinge": scene.hinge[:1]}))
 
 
-def test_a_hundred_thousand_bodies_take_no_stack_and_linear_time() -> None:
+def test_forty_thousand_bodies_take_no_stack_and_linear_time() -> None:
     def seconds(n: int) -> float:
         """Time of `build` alone, for a chain put together without validation."""
         bodies = tuple(Body.model_construct(name=f"b{i}") for i in range(n))
@@ -167,6 +167,6 @@ def test_a_hundred_thousand_bodies_take_no_stack_and_linear_time() -> None:
         assert tree.is_chain and len(tree.links) == n
         return taken
 
-    small, large = seconds(10_000), seconds(100_000)
+    small, large = seconds(4_000), seconds(40_000)
     assert large < 60 * small  # ten times the bodies
-    assert large < 20
+    assert large < 10
