@@ -101,6 +101,8 @@ def main() -> None:
     work = cumulative_simpson(power, x=TIMES, initial=0.0)
     balance = energy - work
     growth = float(np.diff(balance).max())
+    reported = float(abs(result.energy() - energy).max())
+    lost = float(np.ptp(result.energy() - result.work))
     depth = np.array([arm.depths(q) for q in result.q])
     lowest = -arm.g * (arm.m1 * arm.c1 + arm.m2 * (arm.length + arm.c2))
     stiffness = np.array([[s["stiffness"]] for s in arm.stops])
@@ -111,7 +113,11 @@ def main() -> None:
     print(f"largest growth {growth:.1e} J")
     print(f"deepest {np.degrees(depth.max(axis=0)).max():.2f} deg of", end="")
     print(f" {np.degrees(bound).max():.2f} deg")
-    assert error < 1e-6
+    print(f"energy as reported {reported:.1e} J, less work of motor, friction, stops {lost:.1e} J")
+    assert error < 1e-7
+    # A stop that lets go without pulling loses its spring's rest of energy while no force acts:
+    # the step size does not see that power, so the reported work is less exact than the motion.
+    assert reported < 1e-12 and lost < 0.02
     assert growth < 1e-7
     assert balance[-1] < balance[0] - 1.0
     assert (depth.max(axis=0) < bound).all()

@@ -55,6 +55,8 @@ def main() -> None:
     side = np.stack([np.cos(angle), np.sin(angle)], 1)
     force = radial[:, None] * along + across[:, None] * side + [0, MASS * GRAVITY]
     load = float(abs(result.force("motor")[:n, :2] - force).max())
+    moment = result.moment("motor")[:, 2] - ours
+    balance = float(np.ptp(result.energy() - result.work))
     free = float(abs(result.q[m:, 0] - released(after)).max())
 
     work = simpson(ours[:n] * speed, x=before)
@@ -62,7 +64,9 @@ def main() -> None:
     energy = kinetic + MASS * GRAVITY * ARM * (np.cos(angle[0]) - np.cos(angle[-1]))
     print(f"driven motion {driven:.1e}, effort {torque:.1e} N m, force {load:.1e} N")
     print(f"work {work:.6f} J, energy {energy:.6f} J; released: angle {free:.1e} rad")
-    assert driven < 1e-12 and torque < 1e-10 and load < 1e-10
+    print(f"energy less work {balance:.1e} J")
+    assert driven < 1e-14 and torque < 1e-13 and load < 1e-13
+    assert abs(moment).max() < 1e-13 and balance < 1e-9
     assert after_torque < 1e-12
     assert abs(work - energy) < 1e-7
     assert free < 1e-9

@@ -74,7 +74,8 @@ class Top:
 
     def steady(self, spin: float) -> Array:
         """Slow and fast precession rate at the initial lean."""
-        return np.roots([self.A * np.cos(self.lean), -self.C * spin, self.weight * self.arm])
+        quadratic = [self.A * np.cos(self.lean), -self.C * spin, self.weight * self.arm]
+        return np.asarray(np.roots(quadratic).real, np.float64)
 
 
 def simulate(data: dict[str, Any]) -> mstmm.Result:

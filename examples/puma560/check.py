@@ -103,7 +103,7 @@ def explicit_mass_matrix(q: Array) -> Array:
 
 # --- the toolbox's data (standard Denavit-Hartenberg: a, d, alpha) and its numbers at qn ---------
 
-TOOLBOX = {
+TOOLBOX: dict[str, Any] = {
     "a": [0, 0.4318, 0.0203, 0, 0, 0],
     "d": [0, 0, 0.15005, 0.4318, 0, 0],
     "alpha": [np.pi / 2, 0, -np.pi / 2, np.pi / 2, -np.pi / 2, 0],

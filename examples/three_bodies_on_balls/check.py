@@ -86,7 +86,7 @@ class NewtonEuler:
                 A[rows, force + 3 : force + 6] = tilde(tip - c)
             reach[:, own] -= tilde(tip)
             offset = offset + np.cross(w, np.cross(w, tip))
-        x = np.linalg.solve(A, b)
+        x = np.asarray(np.linalg.solve(A, b), np.float64)
         return x[: 3 * n].reshape(n, 3), x[3 * n :].reshape(n, 3)
 
     def rate(self, t: float, state: Array) -> Array:
@@ -108,9 +108,9 @@ def main() -> None:
     other = solve_ivp(
         reference.rate, (0.0, TIMES[-1]), reference.start, "DOP853", TIMES, rtol=1e-11, atol=1e-12
     )
-    turn = tip = force = 0.0
+    turn = tip = force = spin = 0.0
     for k, state in enumerate(other.y.T):
-        forces = reference.solve(state)[1]
+        alpha, forces = reference.solve(state)
         point = np.zeros(3)
         for i, part in enumerate(state.reshape(3, 7)):
             R = rotation(part[:4])
@@ -119,13 +119,16 @@ def main() -> None:
             turn = max(turn, float(abs(ours - R).max()))
             ours = result.force(f"ball{2 * i}")[k]
             force = max(force, float(abs(ours - forces[i]).max()))
+            ours = result.angular_acceleration(f"body{i + 1}")[k]
+            spin = max(spin, float(abs(ours - alpha[i]).max()))
         tip = max(tip, float(abs(result.position("body3.tip")[k] - point).max()))
     energy = result.energy()
     drift = float(np.ptp(energy))
-    print(f"orientation {turn:.1e}, tip {tip:.1e} m, force {force:.1e} N, energy {drift:.1e} J")
-    assert turn < 1e-7 and tip < 1e-7
-    assert force < 1e-5
-    assert drift < 1e-8
+    print(f"orientation {turn:.1e}, tip {tip:.1e} m, force {force:.1e} N, ", end="")
+    print(f"angular acceleration {spin:.1e} rad/s2, energy {drift:.1e} J")
+    assert turn < 2e-9 and tip < 1e-9
+    assert force < 1e-7 and spin < 1e-6
+    assert drift < 2e-9
 
 
 if __name__ == "__main__":

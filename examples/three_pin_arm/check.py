@@ -95,9 +95,9 @@ def main() -> None:
     drift, momentum = np.ptp(energies), np.ptp(momenta)
     ours = abs(np.diff(result.energy()) - np.diff(energies)).max()
     print(f"angles {angle:.1e} rad, energy {drift:.1e} J, momentum {momentum:.1e} N m s")
-    assert angle < 1e-7
+    assert angle < 1e-9
     assert drift < 1e-8 and momentum < 1e-9
-    assert ours < 1e-9
+    assert ours < 1e-11
 
 
 if __name__ == "__main__":

@@ -64,8 +64,8 @@ def main() -> None:
     print("orders in 1/k", " ".join(f"{o:.2f}" for o in orders))
     print(f"gap times k over hinge force: {ratio.min():.3f} to {ratio.max():.3f}")
     assert errors[-1] < 1e-3
-    assert all(0.8 < order < 1.2 for order in orders[1:])
-    assert ratio.min() > 0.9 and ratio.max() < 1.1
+    assert all(0.95 < order < 1.05 for order in orders)
+    assert ratio.min() > 0.95 and ratio.max() < 1.05
 
 
 if __name__ == "__main__":
