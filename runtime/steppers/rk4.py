@@ -20,6 +20,6 @@ def tableau() -> Tableau:
         B=frozen(weights),
         C=frozen([0.0, 0.5, 0.5, 1.0]),
         dense=hermite(weights),
-        dense_order=4,
+        dense_order=3,
         source="Kutta (1901)",
     )

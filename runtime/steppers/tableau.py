@@ -40,7 +40,8 @@ class Tableau:
         B: (s,) weights of the step.
         C: (s,) nodes, `C[0] = 0`.
         dense: (s + 1 + e, d) dense-output weights in the basis of the module's docstring.
-        dense_order: order of the dense output as a whole.
+        dense_order: order q of the dense output: it errs by O(h^(q + 1)) within a step, so that a
+            run is accurate to min(order, q + 1) everywhere.
         E: (s + 1,) weights of the error estimate; None for fixed steps only.
         error_order: order of that estimate; a step is scaled by norm**(-1 / (error_order + 1)).
         E_low: (s + 1,) second estimate of lower order, combined with E as

@@ -9,8 +9,7 @@
 typedef struct parameters {
   double p[8];
   double memory[4];
-  long calls;
-  double last_t; /* of the last call of a right-hand side */
+  long calls; /* whatever the system counts */
 } parameters;
 
 static int harmonic(void *context, double t, const double *y, double *dy) {
@@ -55,6 +54,26 @@ static int piecewise(void *context, double t, const double *y, double *dy) {
   parameters *at = context;
   dy[0] = t < at->p[0] ? cos(t) : y[0];
   if (t == at->p[0]) at->calls++;
+  return 0;
+}
+
+/* A quaternion turning at p[0], p[1], p[2] in its own axes, used normalised */
+static int turning(void *context, double t, const double *y, double *dy) {
+  const double *w = ((parameters *)context)->p;
+  const double r = 0.5 / sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]);
+  (void)t;
+  dy[0] = r * (-y[1] * w[0] - y[2] * w[1] - y[3] * w[2]);
+  dy[1] = r * (y[0] * w[0] + y[2] * w[2] - y[3] * w[1]);
+  dy[2] = r * (y[0] * w[1] - y[1] * w[2] + y[3] * w[0]);
+  dy[3] = r * (y[0] * w[2] + y[1] * w[1] - y[2] * w[0]);
+  return 0;
+}
+
+static int normalise(void *context, double t, double *y) {
+  const double r = 1.0 / sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]);
+  (void)context;
+  (void)t;
+  for (int i = 0; i < 4; i++) y[i] *= r;
   return 0;
 }
 
@@ -109,7 +128,7 @@ static int bounce(void *context, int event, double t, double *y) {
   return MSTMM_FIRE_RESTART;
 }
 
-/* rotating: y = (cos t, sin t); events from p: 0: y1 >= p[0]; 1: t >= p[1]; 2: y0 >= p[2] */
+/* Three thresholds: y1 >= p[3], t >= p[4], y0 >= p[5] */
 static int three_events(void *context, double t, const double *y, double *g) {
   const double *p = ((parameters *)context)->p;
   g[0] = y[1] - p[3];
@@ -118,7 +137,7 @@ static int three_events(void *context, double t, const double *y, double *g) {
   return 0;
 }
 
-/* Appends the event's number to memory[1] as a decimal digit; answers p[6] */
+/* Appends the event's number, counted from 1, to `calls` as a digit; answers p[6] */
 static int log_fire(void *context, int event, double t, double *y) {
   parameters *at = context;
   (void)t;
@@ -135,6 +154,25 @@ static int count_accepts(void *context, double t, double *y) {
   return at->p[7] != 0.0 ? (int)at->p[7] : 0;
 }
 
+/* p[0] = omega, zeta = p[1], tied to a slow oscillator of frequency 1 */
+static int stiff_spring(void *context, double t, const double *y, double *dy) {
+  const double *p = ((parameters *)context)->p;
+  (void)t;
+  dy[0] = y[1];
+  dy[1] = -y[0];
+  dy[2] = y[3];
+  dy[3] = -p[0] * p[0] * (y[2] - y[0]) - 2.0 * p[1] * p[0] * y[3];
+  return 0;
+}
+
+/* y = (x, work of a force cos t): the quadrature y' = x cos t does not steer the step */
+static int quadrature(void *context, double t, const double *y, double *dy) {
+  (void)context;
+  dy[0] = -y[0];
+  dy[1] = 1e6 * y[0] * cos(50.0 * t);
+  return 0;
+}
+
 static int linear_many(void *context, double t, const double *y, double *dy) {
   const int n = (int)((parameters *)context)->p[0];
   (void)t;
@@ -142,7 +180,7 @@ static int linear_many(void *context, double t, const double *y, double *dy) {
   return 0;
 }
 
-/* y' = 0 for n components: what is left is the cost of the loop */
+/* y' = y without arithmetic: what is left is the cost of the loop */
 static int nothing(void *context, double t, const double *y, double *dy) {
   const int n = (int)((parameters *)context)->p[0];
   (void)t;
@@ -156,6 +194,13 @@ typedef struct named {
   rhs_function rhs;
 } named;
 
+parameters *test_parameters(void);
+int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int n_error);
+void test_use_bounce(mstmm_system *system, parameters *at);
+void test_use_three(mstmm_system *system, parameters *at);
+void test_use_normalise(mstmm_system *system);
+void test_use_accept(mstmm_system *system, parameters *at);
+
 parameters *test_parameters(void) { return calloc(1, sizeof(parameters)); }
 
 int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int n_error) {
@@ -163,7 +208,8 @@ int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int 
       {"harmonic", harmonic},   {"mixed", mixed},         {"arenstorf", arenstorf},
       {"van_der_pol", van_der_pol}, {"piecewise", piecewise}, {"growth", growth},
       {"blow_up", blow_up},     {"failing", failing},     {"falling", falling},
-      {"linear_many", linear_many}, {"nothing", nothing},
+      {"linear_many", linear_many}, {"nothing", nothing}, {"stiff_spring", stiff_spring},
+      {"quadrature", quadrature}, {"turning", turning},
   };
   memset(system, 0, sizeof *system);
   system->context = at;
@@ -189,6 +235,8 @@ void test_use_three(mstmm_system *system, parameters *at) {
   system->n_memory = 2;
   system->memory = at->memory;
 }
+
+void test_use_normalise(mstmm_system *system) { system->accept = normalise; }
 
 void test_use_accept(mstmm_system *system, parameters *at) {
   system->accept = count_accepts;

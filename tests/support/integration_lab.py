@@ -23,11 +23,12 @@ SOURCES = ("engine_integrate", "engine_step", "engine_event")
 HEADERS = ("engine_integrate", "engine_step")
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
 TEST_DECLARATIONS = """
-typedef struct parameters { double p[8]; double memory[4]; long calls; double last_t; } parameters;
+typedef struct parameters { double p[8]; double memory[4]; long calls; } parameters;
 parameters *test_parameters(void);
 int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int n_error);
 void test_use_bounce(mstmm_system *system, parameters *at);
 void test_use_three(mstmm_system *system, parameters *at);
+void test_use_normalise(mstmm_system *system);
 void test_use_accept(mstmm_system *system, parameters *at);
 """
 
@@ -74,7 +75,7 @@ class Lab:
         sources.append(folder / TEST_SYSTEMS.name)
         self.ffi = cffi.FFI()
         self.ffi.cdef(cdef(folder / "engine_integrate.h") + TEST_DECLARATIONS)
-        options = ("-Wno-missing-prototypes", "-O2", *flags)
+        options = ("-O2", *flags)
         self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
 
     def problem(self, rhs: str, n: int, *p: float, n_error: int | None = None) -> Problem:

@@ -1,0 +1,140 @@
+"""However a run is cut into slices, buffers or processes, the numbers are the same bits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.integration_lab import Lab, Problem, same_bits
+
+from mstmm.errors import SceneError
+from mstmm.runtime.integrate import Run, Samples, Status
+
+START = (1.0, 0.0)
+CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    "every step": ("dop853", {"rtol": 1e-10, "atol": 1e-12}),
+    "output times": (
+        "dop853",
+        {"rtol": 1e-8, "atol": 1e-10, "output_times": np.linspace(0, 1.5, 301)},
+    ),
+    "breaks": ("dopri5", {"rtol": 1e-9, "atol": 1e-12, "breaks": [0.2, 0.7]}),
+    "fixed": ("rk4", {"step": 1e-3, "output_times": np.linspace(0, 1.5, 77)}),
+}
+
+
+def bouncing(lab: Lab) -> Problem:
+    """A bouncing body: events, memory and accept at work."""
+    problem = lab.problem("falling", 2, 0.8)
+    lab.lib.test_use_accept(problem.system, problem.at)
+    lab.lib.test_use_bounce(problem.system, problem.at)
+    problem.at.p[7] = -1.0  # accept says that the first stage is invalid
+    return problem
+
+
+def whole(lab: Lab, case: str) -> tuple[Samples, Run]:
+    method, options = CASES[case]
+    run = bouncing(lab).solved(method, 1.5, START, **options)
+    return run.samples, run
+
+
+def equal(a: Samples, b: Samples) -> bool:
+    pairs = ((a.t, b.t), (a.y, b.y), (a.memory, b.memory), (a.event, b.event))
+    return all(same_bits(x, y) for x, y in pairs)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_slices_and_small_buffers_change_nothing(lab: Lab, case: str) -> None:
+    wanted, reference = whole(lab, case)
+    assert wanted.event.any()
+    method, options = CASES[case]
+    for capacity in (2, 3, 7):
+        run = bouncing(lab).run(method, 1.5, START, capacity=capacity, **options)
+        slices = 0
+        while run.advance(0.0) is Status.RUNNING:
+            slices += 1
+        assert slices > 5
+        assert run.status is Status.FINISHED
+        assert equal(run.samples, wanted)
+        assert run.statistics == reference.statistics
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_saved_run_continues_bit_for_bit(lab: Lab, case: str) -> None:
+    wanted, reference = whole(lab, case)
+    method, options = CASES[case]
+    run = bouncing(lab).run(method, 1.5, START, capacity=2, **options)
+    parts, sizes = [], set()
+    while True:  # a fresh run after every buffer, also in the middle of a step
+        status = lab.lib.mstmm_advance(run._run, float("inf"))
+        run._drain()
+        parts.append(run.take())
+        state = run.state()
+        sizes.add(len(state["real"]))
+        if status != Status.BUFFER_FULL:
+            break
+        run = bouncing(lab).run(method, 1.5, START, capacity=2, **options)
+        run.restore(state)
+    assert status == Status.FINISHED
+    assert equal(Samples.joined(parts), wanted)
+    assert run.statistics == reference.statistics
+    assert len(sizes) == 2, sizes  # between steps little is kept, within a step everything
+
+
+CONTINUE = """
+import sys
+import numpy as np
+from pathlib import Path
+from support.integration_lab import Lab
+import test_restart as here
+
+folder = Path(sys.argv[1])
+method, options = here.CASES["output times"]
+lab = Lab(folder)
+run = here.bouncing(lab).run(method, 1.5, here.START, **options)
+run.restore(np.load(folder / "state.npz"))
+while run.advance(1.0) == 0:
+    pass
+np.savez(folder / "rest.npz", t=run.samples.t, y=run.samples.y, memory=run.samples.memory)
+"""
+
+
+def test_another_process_continues_bit_for_bit(lab: Lab, tmp_path: Path) -> None:
+    wanted, _ = whole(lab, "output times")
+    method, options = CASES["output times"]
+    run = bouncing(lab).run(method, 1.5, START, **options)
+    while run.t < 0.8:
+        run.advance(0.0)
+    first = run.take()
+    state = run.state()
+    np.savez(tmp_path / "state.npz", real=state["real"], integer=state["integer"])
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[1]), *sys.path]
+    done = subprocess.run(
+        [sys.executable, "-c", CONTINUE, str(tmp_path)],
+        env={"PYTHONPATH": ":".join(filter(None, paths)), "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    rest = np.load(tmp_path / "rest.npz")
+    assert 0 < len(first.t) < len(wanted.t)
+    assert same_bits(np.concatenate([first.t, rest["t"]]), wanted.t)
+    assert same_bits(np.concatenate([first.y, rest["y"]]), wanted.y)
+    assert same_bits(np.concatenate([first.memory, rest["memory"]]), wanted.memory)
+
+
+def test_a_foreign_state_is_refused(lab: Lab) -> None:
+    run = bouncing(lab).run("dop853", 1.5, START)
+    other = bouncing(lab).run("dopri5", 1.5, START)
+    with pytest.raises(SceneError, match="another scene, method or version"):
+        run.restore(other.state())
+    state = run.state()
+    with pytest.raises(SceneError, match="another scene"):
+        run.restore({"real": state["real"][:-1], "integer": state["integer"]})
+    fresh = bouncing(lab).run("dop853", 1.5, START)
+    fresh.restore(state)
+    assert fresh.advance(10.0) is Status.FINISHED
