@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +43,11 @@ class Observation:
     efforts: Array
     udot: Array
     sums: Array
+    failures: tuple[str, ...] = ()
+
+
+#: The arrays of an Observation.
+PARTS = ("points", "loads", "efforts", "udot", "sums")
 
 
 class Engine:
@@ -129,30 +134,48 @@ class Engine:
         return records
 
     def observe(
-        self, t: Array, q: Array, u: Array, memory: Array, probes: Sequence[Probe] = ()
+        self,
+        t: Array,
+        q: Array,
+        u: Array,
+        memory: Array,
+        probes: Sequence[Probe] = (),
+        parts: Collection[str] = PARTS,
     ) -> Observation:
-        """Everything observable of n states."""
-        n = len(t)
+        """What `parts` name of n states.
+
+        A state that cannot be evaluated gives nan in its row and a sentence in `failures`; arrays
+        that are not asked for have no columns.
+        """
+        n, place = len(t), {name: i for i, name in enumerate(PARTS)}
         bodies, numbers = len(self.packed.topology.links), int(self.lib.MSTMM_PROBE_NUMBERS)
-        result = Observation(
-            np.empty((n, len(probes), numbers)), np.empty((n, bodies, 6)),
-            np.empty((n, self.nu)), np.empty((n, self.nu)),
-            np.empty((n, int(self.lib.MSTMM_SUM_NUMBERS))),
-        )  # fmt: skip
-        records = self.probes(probes)
+        shapes = [
+            (len(probes), numbers), (bodies, 6), (self.nu,), (self.nu,),
+            (int(self.lib.MSTMM_SUM_NUMBERS),),
+        ]  # fmt: skip
+        arrays = [
+            np.full((n, *shape) if name in parts else (n, *shape[:-1], 0), np.nan)
+            for name, shape in zip(PARTS, shapes, strict=True)
+        ]
+        states = [np.ascontiguousarray(x, dtype=np.float64) for x in (t, q, u, memory)]
         wanted = self.ffi.new("mstmm_observation *")
+        records = self.probes(probes)
         wanted.n_probes, wanted.probes = len(probes), records
-        for name in ("points", "loads", "efforts", "udot", "sums"):
-            setattr(wanted, name, self.pointer(getattr(result, name)))
         failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
-        code = self.lib.mstmm_observe_many(
-            self.packed.model, self.workspace(), n,
-            *(self.pointer(np.ascontiguousarray(x)) for x in (t, q, u, memory)),
-            wanted, failure, at,
-        )  # fmt: skip
-        if code:
-            raise NumericalFailure(self.failure_text(failure, float(t[at[0]])))
-        return result
+        failures, first = [], 0
+        while first < n:
+            for name in parts:
+                setattr(wanted, name, self.pointer(arrays[place[name]][first:]))
+            code = self.lib.mstmm_observe_many(
+                self.packed.model, self.workspace(), n - first,
+                *(self.pointer(x[first:]) for x in states), wanted, failure, at,
+            )  # fmt: skip
+            if not code:
+                break
+            failures.append(self.failure_text(failure, float(states[0][first + int(at[0])])))
+            first += int(at[0]) + 1
+        points, loads, efforts, udot, sums = arrays
+        return Observation(points, loads, efforts, udot, sums, tuple(failures))
 
     # --- words ----------------------------------------------------------------------------------
 

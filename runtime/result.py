@@ -1,13 +1,18 @@
-"""Result of a run: named, labelled quantities over time (first form: states and status)."""
+"""Result of a run: named, labelled quantities over time, with units, and what vouches for them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .integrate import Statistics, Status
+from .layout import HingeSlots
+from .observed import Observed
+from .quantities import Quantities, Quantity
 from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
 
 if TYPE_CHECKING:
@@ -17,12 +22,182 @@ Array = NDArray[np.float64]
 
 
 class Result:
-    """States of a run; see `Trajectory`."""
+    """What a run gave: states, and everything that follows from them, over the sample times.
+
+    Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
+    Quantities beyond q and u are computed in one batch when the first of them is asked for, and
+    kept (their arrays are read-only).  Where a sample cannot be evaluated they are nan and
+    `warnings` says so.
+
+    Attributes:
+        model: the model that ran.
+        t: (n,) s.  Equal neighbours stand just before and just after an event.
+        q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
+        u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
+        event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
+        success: the run reached its end, or an event stopped it, and every number is finite.
+        status: why it ended; None if it was interrupted.
+        message: the same as a sentence.
+        statistics: counts of the integrator; None for runs of other integrators.
+        settings: how the run was made.
+    """
 
     def __init__(self, model: Model, run: Trajectory) -> None:
         self.model, self.trajectory = model, run
-        self.t, self.q, self.u = run.t, run.q, run.u
-        self.success, self.message = run.success, run.message
+        self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
+        self.status, self.message = run.status, run.message
+        self.statistics: Statistics | None = run.statistics
+        self.settings: Settings = run.settings
+        self._observed = Observed(model, run)
+        self._quantities = Quantities(self._observed)
+
+    @property
+    def success(self) -> bool:
+        """True if the run reached its end or was stopped by an event, with finite numbers."""
+        return self.trajectory.success
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is worth knowing before the numbers are used, one sentence each."""
+        scene = self.model.scene.warnings
+        return (*scene, *self.trajectory.notes, *self._observed.failures)
+
+    # --- bodies and ends ------------------------------------------------------------------------
+
+    def position(self, reference: str) -> Array:
+        """Position (n, 3) in m of "rod1" (its origin) or "rod1.tip".
+
+        Here and below: SceneError, with the nearest name, for one that is not in the scene.
+        """
+        return self._quantities.of_body(reference, "position")
+
+    def velocity(self, reference: str) -> Array:
+        """Velocity (n, 3) in m/s."""
+        return self._quantities.of_body(reference, "velocity")
+
+    def acceleration(self, reference: str) -> Array:
+        """Acceleration (n, 3) in m/s2, gravity not subtracted."""
+        return self._quantities.of_body(reference, "acceleration")
+
+    def orientation(self, reference: str) -> Array:
+        """Unit quaternion (n, 4), w, x, y, z, of the user's axes to inertial axes.
+
+        Its sign is continuous over time and w >= 0 in the first sample.
+        """
+        return self._quantities.of_body(reference, "orientation")
+
+    def angular_velocity(self, reference: str) -> Array:
+        """Angular velocity (n, 3) in rad/s."""
+        return self._quantities.of_body(reference, "angular_velocity")
+
+    def angular_acceleration(self, reference: str) -> Array:
+        """Angular acceleration (n, 3) in rad/s2."""
+        return self._quantities.of_body(reference, "angular_acceleration")
+
+    # --- hinges ---------------------------------------------------------------------------------
+
+    def coordinate(self, hinge: str) -> Array:
+        """Coordinates (n, nq) of one hinge."""
+        return self.q[:, self._quantities.slots(hinge).q_slice]
+
+    def speed(self, hinge: str) -> Array:
+        """Speeds (n, nu) of one hinge."""
+        return self.u[:, self._quantities.slots(hinge).u_slice]
+
+    def force(self, hinge: str) -> Array:
+        """Force (n, 3) in N of the inboard on the outboard side of a hinge, inertial axes."""
+        return self._quantities.of_hinge(hinge, "force")
+
+    def moment(self, hinge: str) -> Array:
+        """Moment (n, 3) in N*m of the inboard on the outboard side about P, inertial axes."""
+        return self._quantities.of_hinge(hinge, "moment")
+
+    def effort(self, hinge: str) -> Array:
+        """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
+        return self._quantities.effort(hinge)
+
+    def layout(self, hinge: str) -> HingeSlots:
+        """Names, units and places of a hinge's coordinates and speeds."""
+        return self._quantities.slots(hinge)
+
+    @property
+    def udot(self) -> Array:
+        """Accelerations (n, nu) of the hinge speeds, m/s2, rad/s2."""
+        return self._observed.part("udot")
+
+    # --- sums -----------------------------------------------------------------------------------
+
+    def energy(self) -> Array:
+        """Total energy (n,) in J: kinetic, gravity (zero at the inertial origin), springs."""
+        return self._quantities.sum("energy")
+
+    def energies(self) -> dict[str, Array]:
+        """The three parts of the energy, (n,) each in J: kinetic, gravity, springs."""
+        names = ("kinetic", "gravity", "springs")
+        return {name: self._quantities.sum(f"energy.{name}") for name in names}
+
+    def power(self) -> Array:
+        """Power (n,) in W of everything that is not stored: dampers, efforts, loads, drives."""
+        return self._quantities.sum("power")
+
+    @property
+    def work(self) -> Array:
+        """Integral (n,) of `power` in J from the start."""
+        return self.trajectory.work
+
+    def momentum(self) -> Array:
+        """Linear momentum (n, 3) in kg*m/s of the whole scene."""
+        return self._quantities.sum("momentum")
+
+    def angular_momentum(self) -> Array:
+        """Angular momentum (n, 3) in kg*m2/s of the whole scene about the inertial origin."""
+        return self._quantities.sum("angular_momentum")
+
+    # --- by name --------------------------------------------------------------------------------
+
+    def names(self) -> tuple[str, ...]:
+        """Every name that `quantity`, `plot` and `table` take."""
+        return tuple(self._quantities.table)
+
+    def quantity(self, name: str) -> Quantity:
+        """Values with unit by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy"."""
+        return self._quantities.get(name)
+
+    # --- out ------------------------------------------------------------------------------------
+
+    def to_xarray(self) -> Any:
+        """`xarray.Dataset` of every quantity with dimensions, units and provenance (extra: io)."""
+        from .dataset import dataset
+
+        return dataset(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write ".nc" (NetCDF, extra: io) or ".csv" (a column per number); returns the path.
+
+        The file appears under its name when it is whole.  EnvironmentFailure if the extra is
+        missing or the file cannot be written.
+        """
+        from .storage import save
+
+        return save(self, Path(path))
+
+    def table(self, *names: str, rows: int = 12) -> str:
+        """A text table of some samples; by default of every hinge coordinate and the energy."""
+        from .table import table
+
+        return table(self, names, rows)
+
+    def plot(self, *names: str, path: str | Path | None = None, title: str | None = None) -> Any:
+        """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
+
+        Without names, the hinge coordinates.  With `path`, also written there (.png, .svg, .pdf).
+        """
+        from .plot import plot
+
+        return plot(self, names, None if path is None else Path(path), title)
+
+    def __repr__(self) -> str:
+        return f"<Result: {self.message}; {len(self.t)} samples>"
 
 
 def simulate(
@@ -42,3 +217,16 @@ def simulate(
     observe = None if progress is None else lambda r: progress(r.t, settings.t_end)
     status = advance(run, observe)
     return Result(model, trajectory(system, run, settings, status))
+
+
+def load_result(path: str | Path) -> Result:
+    """A result saved as NetCDF, with its scene compiled again, so that every quantity is there.
+
+    Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
+    """
+    from .storage import load
+
+    return load(Path(path))
+
+
+__all__ = ["Quantity", "Result", "Status", "load_result", "simulate"]

@@ -43,7 +43,11 @@ class Settings:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,)."""
+    """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
+
+    q and u hold unit quaternions and exact driven coordinates; `norm_residual` is how far the
+    quaternions' lengths were from 1 before.
+    """
 
     t: Array
     q: Array
@@ -57,6 +61,7 @@ class Trajectory:
     statistics: Statistics
     fail_time: float | None = None
     notes: tuple[str, ...] = field(default=())
+    norm_residual: float = 0.0
 
     @property
     def success(self) -> bool:
@@ -201,7 +206,7 @@ def trajectory(
     """Samples of a run, split into coordinates, speeds and work."""
     samples = run.samples
     nq, nu = system.engine.nq, system.engine.nu
-    y = samples.y
+    y, residual = settled(system.engine, samples.t, samples.y, samples.memory)
     work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
     failure = run.failure
     message = (
@@ -210,7 +215,27 @@ def trajectory(
     return Trajectory(
         samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
         message, settings, run.statistics, None if failure is None else failure.time,
+        norm_residual=residual,
     )  # fmt: skip
+
+
+def settled(engine: Engine, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
+    """Samples (n, n_state) with unit quaternions and exact driven coordinates.
+
+    Between steps the samples are the method's dense output, which meets both only within the
+    tolerance.  Also returns the largest distance of a quaternion's length from 1.
+    """
+    y, residual = y.copy(), 0.0
+    for k in engine.packed.layout.quaternions:
+        lengths = np.sqrt(np.sum(y[:, k : k + 4] ** 2, axis=1))
+        residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
+        y[:, k : k + 4] /= lengths[:, None]
+    if engine.packed.model.n_drives:
+        system = SceneSystem(engine)
+        for time, known, row in zip(t, memory, y, strict=True):
+            system.memory[: len(known)] = known
+            engine.lib.mstmm_scene_settle(system.run, time, engine.pointer(row))
+    return y, residual
 
 
 def _message(system: SceneSystem, run: Run) -> str:

@@ -1,0 +1,120 @@
+"""Pictures of a result: any quantities by name over time, one panel per unit (extra: plot)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.errors import SceneError
+
+from .dataset import extra
+from .storage import replacing
+from .table import default_names
+
+if TYPE_CHECKING:
+    from .quantities import Quantity
+    from .result import Result
+
+#: Colours that stay apart in grey and for colour-blind readers (Okabe and Ito, 2008).
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442")
+
+_STYLE: dict[str, Any] = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.7,
+    "axes.edgecolor": "#555555",
+    "axes.axisbelow": True,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-4, 5),
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "savefig.dpi": 150,
+}
+
+#: Points of a smooth curve between samples of the integrator's own steps.
+_FINE = 1500
+
+_UNIT_TEXT = {
+    "N*m": "N m",
+    "m/s2": "m/s²",
+    "rad/s2": "rad/s²",
+    "kg*m/s": "kg m/s",
+    "kg*m2/s": "kg m²/s",
+}
+
+
+def plot(result: Result, names: Sequence[str], path: Path | None, title: str | None) -> Any:
+    """`matplotlib.figure.Figure`; see `Result.plot`.
+
+    Raises SceneError for an unknown name or file type, EnvironmentFailure without the extra.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise extra("plot", "a picture", error) from None
+    quantities = [result.quantity(name) for name in list(names) or default_names(result)]
+    if not quantities:
+        raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")
+    panels = _panels(quantities)
+    style: Any = _STYLE
+    with mpl.rc_context(style):
+        size = (7.5, 1.0 + 2.3 * len(panels))
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, panel in zip(axes, panels, strict=True):
+            _draw(axis, result, panel)
+        axes[-1].set_xlabel("time in s")
+        if title:
+            figure.suptitle(title)
+        if path is not None:
+            _write(figure, path)
+    return figure
+
+
+def _panels(quantities: Sequence[Quantity]) -> list[list[Quantity]]:
+    """Quantities of one unit together, in the order of their first ones."""
+    panels: dict[str, list[Quantity]] = {}
+    for quantity in quantities:
+        panels.setdefault(quantity.unit, []).append(quantity)
+    return list(panels.values())
+
+
+def _draw(axis: Any, result: Result, panel: Sequence[Quantity]) -> None:
+    """The curves of one panel, broken where an event makes them jump."""
+    axis.set_prop_cycle(color=_COLOURS)
+    lines = 0
+    for quantity in panel:
+        labels = [f"{quantity.name}.{x}" for x in quantity.labels] or [quantity.name]
+        columns = quantity.values.reshape(len(result.t), -1).T
+        for label, values in zip(labels, columns, strict=True):
+            axis.plot(*_broken(result.t, values), label=label)
+            lines += 1
+    unit = panel[0].unit
+    name = panel[0].name if lines == 1 else ""
+    text = _UNIT_TEXT.get(unit, unit)
+    axis.set_ylabel(" in ".join(x for x in (name, text) if x))
+    axis.margins(x=0.01)
+    if lines > 1:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.4)
+
+
+def _broken(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Time and values with a gap where two samples share one time."""
+    jumps = np.flatnonzero(np.diff(t) == 0) + 1
+    return np.insert(t, jumps, np.nan), np.insert(values, jumps, np.nan)
+
+
+def _write(figure: Any, path: Path) -> None:
+    known = figure.canvas.get_supported_filetypes()
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in known:
+        raise SceneError(f'picture "{path}": expected a name that ends in .png, .svg or .pdf')
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind)

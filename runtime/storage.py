@@ -1,0 +1,110 @@
+"""Results to and from files: NetCDF through xarray and h5netcdf (extra: io), and CSV."""
+
+from __future__ import annotations
+
+import csv
+import os
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.scene import Scene
+
+from . import provenance
+from .dataset import dataset, extra
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+def save(result: Result, path: Path) -> Path:
+    """Write a result; the suffix says how."""
+    writers: dict[str, Callable[[Result, Path], None]] = {".nc": _netcdf, ".csv": _csv}
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        raise SceneError(f'result file "{path}": expected a name that ends in .nc or .csv')
+    with replacing(path) as temporary:
+        writer(result, temporary)
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file that takes the name `path` when the block ends well.
+
+    Raises EnvironmentFailure, with the old file untouched, if anything cannot be written.
+    """
+    temporary: Path | None = None
+    try:
+        handle, name = tempfile.mkstemp(path.suffix, f".{path.stem}.", path.parent)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise EnvironmentFailure(f'"{path}" cannot be written: {reason}') from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def _netcdf(result: Result, path: Path) -> None:
+    data = dataset(result)
+    try:
+        import h5netcdf  # noqa: F401
+    except ImportError as error:
+        raise extra("io", "a NetCDF file", error) from None
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def _csv(result: Result, path: Path) -> None:
+    """One row per sample, one column per number; the header holds names and units."""
+    quantities = [result.quantity(name) for name in result._quantities.scalars]
+    header = ["time [s]", "event"]
+    header += [f"{q.name} [{q.unit}]" if q.unit else q.name for q in quantities]
+    columns = [result.t.tolist(), result.event.tolist(), *(q.values.tolist() for q in quantities)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(zip(*columns, strict=True))
+
+
+def load(path: Path) -> Result:
+    """A result from NetCDF; its scene is validated and compiled again."""
+    try:
+        import h5netcdf  # noqa: F401
+        import xarray
+    except ImportError as error:
+        raise extra("io", "a NetCDF file", error) from None
+    try:
+        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+            data = file.load()
+    except FileNotFoundError:
+        raise SceneError(f'result file "{path}": there is no such file') from None
+    except (OSError, ValueError, KeyError) as error:
+        raise SceneError(f'result file "{path}": not a NetCDF file ({error})') from None
+    if data.attrs.get("format") != "mstmm result" or "scene" not in data:
+        raise SceneError(f'result file "{path}": not a result of mstmm')
+    if int(data.attrs["format_version"]) > provenance.FORMAT:
+        raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
+    return _rebuilt(data, path)
+
+
+def _rebuilt(data: Any, path: Path) -> Result:
+    from .model import Model
+    from .result import Result
+
+    scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
+    run = provenance.trajectory(data)
+    model = Model(scene)
+    if run.q.shape[1] != model.nq or run.u.shape[1] != model.nu:
+        raise SceneError(f'result file "{path}": its states do not fit its scene')
+    return Result(model, run)
