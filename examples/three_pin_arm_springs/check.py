@@ -31,7 +31,7 @@ def run(scene: mstmm.Scene) -> mstmm.Result:
     return result
 
 
-def softer(scale: float) -> mstmm.Scene:
+def stiffer(scale: float) -> mstmm.Scene:
     """The scene with its stiffness times `scale` and its damping times the square root."""
     with (HERE / "scene.toml").open("rb") as file:
         data = tomllib.load(file)
@@ -54,7 +54,7 @@ def main() -> None:
     loads = np.stack([pins.force(name) for name in ("pin0", "pin2", "pin4")], axis=1)
     errors = []
     for scale in SCALES:
-        result = run(softer(scale))
+        result = run(stiffer(scale))
         errors.append(float(abs(angles(result) - pins.q).max()))
         gaps = np.stack([result.q[:, 7 * i : 7 * i + 3] for i in range(3)], axis=1)
     stiffness = 1e5 * SCALES[-1]
