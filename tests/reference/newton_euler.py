@@ -47,7 +47,6 @@ class Accelerations:
     force: Array
     moment: Array
     effort: Array
-    condition: float
 
 
 def relative(hinge: Hinge, q: Array, u: Array) -> Relative:
@@ -209,7 +208,7 @@ def solve(
 
 
 def _unpack(tree: Tree, system: _System, powers: list[Array]) -> Accelerations:
-    x, condition = _refined(system.matrix, system.right)
+    x = _refined(system.matrix, system.right)
     n, h = system.bodies, system.hinges
     bodies = x[: 6 * n].reshape(n, 6)
     wrenches = x[6 * n : 6 * (n + h)].reshape(h, 6)
@@ -221,11 +220,10 @@ def _unpack(tree: Tree, system: _System, powers: list[Array]) -> Accelerations:
         force=wrenches[:, :3],
         moment=wrenches[:, 3:],
         effort=np.concatenate(efforts) if efforts else np.zeros(0),
-        condition=condition,
     )
 
 
-def _refined(matrix: Array, right: Array) -> tuple[Array, float]:
+def _refined(matrix: Array, right: Array) -> Array:
     """Solution of an equilibrated system, refined with residuals in extended precision."""
     scale_c = 1.0 / np.abs(matrix).max(axis=0)
     scale_r = 1.0 / np.abs(matrix * scale_c).max(axis=1)
@@ -235,7 +233,7 @@ def _refined(matrix: Array, right: Array) -> tuple[Array, float]:
     x = scipy.linalg.lu_solve(factors, scale_r * right).astype(np.longdouble)
     for _ in range(2):
         x = x + scipy.linalg.lu_solve(factors, np.asarray(wide_r - wide_m @ x, float))
-    return np.asarray(x * scale_c, float), float(np.linalg.cond(scaled))
+    return np.asarray(x * scale_c, float)
 
 
 def mass_matrix(scene: Mapping[str, Any] | Tree, q: Array) -> Array:

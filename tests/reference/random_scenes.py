@@ -171,3 +171,26 @@ def random_state(scene: Scene | Tree, seed: int) -> tuple[Array, Array]:
         if hinge.type in ("ball", "free", "elastic"):
             q[hinge.q.stop - 4 : hinge.q.stop] = _quaternion(rng)
     return q, u
+
+
+def aligned_chain(seed: int, types: tuple[str, ...], springs: bool = False) -> Scene:
+    """Chain with axes along coordinate directions and whole-number frames, small enough for
+    symbolic formulations; full inertia, laws with a spring and a damper if asked."""
+    rng = np.random.default_rng(seed)
+    bodies, hinges = [], []
+    for i, kind in enumerate(types):
+        body = random_body(rng, f"body{i}")
+        body["ends"] = {"tip": [1.0, 0.0, 0.0]}
+        bodies.append(body)
+        first, second = rng.permutation(3)[:2]
+        hinge: Scene = {"name": f"hinge{i}", "type": kind, "outboard": f"body{i}"}
+        hinge["inboard"] = f"body{i - 1}.tip" if i else "ground"
+        hinge["axis"] = [float(k == first) for k in range(3)]
+        if kind in ("universal", "planar"):
+            hinge["axis2"] = [float(k == second) for k in range(3)]
+        if kind == "screw":
+            hinge["lead"] = 0.5
+        if springs:
+            hinge["law"] = {"stiffness": 4.0, "rest": 0.25, "damping": 0.5}
+        hinges.append(hinge)
+    return {"schema_version": 1, "gravity": [0, 0, -9.81], "body": bodies, "hinge": hinges}
