@@ -24,7 +24,7 @@ def unit(v: Sequence[float]) -> tuple[float, ...]:
     Raises ValueError for a vector without direction.
     """
     largest = max(abs(x) for x in v)
-    if largest == 0 or not math.isfinite(largest):
+    if largest == 0 or not all(math.isfinite(x) for x in v):
         raise ValueError("a vector without direction")
     length = norm(v)
     if abs(length - 1) <= 1e-15:

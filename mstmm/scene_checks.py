@@ -144,4 +144,5 @@ def _names(expression: Expression, scope: Scope, place: Location) -> Iterator[Pr
     for name in expression.names:
         message = problem_with(name, scope)
         if message is not None:
-            yield place, f"{message} (in {expression.text[:80]!r})"
+            context = "" if expression.text == name.text else f" (in {expression.text[:80]!r})"
+            yield place, message + context

@@ -11,7 +11,7 @@ from .errors import ExpressionError
 from .expression import Expression
 from .hinge_types import HINGE_TYPES, HingeType, effort_unit
 from .rotations import cross, norm, perpendicular, unit
-from .scene_rules import GROUND, Location, Refused, found, quaternion
+from .scene_rules import GROUND, Location, Refused, counted, found, quaternion
 
 if TYPE_CHECKING:
     from .scene_law import Law, LawEntry
@@ -149,7 +149,7 @@ def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) ->
         place: Location = ("law", key)
         if len(values) > 1 and len(values) != count:
             problems.append((
-                place, f"expected {entries_of(kind.name, kind.speeds)}, found {len(values)} entries"
+                place, f"expected {entries_of(kind.name, kind.speeds)}, found {len(values)}"
             ))  # fmt: skip
         elif count == 0 and values:
             problems.append((place, "a fixed hinge has no coordinate for a law; leave it out"))
@@ -179,10 +179,8 @@ def a_hinge(type_name: str) -> str:
 
 def entries_of(type_name: str, coordinates: tuple[Any, ...]) -> str:
     """How many entries a list has and what they are."""
-    names = ", ".join(f"{c.name} ({c.unit})" for c in coordinates)
-    count = len(coordinates)
-    entries = "entry" if count == 1 else "entries"
-    return f"{count} {entries} for {a_hinge(type_name)}" + (f": {names}" if names else "")
+    names = ", ".join(f"{c.name} ({c.unit})" if c.unit else c.name for c in coordinates)
+    return f"{counted(len(coordinates))} for {a_hinge(type_name)}" + (f": {names}" if names else "")
 
 
 def _units_differ(kind: HingeType) -> bool:
@@ -223,7 +221,7 @@ def _drive(
     elif len(drive) != len(kind.speeds):
         problems.append((
             ("drive",),
-            f"expected {entries_of(kind.name, kind.coordinates)}, found {len(drive)} entries",
+            f"expected {entries_of(kind.name, kind.coordinates)}, found {len(drive)}",
         ))  # fmt: skip
     for k, entry in enumerate(drive):
         if entry is None:

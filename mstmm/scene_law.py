@@ -89,7 +89,8 @@ def _one_or_list(value: Any) -> Any:
 
 def _per_coordinate(one: str, minimum: float | None = None) -> rules.Rule:
     bound = "" if minimum is None else f", {minimum:g} or more"
-    return rules.numbers(f"{one}{bound}, or a list, one per coordinate", minimum=minimum)
+    expected = f"{one}{bound}, or a list, one per coordinate"
+    return rules.numbers(expected, minimum=minimum, of=one.removeprefix("a number in "))
 
 
 _TABLES = rules.Shorthand(

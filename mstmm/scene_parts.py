@@ -64,7 +64,8 @@ class Body(Table):
     mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
     center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     inertia: Annotated[
-        Numbers, rules.numbers("[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2", 3, 6)
+        Numbers,
+        rules.numbers("[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2", 3, 6, of="kg m^2"),
     ] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     ends: Annotated[
@@ -126,7 +127,7 @@ class Hinge(Table):
     """
 
     name: Annotated[str, texts.name("the hinge's name")]
-    type: Annotated[str, texts.name("a hinge type")]
+    type: Annotated[str, texts.name("a hinge type", ", ".join(HINGE_TYPES) + " or your own")]
     inboard: Annotated[str, texts.end()]
     outboard: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)

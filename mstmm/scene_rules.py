@@ -182,6 +182,11 @@ def entries_of(value: Any, expected: str) -> Sequence[Any]:
     return value
 
 
+def counted(entries: int) -> str:
+    """The number of entries in words."""
+    return "1 entry" if entries == 1 else f"{entries} entries"
+
+
 def collect(
     values: Sequence[Any], expected: str, check: Callable[[Any, int], Any]
 ) -> tuple[Any, ...]:
@@ -198,12 +203,12 @@ def collect(
     return tuple(results)
 
 
-def numbers(expected: str, *lengths: int, minimum: float | None = None) -> Rule:
+def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str = "") -> Rule:
     """A list of finite numbers of one of these lengths (any length when none is given).
 
-    Without lengths a single number stands for the list with this one entry.
+    Without lengths a single number stands for the list with this one entry.  `of` is the unit.
     """
-    entry = "a number" + (f", {minimum:g} or more" if minimum is not None else "")
+    entry = f"a number{_unit(of)}" + (f", {minimum:g} or more" if minimum is not None else "")
 
     def one(value: Any, i: int) -> float:
         result = finite(plain(value), entry, i)
@@ -218,7 +223,7 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None) -> Rule:
             return (result,)
         entries = entries_of(value, expected)
         if lengths and len(entries) not in lengths:
-            raise refuse(f"expected {expected}, found {len(entries)} entries")
+            raise refuse(f"expected {expected}, found {counted(len(entries))}")
         return collect(entries, expected, one)
 
     item: dict[str, Any] = {"type": "number"} | ({} if minimum is None else {"minimum": minimum})
@@ -231,7 +236,7 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None) -> Rule:
 
 def vector(of: str) -> Rule:
     """Three numbers in the unit `of`."""
-    return numbers(f"three numbers{_unit(of)}", 3)
+    return numbers(f"three numbers{_unit(of)}", 3, of=of.partition(",")[0])
 
 
 def direction() -> Rule:

@@ -15,6 +15,7 @@ from .scene_rules import (
     NAME_SHAPE,
     Rule,
     collect,
+    counted,
     entries_of,
     finite,
     found,
@@ -23,8 +24,11 @@ from .scene_rules import (
 )
 
 
-def name(expected: str = "a name") -> Rule:
-    """A name by the pattern of the format; "ground" is reserved."""
+def name(expected: str, missing: str = "") -> Rule:
+    """A name by the pattern of the format; "ground" is reserved.
+
+    `missing` says more about what is expected where the name is left out.
+    """
 
     def check(value: Any) -> str:
         checked = text(value, f"{expected}: {NAME_SHAPE}")
@@ -34,7 +38,9 @@ def name(expected: str = "a name") -> Rule:
             raise refuse('"ground" is reserved for the inertial frame; choose another name')
         return checked
 
-    return Rule(f"{expected}: {NAME_SHAPE}", check, {"type": "string", "pattern": _pattern(NAME)})
+    return Rule(
+        f"{expected}: {missing or NAME_SHAPE}", check, {"type": "string", "pattern": _pattern(NAME)}
+    )
 
 
 def _pattern(expression: re.Pattern[str]) -> str:
@@ -172,7 +178,7 @@ def expressions(expected: str, length: int | None = None, free: bool = False) ->
             return (one(value),)
         entries = entries_of(value, expected)
         if length is not None and len(entries) != length:
-            raise refuse(f"expected {expected}, found {len(entries)} entries")
+            raise refuse(f"expected {expected}, found {counted(len(entries))}")
         return collect(entries, expected, one)
 
     def dump(value: Sequence[Expression | None] | None) -> list[str | float] | None:

@@ -320,7 +320,7 @@ def test_ten_thousand_bodies_in_seconds() -> None:
         hinge(f"h{i}", inboard=f"b{i - 1}.tip" if i else "ground", outboard=f"b{i}")
         for i in range(n)
     ]
-    started = time.perf_counter()
+    started = time.process_time()
     scene = Scene(gravity=[0, 0, 0], body=bodies, hinge=hinges)
     assert len(scene.body) == n
-    assert time.perf_counter() - started < 15  # about 1 s on an idle machine
+    assert time.process_time() - started < 15  # about 1 s on an idle machine

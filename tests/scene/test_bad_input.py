@@ -40,9 +40,12 @@ BAD: list[tuple[Data, str]] = [
         "gravity: expected three numbers in m/s^2, such as [0, -9.81, 0], found 9.81",
     ),
     (arm(gravity=[0, 0]), "found 2 entries"),
-    (arm(gravity=[0, NAN, 0]), "gravity[1]: expected a number, found nan, which is not finite"),
+    (
+        arm(gravity=[0, NAN, 0]),
+        "gravity[1]: expected a number in m/s^2, found nan, which is not finite",
+    ),
     (arm(gravity=[0, "-9.81", 0]), "found '-9.81'; write the number without quotes"),
-    (arm(gravity=[0, True, 0]), "gravity[1]: expected a number, found true"),
+    (arm(gravity=[0, True, 0]), "gravity[1]: expected a number in m/s^2, found true"),
     (arm(gravity=[0, 10**400, 0]), "which is not finite"),
     (arm(schema_version=2), "schema_version: expected 1, the only version there is, found 2"),
     (arm(schema_version=True), "schema_version: expected 1, the only version there is, found true"),
@@ -92,7 +95,7 @@ BAD: list[tuple[Data, str]] = [
         "inertia: expected [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2",
     ),
     (in_body(inertia=1.0), "inertia: expected [xx, yy, zz]"),
-    (in_body(inertia=[1, 1, INF]), "inertia[2]: expected a number, found inf"),
+    (in_body(inertia=[1, 1, INF]), "inertia[2]: expected a number in kg m^2, found inf"),
     (in_body(inertia=[1, -1, 1]), "found yy = -1; remove the sign"),
     (
         in_body(inertia=[1, 1, 1, 2, 0, 0]),
@@ -113,12 +116,15 @@ BAD: list[tuple[Data, str]] = [
     (in_body(ends={"tip": {"orientation": [0, 0, 0]}}), "ends.tip.position: missing"),
     (in_body(ends={"a.b": [1, 0, 0]}), "expected the name of an end, found 'a.b'"),
     (in_body(ends={"tip": {"position": [1, 0, 0], "orientation": [0, 0, 0, 0]}}), "zero length"),
-    (in_body(ends={"tip": {"position": [1, 0, 0], "orientation": [0]}}), "found 1 entries"),
+    (in_body(ends={"tip": {"position": [1, 0, 0], "orientation": [0]}}), "found 1 entry"),
     (in_body(parameters={"spin": 3}), "a rigid body has no parameters"),
     (arm(body=[body(), body()]), '"rod1" is also the name of body number 1; rename one'),
     # hinges: what they join
     (arm(hinge=[hinge(), hinge(outboard="rod2")]), '"shoulder" is also the name of hinge number 1'),
-    (changed(arm(), "hinge", 0, "type", to=...), 'hinge "shoulder": type: missing'),
+    (
+        changed(arm(), "hinge", 0, "type", to=...),
+        'hinge "shoulder": type: missing; expected a hinge type: fixed, pin, prismatic, screw',
+    ),
     (changed(arm(), "hinge", 0, "outboard", to=...), 'hinge "shoulder": outboard: missing'),
     (in_hinge(inboard="grnd"), 'there is no body "grnd"'),
     (in_hinge(inboard="ground.tip"), "the ground has no ends"),
@@ -168,7 +174,10 @@ BAD: list[tuple[Data, str]] = [
     (one(type="fixed", initial={"q": [1]}), "expected 0 entries for a fixed hinge"),
     # laws
     (one(law={"stiffness": -1}), "law.stiffness: expected a number in N/m or N m/rad, 0 or more"),
-    (one(law={"damping": [-1]}), "law.damping[0]: expected a number, 0 or more, found -1"),
+    (
+        one(law={"damping": [-1]}),
+        "law.damping[0]: expected a number in N s/m or N m s/rad, 0 or more, found -1",
+    ),
     (one(law={"inertia": -1}), "law.inertia: expected"),
     (one(law={"stifness": 1}), 'law.stifness: unknown key; did you mean "stiffness"?'),
     (one(law={"stiffness": [1, 2]}), "law.stiffness: expected 1 entry for a pin hinge"),
@@ -231,7 +240,7 @@ BAD: list[tuple[Data, str]] = [
     (one(type="free", drive=["t"] * 6), "a free hinge cannot be driven"),
     (one(type="elastic", drive=["t"] * 6), "an elastic hinge cannot be driven"),
     (one(type="fixed", drive="t"), "expected 0 entries for a fixed hinge"),
-    (one(type="cylindrical", drive="t"), "displacement (m), angle (rad), found 1 entries"),
+    (one(type="cylindrical", drive="t"), "displacement (m), angle (rad), found 1"),
     (
         one(type="cylindrical", drive=["free", "1 + t"], initial={"q": [0, 0]}),
         "initial.q[1]: 0 contradicts the drive, which begins at 1",

@@ -264,12 +264,12 @@ def test_long_and_deep_texts_need_no_stack(text: str) -> None:
         frames, frame = frames + 1, frame.f_back
     sys.setrecursionlimit(frames + 120)
     try:
-        started = time.perf_counter()
+        started = time.process_time()
         expression = parse(text)
         graph = Graph()
         node = expression.build(graph, lambda name: graph.element(name.text))
         expression.time_breaks()
-        taken = time.perf_counter() - started
+        taken = time.process_time() - started
     finally:
         sys.setrecursionlimit(limit)
     assert value(node, lambda _: 0.5) == pytest.approx(
