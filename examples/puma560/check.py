@@ -8,7 +8,7 @@ program says (below: Hamilton's equations from the mass matrix, by complex step 
 
 Explicit model: B. Armstrong, O. Khatib, J. Burdick, "The explicit dynamic model and inertial
 parameters of the PUMA 560 arm", Proc. IEEE Int. Conf. Robotics and Automation, 1986, pp. 510-518:
-constants I_1 .. I_23 and g_1 .. g_5 as printed (g in 9.81 m/s^2), and the elements of the mass
+constants I_1 .. I_23 and g_1 .. g_5 as printed, and the elements of the mass
 matrix and of the gravity vector in terms of them.
 
 Toolbox: values of joint torques and inertia at the pose qn that P. Corke's robotics toolbox lists
