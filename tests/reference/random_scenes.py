@@ -1,4 +1,4 @@
-"""Random scenes and states, drawn from a printed seed.
+"""Random scenes and states, each drawn from a seed that its test prints.
 
 Trees of 1 to `most` bodies with all hinge types mixed, masses over three decades, full physical
 inertia, skew frames, bodies held by ends other than their origin, loads, laws and springs.
@@ -6,7 +6,6 @@ inertia, skew frames, bodies held by ends other than their origin, loads, laws a
 
 from __future__ import annotations
 
-import secrets
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,6 @@ from .tree import SIZES, Tree, read
 Scene = dict[str, Any]
 TYPES = tuple(SIZES)
 Generator = np.random.Generator
-
-
-def fresh_seed() -> int:
-    """New seed, printed so that a failing draw can be repeated."""
-    seed = secrets.randbits(32)
-    print(f"random_scenes seed = {seed}")
-    return seed
 
 
 def _vector(rng: Generator, size: float = 1.0) -> list[float]:
@@ -75,8 +67,8 @@ def random_law(rng: Generator, kind: str) -> Scene:
             law[key] = [float(v) for v in rng.uniform(low, high, count)]
     if kind == "ball":
         law.pop("rest", None)
-    elif kind in ("free", "elastic") and "rest" in law:
-        law["rest"][3:] = [0.0, 0.0, 0.0]
+    elif kind in ("free", "elastic"):
+        law["rest"] = [*law.get("rest", [0.0] * 6)[:3], 0.0, 0.0, 0.0]
     elif rng.random() < 0.3:
         friction = {"coulomb": 0.3, "static": 0.5, "stribeck_velocity": 0.2}
         friction["regularisation_velocity"] = 0.1
@@ -191,6 +183,7 @@ def aligned_chain(seed: int, types: tuple[str, ...], springs: bool = False) -> S
         if kind == "screw":
             hinge["lead"] = 0.5
         if springs:
-            hinge["law"] = {"stiffness": 4.0, "rest": 0.25, "damping": 0.5}
+            values = {"stiffness": 4.0, "rest": 0.25, "damping": 0.5}
+            hinge["law"] = {key: [value] * SIZES[kind][1] for key, value in values.items()}
         hinges.append(hinge)
     return {"schema_version": 1, "gravity": [0, 0, -9.81], "body": bodies, "hinge": hinges}

@@ -24,8 +24,9 @@ def drawn(seed, **options):
 
 
 @pytest.mark.parametrize("seed", [*SEEDS, "fresh"])
-def test_dense_equations_agree_with_multipliers(seed):
-    seed = random_scenes.fresh_seed() if seed == "fresh" else seed
+def test_dense_equations_agree_with_multipliers(seed, rng):
+    seed = int(rng.integers(2**32)) if seed == "fresh" else seed
+    print(f"random_scenes seed = {seed}")
     scene, q, u = drawn(seed)
     found = dense.solve(scene, q, u, 0.3)
     equations = dae.Equations(scene)

@@ -1,0 +1,109 @@
+"""The engine against the dense Newton-Euler equations and against Kane's, on random scenes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference import kane, random_scenes
+from reference import newton_euler as dense
+from reference.tree import SIZES
+
+import mstmm
+
+ACCURACY = 1e-11
+TIME = 0.3
+
+
+def worst(a, b):
+    """Largest difference over the largest entry."""
+    a, b = np.asarray(a), np.asarray(b)
+    return float(np.abs(a - b).max() / max(np.abs(b).max(), 1e-300)) if b.size else 0.0
+
+
+def compiled(scene):
+    return mstmm.compile(mstmm.Scene(**scene))
+
+
+def compare(scene, q, u):
+    """Accelerations, hinge loads, efforts, energy and momentum of one state."""
+    model, found = compiled(scene), dense.solve(scene, q, u, TIME)
+    assert worst(model.accelerations(q, u, t=TIME), found.udot) < ACCURACY
+    result = model.simulate(t_start=TIME, t_end=TIME, initial=(q, u))
+    assert result.success, result.message
+    names = [hinge["name"] for hinge in scene["hinge"]]
+    assert worst([result.force(n)[0] for n in names], found.force) < ACCURACY
+    assert worst([result.moment(n)[0] for n in names], found.moment) < ACCURACY
+    scale = max(np.abs(found.force).max(), np.abs(found.moment).max())
+    assert abs(result.energy()[0] - dense.energy(scene, q, u)) < ACCURACY * max(scale, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_random_trees(seed):
+    scene = random_scenes.random_scene(seed)
+    compare(scene, *random_scenes.random_state(scene, seed + 1))
+
+
+@pytest.mark.parametrize("draw", range(15))
+def test_random_trees_drawn_afresh(draw, rng):
+    seed = int(rng.integers(2**32))
+    print(f"random_scenes seed = {seed}")
+    scene = random_scenes.random_scene(seed)
+    compare(scene, *random_scenes.random_state(scene, seed + 1))
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_chains_of_one_type(kind, rng):
+    seed = int(rng.integers(2**32))
+    print(f"random_scenes seed = {seed}")
+    scene = random_scenes.random_scene(seed, types=(kind,), chain=True, most=5)
+    compare(scene, *random_scenes.random_state(scene, seed + 1))
+
+
+@pytest.mark.parametrize("seed", range(40, 50))
+def test_mass_matrix(seed):
+    scene = random_scenes.random_scene(seed)
+    q, _ = random_scenes.random_state(scene, seed)
+    assert worst(compiled(scene).mass_matrix(q), dense.mass_matrix(scene, q)) < ACCURACY
+
+
+@pytest.mark.parametrize("seed", range(50, 60))
+def test_forward_after_inverse_dynamics_is_the_identity(seed, rng):
+    scene = random_scenes.random_scene(seed)
+    q, u = random_scenes.random_state(scene, seed)
+    model = compiled(scene)
+    asked = rng.uniform(-2, 2, len(u))
+    efforts = model.inverse_dynamics(q, u, asked, TIME)
+    again = model.accelerations(q, u, TIME, efforts)
+    # Heavy bodies on light ones lose digits in proportion to the ratio of their efforts.
+    assert np.abs(again - asked).max(initial=0.0) < 1e-10
+
+
+@pytest.mark.parametrize("seed", range(60, 66))
+def test_driven_coordinates(seed):
+    types = ("pin", "cylindrical", "planar", "universal", "gimbal", "screw", "prismatic")
+    scene = random_scenes.random_scene(seed, types=types, most=5)
+    for number, hinge in enumerate(scene["hinge"]):
+        count = SIZES[hinge["type"]][1]
+        if number % 2 == 0:
+            hinge["drive"] = ["0.3*sin(2*t)^2 + 0.1*exp(-t)"] + ["free"] * (count - 1)
+    q, u = random_scenes.random_state(scene, seed)
+    dense.fill_driven(scene, q, u, TIME)
+    compare(scene, q, u)
+
+
+CHAINS = {
+    ("pin", "pin", "pin"): True,
+    ("prismatic", "pin", "cylindrical"): True,
+    ("pin", "screw"): True,
+    ("universal", "pin"): False,
+    ("planar", "pin"): False,
+}
+
+
+@pytest.mark.parametrize("types", CHAINS, ids="-".join)
+def test_kane(types):
+    scene = random_scenes.aligned_chain(5, types, springs=CHAINS[types])
+    solve, model = kane.accelerations(scene), compiled(scene)
+    for seed in range(3):
+        q, u = random_scenes.random_state(scene, seed)
+        assert worst(model.accelerations(q, u), solve(q, u)) < 1e-12
