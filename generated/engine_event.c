@@ -11,10 +11,9 @@
 static const double places[] = {0x1p-20, 0x1p-14, 0x1p-9, 0x1p-5, 0.125, 0.25, 0.5, 0.75, 1.0};
 enum { N_PLACES = sizeof places / sizeof *places, FIRST_REGULAR = 5 };
 
-static int values(const mstmm_work *work, double t, double *g) {
+int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g) {
   const mstmm_system *system = work->system;
-  mstmm_dense(work, t, work->y_stage);
-  const int code = system->events(system->context, t, work->y_stage, g);
+  const int code = system->events(system->context, t, y, g);
   if (code) return mstmm_note(work->run, MSTMM_EVENT_FAILED, code, -1, t);
   for (int i = 0; i < system->n_events; i++)
     if (isnan(g[i])) {
@@ -24,6 +23,12 @@ static int values(const mstmm_work *work, double t, double *g) {
   return 0;
 }
 
+/* The events at a time inside the trial step */
+static int values(const mstmm_work *work, double t, double *g) {
+  mstmm_dense(work, t, work->y_stage);
+  return mstmm_event_values(work, t, work->y_stage, g);
+}
+
 /* Distance of neighbouring numbers around the step: what "located to rounding" means */
 static double resolution(const mstmm_run *run) {
   const double largest = fmax(fabs(run->real.t), fabs(run->real.t_new));
@@ -31,7 +36,8 @@ static double resolution(const mstmm_run *run) {
 }
 
 /* Event i is false at `left` and true at `right`: closes the bracket to rounding by the
- * Illinois rule, with a bisection whenever two steps did not halve it.  *root is on the true side. */
+ * Illinois rule, with a bisection whenever two steps did not halve it.  *root is on the true
+ * side. */
 static int locate(const mstmm_work *work, int i, double left, double g_left, double right,
                   double g_right, double *root) {
   double width_before = INFINITY;
@@ -103,7 +109,7 @@ static int search_maximum(const mstmm_work *work, int i, const double *at, const
   return 0;
 }
 
-/* Events between t_scan (values g_left) and `right` (values g_right): the earliest goes to the run. */
+/* Events between t_scan (values g_left) and `right` (values g_right): sets the earliest. */
 static int first_of(const mstmm_work *work, double before, double right) {
   mstmm_run *run = work->run;
   const double left = run->real.t_scan;
@@ -112,7 +118,7 @@ static int first_of(const mstmm_work *work, double before, double right) {
     const double at[3] = {before, left, right};
     double root = INFINITY;
     int status = 0;
-    if (work->truth[i] != 0.0) continue;
+    if (work->truth[i] != UNTRUE) continue;
     if (g[2] >= 0.0)
       status = locate(work, i, left, g[1], right, g[2], &root);
     else if (before < left && g[0] < 0.0 && g[1] < 0.0)
@@ -131,7 +137,7 @@ static int pending(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int status = values(work, run->real.t_scan, work->g_left);
   for (int i = 0; i < work->system->n_events && !status; i++)
-    if (work->truth[i] == 0.0 && work->g_left[i] >= 0.0) {
+    if (work->truth[i] == UNTRUE && work->g_left[i] >= 0.0) {
       run->real.t_stop = run->real.t_scan;
       run->count.event = i;
       break;
@@ -141,7 +147,7 @@ static int pending(const mstmm_work *work) {
 
 static void learn_truth(const mstmm_work *work, const double *g) {
   for (int i = 0; i < work->system->n_events; i++)
-    if (work->truth[i] >= 0.0) work->truth[i] = g[i] >= 0.0 ? 1.0 : 0.0;
+    if (work->truth[i] != UNWATCHED) work->truth[i] = g[i] >= 0.0 ? HOLDS : UNTRUE;
 }
 
 int mstmm_scan(const mstmm_work *work) {

@@ -13,157 +13,13 @@
 
 #include "engine_step.h"
 
-enum {
-  PHASE_HERE,    /* fire what has become true at the current state */
-  PHASE_SAMPLE,  /* sample the current state, finish, or go on */
-  PHASE_STEP,    /* make the trial step until its error is small enough */
-  PHASE_SCAN,    /* look for the next event in it */
-  PHASE_OUTPUT,  /* samples inside the step */
-  PHASE_FIRE,    /* accept up to the event and fire it */
-  PHASE_ACCEPT,  /* accept the whole step */
-  PHASE_END      /* count.status is final */
-};
-
 static const double SAFETY = 0.9, SMALLEST_FACTOR = 0.2, LARGEST_FACTOR = 10.0;
-static const double AFTER_FAILURE = 0.25; /* step factor after a stage that could not be evaluated */
-static const double SAME = 1e-9;          /* a grid point this part of a step from a break is the break */
-static const double STRETCH = 1.01;       /* a step may be this much longer to end at a stop */
-static const double HOPELESS = 1e-24;     /* smallest step as part of the run, where t is near 0 */
-enum { STIFF_STREAK = 15, CALM_STREAK = 6, MOST_REJECTIONS = 200, MOST_FIRES_HERE = 100 };
-
-/* ---- sizes and workspace ---- */
-
-static double *take(double **at, int64_t count) {
-  double *const start = *at;
-  *at += count;
-  return start;
-}
-
-static int64_t cut(mstmm_run *run, const mstmm_system *system, const mstmm_tableau *tableau,
-                   double *at, mstmm_work *work, int64_t *kept) {
-  const int64_t n = system->n_state, ne = system->n_events;
-  double *const start = at;
-  *work = (mstmm_work){.run = run, .system = system, .tableau = tableau};
-  work->truth = take(&at, ne);
-  work->last_fire = take(&at, ne);
-  work->y = take(&at, n);
-  work->k = take(&at, n);
-  *kept = at - start;
-  take(&at, (tableau->n_stages + tableau->n_extra) * n);
-  work->y_new = take(&at, n);
-  work->y_stage = take(&at, n);
-  work->y_event = take(&at, n);
-  work->dense = take(&at, tableau->n_dense * n);
-  work->g_before = take(&at, ne);
-  work->g_left = take(&at, ne);
-  work->g_right = take(&at, ne);
-  work->g_trial = take(&at, ne);
-  work->memory = take(&at, system->n_memory);
-  return at - start;
-}
-
-int64_t mstmm_work_cut(mstmm_run *run, mstmm_work *work) {
-  int64_t kept;
-  cut(run, run->system, run->tableau, run->workspace, work, &kept);
-  return kept;
-}
-
-static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tableau) {
-  return system->n_state >= 0 && system->n_error >= 0 && system->n_error <= system->n_state &&
-         system->n_events >= 0 && system->n_memory >= 0 && system->rhs &&
-         (!system->n_events || (system->events && system->fire)) &&
-         (!system->n_memory || system->memory) && tableau->n_stages >= 1 &&
-         tableau->n_extra >= 0 && tableau->n_dense >= 1;
-}
-
-int64_t mstmm_workspace_size(const mstmm_system *system, const mstmm_tableau *tableau) {
-  const int64_t n = system->n_state, ne = system->n_events;
-  if (!sizes_are_sound(system, tableau)) return 0;
-  const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
-  return rows * n + 6 * ne + system->n_memory + 1;
-}
-
-/* ---- starting ---- */
-
-static int increasing(int64_t n, const double *x, int strictly) {
-  for (int64_t i = 0; i < n; i++) {
-    if (!isfinite(x[i])) return 0;
-    if (i && (strictly ? !(x[i] > x[i - 1]) : !(x[i] >= x[i - 1]))) return 0;
-  }
-  return 1;
-}
-
-/* Number of the first argument that makes no sense, 0 if none */
-static int bad_argument(const mstmm_run *run) {
-  const mstmm_system *system = run->system;
-  if (!sizes_are_sound(system, run->tableau) || !run->workspace) return 1;
-  if (!isfinite(run->t_start) || !isfinite(run->t_end) || run->t_end < run->t_start) return 2;
-  if (!(run->fixed_step >= 0.0) || !(run->rtol >= 0.0) || !(run->first_step >= 0.0) ||
-      !(run->min_step >= 0.0) || !(run->max_step >= 0.0) || run->max_steps < 0)
-    return 3;
-  if (run->fixed_step == 0.0 && (!run->tableau->error || (system->n_error && !run->atol))) return 3;
-  for (int i = 0; run->atol && i < system->n_error; i++)
-    if (!(run->atol[i] > 0.0)) return 3;
-  if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks, 1)) return 4;
-  if (!increasing(run->n_outputs, run->outputs, 0)) return 5;
-  if (run->n_outputs > 0 &&
-      (run->outputs[0] < run->t_start || run->outputs[run->n_outputs - 1] > run->t_end))
-    return 5;
-  if (run->sample_capacity < 2 || !run->sample_t || !run->sample_event) return 6;
-  if ((system->n_state && !run->sample_y) || (system->n_memory && !run->sample_memory)) return 6;
-  return 0;
-}
-
-static void clear(mstmm_run *run) {
-  memset(&run->real, 0, sizeof run->real);
-  memset(&run->count, 0, sizeof run->count);
-  run->count.n_state = run->system->n_state;
-  run->count.n_events = run->system->n_events;
-  run->count.n_memory = run->system->n_memory;
-  run->count.n_stages = run->tableau->n_stages;
-  run->count.n_extra = run->tableau->n_extra;
-  run->count.n_dense = run->tableau->n_dense;
-  run->count.component = -1;
-  run->count.event = -1;
-  run->real.t = run->t_start;
-  run->real.smallest_step = INFINITY;
-}
-
-static void pass_breaks(mstmm_run *run) {
-  int64_t *i = &run->count.break_index;
-  while (*i < run->n_breaks && run->breaks[*i] <= run->real.t) (*i)++;
-  run->count.at_break = *i > 0 && run->breaks[*i - 1] == run->real.t;
-}
-
-int mstmm_run_start(mstmm_run *run, const double *y0) {
-  mstmm_work work;
-  clear(run);
-  run->n_samples = 0;
-  const int bad = bad_argument(run);
-  if (bad) {
-    run->count.phase = PHASE_END;
-    run->count.status = mstmm_note(run, MSTMM_BAD_ARGUMENT, bad, -1, run->t_start);
-    return MSTMM_BAD_ARGUMENT;
-  }
-  mstmm_work_cut(run, &work);
-  memcpy(work.y, y0, (size_t)run->system->n_state * sizeof *y0);
-  for (int i = 0; i < run->system->n_events; i++) {
-    work.truth[i] = 0.0;
-    work.last_fire[i] = NAN;
-  }
-  pass_breaks(run);
-  run->count.phase = PHASE_HERE;
-  if (!mstmm_all_finite(run->system->n_state, work.y)) {
-    run->count.phase = PHASE_END;
-    run->count.status = mstmm_note(run, MSTMM_NOT_FINITE, 0,
-                                   mstmm_first_not_finite(run->system->n_state, y0), run->t_start);
-  }
-  return (int)run->count.status;
-}
-
-const double *mstmm_run_y(const mstmm_run *run) {
-  return run->workspace + 2 * run->system->n_events;
-}
+static const double AFTER_FAILURE = 0.25; /* of the step whose stages could not be evaluated */
+static const double SAME = 1e-9;      /* of a step: a grid point so near to a break is the break */
+static const double STRETCH = 1.01;   /* a step may be this much longer to end at a stop */
+static const double HOPELESS = 1e-24; /* of the run: smallest step where t is near 0 */
+enum { STIFF_STREAK = 15, CALM_STREAK = 6, MANY_STEPS = 50 };
+enum { MOST_REJECTIONS = 200, MOST_FIRES_HERE = 100 };
 
 /* ---- samples ---- */
 
@@ -222,7 +78,7 @@ static int fire(const mstmm_work *work, int i, double t, int sampled) {
     restore_memory(work);
     return status;
   }
-  work->truth[i] = answer == MSTMM_FIRE_IGNORE ? -1.0 : 1.0;
+  work->truth[i] = answer == MSTMM_FIRE_IGNORE ? UNWATCHED : HOLDS;
   if (answer == MSTMM_FIRE_IGNORE || answer == MSTMM_FIRE_CONTINUE) return answer;
   if (!sampled && !(answer == MSTMM_FIRE_STOP && sample_equals(run, y))) run->n_samples++;
   put_sample(run, t, y, i + 1);
@@ -253,38 +109,41 @@ static int stop_run(mstmm_run *run) {
   return MSTMM_STOPPED;
 }
 
+static void learn_here(const mstmm_work *work, const double *g) {
+  for (int i = 0; i < work->system->n_events; i++)
+    if (work->truth[i] == HOLDS && g[i] < 0.0)
+      work->truth[i] = work->last_fire[i] == work->run->real.t ? DOUBTFUL : UNTRUE;
+}
+
+static int fire_here(const mstmm_work *work, int i) {
+  mstmm_run *run = work->run;
+  const size_t bytes = (size_t)work->system->n_state * sizeof(double);
+  if (!room(run, 2)) return MSTMM_BUFFER_FULL;
+  memcpy(work->y_event, work->y, bytes);
+  save_memory(work);
+  const int answer = fire(work, i, run->real.t, (int)run->count.sampled);
+  if (answer == MSTMM_FIRE_RESTART || answer == MSTMM_FIRE_STOP) {
+    memcpy(work->y, work->y_event, bytes);
+    const int status = after_change(work, i);
+    return answer == MSTMM_FIRE_STOP ? stop_run(run) : status;
+  }
+  restore_memory(work);
+  return answer < 0 ? answer : 0;
+}
+
 static int phase_here(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const mstmm_system *system = work->system;
   double *g = work->g_left;
-  const size_t bytes = (size_t)system->n_state * sizeof(double);
-  run->count.phase = PHASE_SAMPLE;
-  if (!system->n_events) return 0;
-  const int code = system->events(system->context, run->real.t, work->y, g);
-  if (code) return mstmm_note(run, MSTMM_EVENT_FAILED, code, -1, run->real.t);
-  for (int i = 0; i < system->n_events; i++) {
-    run->count.event = i;
-    if (isnan(g[i])) return mstmm_note(run, MSTMM_EVENT_FAILED, 0, -1, run->real.t);
-    if (work->truth[i] == 0.0 && g[i] >= 0.0) {
-      run->count.phase = PHASE_HERE;
-      if (!room(run, 2)) return MSTMM_BUFFER_FULL;
-      memcpy(work->y_event, work->y, bytes);
-      save_memory(work);
-      const int answer = fire(work, i, run->real.t, (int)run->count.sampled);
-      if (answer < 0) return answer;
-      if (answer == MSTMM_FIRE_RESTART || answer == MSTMM_FIRE_STOP) {
-        memcpy(work->y, work->y_event, bytes);
-        const int status = after_change(work, i);
-        return answer == MSTMM_FIRE_STOP ? stop_run(run) : status;
-      }
-      restore_memory(work);
-      return 0;
-    }
+  if (system->n_events) {
+    const int status = mstmm_event_values(work, run->real.t, work->y, g);
+    if (status) return status;
+    learn_here(work, g);
   }
   for (int i = 0; i < system->n_events; i++)
-    if (work->truth[i] == 1.0 && g[i] < 0.0 && work->last_fire[i] != run->real.t)
-      work->truth[i] = 0.0;
-  run->count.event = -1;
+    if (g[i] >= 0.0 && (work->truth[i] == UNTRUE || work->truth[i] == DOUBTFUL))
+      return fire_here(work, i);
+  run->count.phase = PHASE_SAMPLE;
   return 0;
 }
 
@@ -330,7 +189,7 @@ static void aim_fixed(mstmm_run *run, double stop, int is_break) {
   run->real.t_new = reaches ? stop : grid;
   run->count.lands_on_break = reaches && is_break;
   run->count.lands_on_grid = !reaches || grid - stop <= SAME * h;
-  run->count.cut_short = !run->count.lands_on_grid;
+  run->count.cut_short = run->real.t_new - run->real.t < (1.0 - 4.0 * SAME) * h;
 }
 
 static void aim_adaptive(mstmm_run *run, double stop, int is_break) {
@@ -384,7 +243,10 @@ static void count_step(const mstmm_work *work, double error, double absolute) {
   if (run->real.stiffness > 0.9 * work->tableau->stability_limit) {
     count->calm_streak = 0;
     count->stability_limited_steps++;
-    if (++count->stiff_streak >= STIFF_STREAK) count->stability_limited = 1;
+    const int64_t limited = count->stability_limited_steps;
+    const int often = limited >= MANY_STEPS && 10 * limited >= count->steps;
+    /* an undamped spring shakes the step about the limit, without long streaks */
+    if (++count->stiff_streak >= STIFF_STREAK || often) count->stability_limited = 1;
   } else if (++count->calm_streak >= CALM_STREAK) {
     count->stiff_streak = 0;
   }
@@ -491,7 +353,7 @@ static void move_to(const mstmm_work *work, double t, const double *y) {
   run->count.sampled = 0;
   run->count.restarted = 0;
   if (t == run->real.t_new && run->count.lands_on_grid) run->count.grid_index++;
-  pass_breaks(run);
+  mstmm_pass_breaks(run);
 }
 
 static int phase_fire(const mstmm_work *work) {
@@ -564,66 +426,4 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
     if (run->count.phase == PHASE_STEP && isfinite(deadline) && seconds() >= deadline)
       return MSTMM_RUNNING;
   }
-}
-
-/* ---- the state as numbers ---- */
-
-static int between_steps(const mstmm_run *run) {
-  const int64_t phase = run->count.phase;
-  return phase == PHASE_HERE || phase == PHASE_SAMPLE || phase == PHASE_STEP || phase == PHASE_END;
-}
-
-static int64_t kept_doubles(const mstmm_run *run, int64_t *all) {
-  mstmm_work work;
-  int64_t kept;
-  *all = cut(NULL, run->system, run->tableau, run->workspace, &work, &kept);
-  return kept;
-}
-
-int64_t mstmm_run_pack_integers(const mstmm_run *run) {
-  return (int64_t)(sizeof run->count / sizeof(int64_t));
-}
-
-static int64_t pack_reals(const mstmm_run *run, int whole) {
-  int64_t all;
-  const int64_t kept = kept_doubles(run, &all);
-  return (int64_t)(sizeof run->real / sizeof(double)) + run->system->n_memory + (whole ? all : kept);
-}
-
-int64_t mstmm_run_pack_reals(const mstmm_run *run) { return pack_reals(run, !between_steps(run)); }
-
-void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers) {
-  int64_t all;
-  const int64_t kept = kept_doubles(run, &all), nm = run->system->n_memory;
-  memcpy(integers, &run->count, sizeof run->count);
-  memcpy(reals, &run->real, sizeof run->real);
-  reals += sizeof run->real / sizeof(double);
-  if (nm) memcpy(reals, run->system->memory, (size_t)nm * sizeof(double));
-  memcpy(reals + nm, run->workspace, (size_t)(between_steps(run) ? kept : all) * sizeof(double));
-}
-
-int mstmm_run_restore(mstmm_run *run, int64_t n_reals, const double *reals, int64_t n_integers,
-                      const int64_t *integers) {
-  int64_t all;
-  clear(run);
-  const mstmm_run_count fresh = run->count;
-  const int bad = bad_argument(run);
-  const int64_t kept = bad ? 0 : kept_doubles(run, &all), nm = run->system->n_memory;
-  if (bad || n_integers != mstmm_run_pack_integers(run)) return MSTMM_BAD_ARGUMENT;
-  memcpy(&run->count, integers, sizeof run->count);
-  const int whole = !between_steps(run);
-  if (run->count.phase < PHASE_HERE || run->count.phase > PHASE_END ||
-      n_reals != pack_reals(run, whole) || run->count.n_state != fresh.n_state ||
-      run->count.n_events != fresh.n_events || run->count.n_memory != fresh.n_memory ||
-      run->count.n_stages != fresh.n_stages || run->count.n_extra != fresh.n_extra ||
-      run->count.n_dense != fresh.n_dense) {
-    clear(run);
-    return MSTMM_BAD_ARGUMENT;
-  }
-  memcpy(&run->real, reals, sizeof run->real);
-  reals += sizeof run->real / sizeof(double);
-  if (nm) memcpy(run->system->memory, reals, (size_t)nm * sizeof(double));
-  memcpy(run->workspace, reals + nm, (size_t)(whole ? all : kept) * sizeof(double));
-  run->n_samples = 0;
-  return 0;
 }

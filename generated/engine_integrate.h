@@ -14,7 +14,7 @@
 typedef struct mstmm_system {
   void *context;
   int n_state;
-  int n_error; /* only the first n_error components enter the error norm; the rest are quadratures */
+  int n_error; /* only the first n_error components enter the error norm: quadratures come last */
   /* dy = f(t, y); nonzero = failure code */
   int (*rhs)(void *context, double t, const double *y, double *dy);
   /* After every accepted step, may change y and memory.  0 = the saved first stage still holds,
@@ -115,8 +115,8 @@ typedef struct mstmm_run {
   int64_t n_outputs;    /* < 0: a sample at every accepted step */
   const double *outputs; /* increasing, within [t_start, t_end] */
   double *workspace;     /* mstmm_workspace_size doubles */
-  /* The sample buffer: the caller's; empty it by n_samples = 0.  Samples inside a step are the dense
-   * output, not passed through accept, with the memory of the step's start. */
+  /* The sample buffer: the caller's; empty it by n_samples = 0.  Samples inside a step are the
+   * dense output, not passed through accept, with the memory of the step's start. */
   int64_t sample_capacity; /* at least 2 */
   int64_t n_samples;
   double *sample_t;
@@ -140,7 +140,8 @@ int mstmm_advance(mstmm_run *run, double wall_seconds);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);
 /* State of a run as plain numbers: sizes, writing, and reading back into a run whose problem part
- * has been filled in the same way.  Restoring returns 0, or MSTMM_BAD_ARGUMENT. */
+ * has been filled in the same way.  Restoring returns 0, or MSTMM_BAD_ARGUMENT with the run
+ * unchanged. */
 int64_t mstmm_run_pack_reals(const mstmm_run *run);
 int64_t mstmm_run_pack_integers(const mstmm_run *run);
 void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers);

@@ -39,10 +39,10 @@ int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, doub
   return status;
 }
 
-/* out[i] = sum_j w[j stride] k_j[i] for `count` components, k_j a row of n.  Every component is
- * summed in the same order, whether eight at a time or alone. */
-static void weighted_sum(int64_t count, int m, const double *w, int stride, const double *k,
-                         int64_t n, double *restrict out) {
+/* out = base + h sum_j w[j stride] k_j, k_j a row of n; only `count` components of each, from the
+ * start of every array.  Every component is summed in the same order, eight at a time or alone. */
+static void combine(int64_t count, int m, const double *w, int stride, const double *k, int64_t n,
+                    double h, const double *base, double *out) {
   int64_t i = 0;
   for (; i + 8 <= count; i += 8) {
     lanes a = {0.0}, b = {0.0}, c = {0.0}, d = {0.0};
@@ -55,44 +55,29 @@ static void weighted_sum(int64_t count, int m, const double *w, int stride, cons
       c += weight * row[2];
       d += weight * row[3];
     }
+    const lanes *from = (const lanes *)(base + i);
     lanes *to = (lanes *)(out + i);
-    to[0] = a;
-    to[1] = b;
-    to[2] = c;
-    to[3] = d;
+    to[0] = from[0] + h * a;
+    to[1] = from[1] + h * b;
+    to[2] = from[2] + h * c;
+    to[3] = from[3] + h * d;
   }
   for (; i + 2 <= count; i += 2) {
     lanes a = {0.0};
     for (int j = 0; j < m; j++)
       if (w[j * stride] != 0.0) a += w[j * stride] * *(const lanes *)(k + j * n + i);
-    *(lanes *)(out + i) = a;
+    *(lanes *)(out + i) = *(const lanes *)(base + i) + h * a;
   }
   for (; i < count; i++) {
     double a = 0.0;
     for (int j = 0; j < m; j++)
       if (w[j * stride] != 0.0) a += w[j * stride] * k[j * n + i];
-    out[i] = a;
+    out[i] = base[i] + h * a;
   }
 }
 
 static int64_t block_length(int64_t n, int64_t start) {
   return n - start < BLOCK ? n - start : BLOCK;
-}
-
-/* target = base + h sum_j w[j] k_j; base NULL: zero */
-static void combine(int64_t n, int m, const double *w, int stride, const double *k, double h,
-                    const double *base, double *target) {
-  for (int64_t start = 0; start < n; start += BLOCK) {
-    const int64_t count = block_length(n, start);
-    double *restrict out = target + start;
-    weighted_sum(count, m, w, stride, k + start, n, out);
-    if (base) {
-      const double *restrict from = base + start;
-      for (int64_t i = 0; i < count; i++) out[i] = from[i] + h * out[i];
-    } else {
-      for (int64_t i = 0; i < count; i++) out[i] *= h;
-    }
-  }
 }
 
 /* A break belongs to neither side: stages of the step that ends there see the last number before
@@ -134,11 +119,11 @@ int mstmm_stages(const mstmm_work *work) {
   const double h = work->run->real.h;
   int status = 0;
   for (int i = 1; i < s && !status; i++) {
-    combine(n, i, tableau->a + i * s, 1, work->k, h, work->y, work->y_stage);
+    combine(n, i, tableau->a + i * s, 1, work->k, n, h, work->y, work->y_stage);
     status = evaluate(work, mstmm_stage_time(work, tableau->c[i]), work->y_stage, work->k + i * n);
   }
   if (status) return status;
-  combine(n, s, tableau->b, 1, work->k, h, work->y, work->y_new);
+  combine(n, s, tableau->b, 1, work->k, n, h, work->y, work->y_new);
   status = check_finite(work, work->run->real.t_new, work->y_new);
   if (!status) status = evaluate(work, mstmm_stage_time(work, 1.0), work->y_new, work->k + s * n);
   if (!status) status = check_finite(work, work->run->real.t_new, work->k + s * n);
@@ -154,12 +139,15 @@ int mstmm_build_dense(const mstmm_work *work) {
   for (int i = 0; i < tableau->n_extra && !status; i++) {
     double *k = work->k + (s + 1 + i) * n;
     const double t = mstmm_stage_time(work, tableau->c_extra[i]);
-    combine(n, s + 1 + i, tableau->a_extra + i * all, 1, work->k, h, work->y, work->y_event);
+    combine(n, s + 1 + i, tableau->a_extra + i * all, 1, work->k, n, h, work->y, work->y_event);
     status = evaluate(work, t, work->y_event, k);
     if (!status) status = check_finite(work, t, k);
   }
-  for (int j = 0; j < tableau->n_dense && !status; j++)
-    combine(n, all, tableau->dense + j, tableau->n_dense, work->k, h, NULL, work->dense + j * n);
+  memset(work->dense, 0, (size_t)(tableau->n_dense * n) * sizeof(double));
+  for (int j = 0; j < tableau->n_dense && !status; j++) {
+    double *row = work->dense + j * n;
+    combine(n, all, tableau->dense + j, tableau->n_dense, work->k, n, h, row, row);
+  }
   return status;
 }
 
@@ -204,11 +192,12 @@ double mstmm_error_norm(const mstmm_work *work, double *absolute) {
   const int m = tableau->n_stages + 1, both = tableau->error_low != NULL;
   double high = 0.0, low = 0.0, high_scaled = 0.0, low_scaled = 0.0;
   double e_high[BLOCK], e_low[BLOCK] = {0.0};
+  static const double zero[BLOCK] = {0.0};
   for (int64_t start = 0; start < n; start += BLOCK) {
     const int64_t count = block_length(n, start);
     const double *y = work->y + start, *y_new = work->y_new + start;
-    weighted_sum(count, m, tableau->error, 1, work->k + start, row, e_high);
-    if (both) weighted_sum(count, m, tableau->error_low, 1, work->k + start, row, e_low);
+    combine(count, m, tableau->error, 1, work->k + start, row, 1.0, zero, e_high);
+    if (both) combine(count, m, tableau->error_low, 1, work->k + start, row, 1.0, zero, e_low);
     for (int64_t i = 0; i < count; i++) {
       const double unit = tolerance(work, start + i, larger(fabs(y[i]), fabs(y_new[i])));
       const double scale = unit > 0.0 ? 1.0 / unit : 0.0;
@@ -242,22 +231,25 @@ int64_t mstmm_worst_component(const mstmm_work *work) {
 }
 
 /* h |f(t_new, y_new) - k_(s-1)| / |y_new - Y_(s-1)|: both stages lie at the step's end, so the
- * quotient follows the Jacobian alone (Hairer, Wanner, Solving ODE II, section IV.2).
- * 0 where the last stage does not lie there or the difference is rounding. */
+ * quotient follows the Jacobian alone (Hairer, Wanner, Solving ODE II, section IV.2).  Components
+ * are measured by their own size |y| + h |f|, or metres beside metres per second would make an
+ * oscillation of frequency w look as fast as w^2.  0 where the last stage does not lie at the end
+ * or the difference is rounding. */
 double mstmm_stiffness(const mstmm_work *work) {
   const int s = work->tableau->n_stages;
   const int64_t n = work->system->n_error, row = work->system->n_state;
-  double top = 0.0, bottom = 0.0, size = 0.0;
+  const double h = work->run->real.h;
+  double top = 0.0, bottom = 0.0;
   if (s < 2 || work->tableau->c[s - 1] != 1.0) return 0.0;
   const double *k_end = work->k + s * row, *k_last = work->k + (s - 1) * row;
   for (int64_t i = 0; i < n; i++) {
-    const double df = k_end[i] - k_last[i], dy = work->y_new[i] - work->y_stage[i];
-    top += df * df;
-    bottom += dy * dy;
-    size += work->y_new[i] * work->y_new[i];
+    const double df = h * (k_end[i] - k_last[i]), dy = work->y_new[i] - work->y_stage[i];
+    const double size = fabs(work->y_new[i]) + h * fabs(k_end[i]) + tolerance(work, i, 0.0);
+    const double unit = size > 0.0 ? 1.0 / size : 0.0;
+    top += (df * unit) * (df * unit);
+    bottom += (dy * unit) * (dy * unit);
   }
-  if (!(bottom > 1e-26 * size)) return 0.0;
-  return work->run->real.h * sqrt(top / bottom);
+  return bottom > 1e-26 ? sqrt(top / bottom) : 0.0;
 }
 
 static double scaled_norm(const mstmm_work *work, const double *x, const double *minus) {
@@ -280,7 +272,7 @@ double mstmm_initial_step(const mstmm_work *work, double interval) {
   const double one = 1.0;
   h0 = fmin(h0, interval);
   const double t = fmin(work->run->real.t + h0, nextafter(work->run->real.t + interval, -INFINITY));
-  combine(n, 1, &one, 1, work->k, h0, work->y, work->y_stage);
+  combine(n, 1, &one, 1, work->k, n, h0, work->y, work->y_stage);
   if (!mstmm_all_finite(n, work->y_stage) || evaluate(work, t, work->y_stage, f1) ||
       !mstmm_all_finite(n, f1))
     return 1e-3 * h0;

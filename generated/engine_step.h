@@ -6,13 +6,33 @@
 
 #include "engine_integrate.h"
 
+/* Where the loop stands between two calls */
+enum {
+  PHASE_HERE,    /* fire what has become true at the current state */
+  PHASE_SAMPLE,  /* sample the current state, finish, or go on */
+  PHASE_STEP,    /* make the trial step until its error is small enough */
+  PHASE_SCAN,    /* look for the next event in it */
+  PHASE_OUTPUT,  /* samples inside the step */
+  PHASE_FIRE,    /* accept up to the event and fire it */
+  PHASE_ACCEPT,  /* accept the whole step */
+  PHASE_END      /* count.status is final */
+};
+
+/* What is known of an event, kept as a double among the others.  Doubtful: it has just fired, and
+ * reads false at the same time; only rounding perhaps, so that becoming true again counts for
+ * nothing until time has passed or another event has fired. */
+#define UNWATCHED (-1.0)
+#define UNTRUE 0.0
+#define DOUBTFUL 0.5
+#define HOLDS 1.0
+
 /* The workspace cut into named arrays.  Up to and including the first stage lies what must be
  * kept between steps; the rest matters only inside a step. */
 typedef struct mstmm_work {
   mstmm_run *run;
   const mstmm_system *system;
   const mstmm_tableau *tableau;
-  double *truth;     /* n_events: 1 true, 0 false, -1 no longer watched */
+  double *truth;     /* n_events */
   double *last_fire; /* n_events: time, or NaN */
   double *y;         /* n_state: the current good state */
   double *k;         /* (s + 1 + n_extra) x n_state */
@@ -22,7 +42,9 @@ typedef struct mstmm_work {
   double *memory;                                /* n_memory: saved while an event is tried */
 } mstmm_work;
 
-int64_t mstmm_work_cut(mstmm_run *run, mstmm_work *work); /* returns the size up to the first stage */
+void mstmm_work_cut(mstmm_run *run, mstmm_work *work);
+/* Breaks up to t lie behind the run; is t one of them? */
+void mstmm_pass_breaks(mstmm_run *run);
 
 int mstmm_all_finite(int64_t n, const double *x);
 int64_t mstmm_first_not_finite(int64_t n, const double *x);
@@ -40,6 +62,8 @@ int64_t mstmm_worst_component(const mstmm_work *work);
 double mstmm_stiffness(const mstmm_work *work);
 double mstmm_initial_step(const mstmm_work *work, double interval);
 
+/* The event functions at (t, y); a value that is not a number is a failure. */
+int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g);
 /* Looks for the first event in (t_scan, t_new]; sets t_stop and count.event (-1: none). */
 int mstmm_scan(const mstmm_work *work);
 
