@@ -310,3 +310,82 @@ def length() -> Derivation:
             Equation("distance and rate", value, sp.ImmutableDenseMatrix([distance, along])),
         ),
     )
+
+
+def turned() -> Derivation:
+    """A vector of a body in inertial axes."""
+    own, out = _symbol("b", 3), _symbol("b_0", 3)
+    return Derivation(
+        "frames",
+        "vector in inertial axes",
+        (A, Quantity(own, "", "body axes")),
+        (Quantity(out, "", "inertial axes"),),
+        (Equation("vector", out, A.symbol * own),),
+    )
+
+
+def classical_body() -> Derivation:
+    """What the classical matrix of a rigid body takes, in inertial axes, from the swept data."""
+    p = Quantity(_symbol("p", 10), "", "parameters of the rigid body")
+    load = Quantity(_symbol("load", 6), "N, N*m", "applied force and moment at P, body axes")
+    out = Quantity(_symbol("ro_n", 3), "m", "inboard point of the next hinge, body axes")
+    symbol = p.symbol
+    center = sp.ImmutableDenseMatrix([symbol[i, 0] / symbol[0, 0] for i in (1, 2, 3)])
+    entries = [symbol[i, 0] for i in range(4, 10)]
+    tensor = sp.ImmutableDenseMatrix(
+        [
+            [entries[0], entries[1], entries[2]],
+            [entries[1], entries[3], entries[4]],
+            [entries[2], entries[4], entries[5]],
+        ]
+    )
+    names = (("M", 1, 1), ("r_IO", 3, 1), ("r_IC", 3, 1), ("J_I", 3, 3), ("omega", 3, 1))
+    mass, r_io, r_ic, inertia, omega = (_symbol(*name) for name in names)
+    force, moment = _symbol("f_C", 3), _symbol("m_C", 3)
+    push, turn = _rows(load.symbol, 0), _rows(load.symbol, 3)
+    return Derivation(
+        "frames",
+        "inputs of the classical body matrix",
+        (A, p, MOTION, load, out),
+        (
+            Quantity(mass, "kg", "mass"),
+            Quantity(r_io, "m", "output end from input end, inertial axes"),
+            Quantity(r_ic, "m", "mass centre from input end, inertial axes"),
+            Quantity(inertia, "kg*m2", "about the input end, inertial axes", symmetric=True),
+            Quantity(omega, "rad/s", "angular velocity, inertial axes"),
+            Quantity(force, "N", "force at the mass centre"),
+            Quantity(moment, "N*m", "moment"),
+        ),
+        (
+            Equation("mass", mass, sp.ImmutableDenseMatrix([symbol[0, 0]])),
+            Equation("output end", r_io, A.symbol * out.symbol),
+            Equation("mass centre", r_ic, A.symbol * center),
+            Equation("inertia", inertia, A.symbol * tensor * A.symbol.T),
+            Equation("angular velocity", omega, A.symbol * _rows(MOTION.symbol, 0)),
+            Equation("force", force, A.symbol * push),
+            Equation("moment", moment, A.symbol * (turn - tilde(center) * push)),
+        ),
+    )
+
+
+def state_deviation() -> Derivation:
+    """Deviation of a body's acceleration from the bias motion, read from a classical state."""
+    state = Quantity(_symbol("z", 13), "", "[rdd; omegadot; m; q; 1] at P, inertial axes")
+    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    z, motion = state.symbol, MOTION.symbol
+    return Derivation(
+        "frames",
+        "deviation read from a classical state vector",
+        (A, MOTION, state),
+        (delta,),
+        (
+            Equation(
+                "deviation",
+                delta.symbol,
+                _stack(
+                    A.symbol.T * _rows(z, 0) - _rows(motion, 6),
+                    A.symbol.T * _rows(z, 3) - _rows(motion, 3),
+                ),
+            ),
+        ),
+    )

@@ -12,6 +12,7 @@ from mstmm.spec import ElementSpec
 from . import body as body_kernels
 from . import force as force_kernels
 from . import frames, laws, sweep
+from .classical import CLASSICAL, classical_spec
 from .derivation import Quantity, vector
 from .element import Body, ForceElement, Hinge
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of, speeds_of
@@ -22,7 +23,7 @@ FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
     frames.reaction, frames.transport, frames.rotor_energy,
-    frames.length,
+    frames.length, frames.turned, frames.classical_body, frames.state_deviation,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
@@ -112,6 +113,7 @@ def generic_spec(nu: int) -> ElementSpec:
         lower(sweep.condense(nu), "condense", sweep.pivot_guards(nu)),
         lower(sweep.recover(nu), "recover"),
         lower(sweep.effort(nu), "effort"),
+        lower(sweep.project(nu), "project"),
     ]
     return ElementSpec(
         "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
@@ -140,4 +142,8 @@ def shared_specs() -> list[ElementSpec]:
 
 def all_specs() -> list[ElementSpec]:
     """Everything that is generated and compiled when the package is built."""
-    return [*(spec_of(e) for e in builtin_elements()), *shared_specs()]
+    return [
+        *(spec_of(e) for e in builtin_elements()),
+        *shared_specs(),
+        *(classical_spec(name) for name in CLASSICAL),
+    ]

@@ -325,3 +325,22 @@ def effort(nu: int) -> Derivation:
         (tau,),
         (Equation("tau = H^T f", tau.symbol, h.symbol.T * force.symbol),),
     )
+
+
+def project(nu: int) -> Derivation:
+    """udot = (H^T H)^-1 H^T (delta - X delta_I): accelerations of a hinge between known motions."""
+    h = Quantity(_symbol("H", 6, nu), "", "motion subspace")
+    rates = Quantity(_symbol("udot", nu), "", "accelerations of the coordinates")
+    carried, gap, gram = _symbol("delta_Q", 6), _symbol("gap", 6), _symbol("HH", nu, nu)
+    return Derivation(
+        f"generic{nu}",
+        f"accelerations of a hinge with {nu} speeds from those of its bodies",
+        (R, SHIFT, h, DELTA, PARENT_DELTA),
+        (rates,),
+        (
+            Equation("X delta_I", carried, _outboard_deviation()),
+            Equation("relative deviation", gap, DELTA.symbol - carried),
+            Equation("H^T H", gram, h.symbol.T * h.symbol),
+            Equation("udot", rates.symbol, Solve(gram, h.symbol.T * gap, symmetric=True)),
+        ),
+    )

@@ -16,6 +16,39 @@ int mstmm_body_rigid_bias_load(const real *restrict p, const real *restrict moti
 int mstmm_body_rigid_energy(const real *restrict p, const real *restrict v, const real *restrict w,
     real *restrict T);
 
+extern const mstmm_element mstmm_classical_acceleration;
+int mstmm_classical_acceleration_transfer(const real *restrict U, const real *restrict F_scale,
+    const real *restrict d, const real *restrict d_n, const real *restrict tau_n,
+    real *restrict U_h, real *restrict margin);
+
+extern const mstmm_element mstmm_classical_acceleration_planar;
+int mstmm_classical_acceleration_planar_transfer(const real *restrict U,
+    const real *restrict F_scale, const real *restrict d, const real *restrict d_n,
+    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
+
+extern const mstmm_element mstmm_classical_ball;
+int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
+    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
+
+extern const mstmm_element mstmm_classical_body_planar;
+int mstmm_classical_body_planar_transfer(const real *restrict M, const real *restrict r_IO,
+    const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
+    const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
+
+extern const mstmm_element mstmm_classical_body_spatial;
+int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
+    const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
+    const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
+
+extern const mstmm_element mstmm_classical_pin_planar;
+int mstmm_classical_pin_planar_transfer(const real *restrict U, const real *restrict F_scale,
+    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
+
+extern const mstmm_element mstmm_classical_pin_spatial;
+int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *restrict F_scale,
+    const real *restrict a, const real *restrict u, const real *restrict omega_I,
+    const real *restrict a_n, const real *restrict tau_n, real *restrict U_h, real *restrict margin);
+
 extern const mstmm_element mstmm_force_spring;
 int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
@@ -218,6 +251,13 @@ int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict
     real *restrict T);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
+int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
+int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
+    const real *restrict motion, const real *restrict load, const real *restrict ro_n,
+    real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
+    real *restrict omega, real *restrict f_C, real *restrict m_C);
+int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
+    const real *restrict z, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic0;
 int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict ro,
@@ -232,6 +272,9 @@ int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic1;
 int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
@@ -246,6 +289,9 @@ int mstmm_sweep_generic1_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -260,6 +306,9 @@ int mstmm_sweep_generic2_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -274,6 +323,9 @@ int mstmm_sweep_generic3_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -288,6 +340,9 @@ int mstmm_sweep_generic4_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -302,6 +357,9 @@ int mstmm_sweep_generic5_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -316,6 +374,9 @@ int mstmm_sweep_generic6_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,

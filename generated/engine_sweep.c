@@ -33,6 +33,8 @@ typedef int (*generic_recover_kernel)(const real *rotation, const real *shift,
                                       const real *subspace, const real *gain, const real *offset,
                                       const real *parent, real *udot, real *deviation);
 typedef int (*effort_kernel)(const real *subspace, const real *load, real *tau);
+typedef int (*project_kernel)(const real *rotation, const real *shift, const real *subspace,
+                              const real *deviation, const real *parent, real *udot);
 typedef int (*inertia_kernel)(const real *p, real *inertia);
 typedef int (*bias_load_kernel)(const real *p, const real *motion, real *load);
 
@@ -66,6 +68,16 @@ static const generic_recover_kernel generic_recover[] = {
     mstmm_sweep_generic6_recover,
 };
 
+static const project_kernel generic_project[] = {
+    mstmm_sweep_generic0_project,
+    mstmm_sweep_generic1_project,
+    mstmm_sweep_generic2_project,
+    mstmm_sweep_generic3_project,
+    mstmm_sweep_generic4_project,
+    mstmm_sweep_generic5_project,
+    mstmm_sweep_generic6_project,
+};
+
 static const effort_kernel generic_effort[] = {
     mstmm_sweep_generic0_effort,
     mstmm_sweep_generic1_effort,
@@ -89,6 +101,12 @@ int mstmm_fail(mstmm_state *state, int reason, int element, int code)
 void mstmm_effort(int nu, const real *subspace, const real *load, real *tau)
 {
     generic_effort[nu](subspace, load, tau);
+}
+
+int mstmm_project(int nu, const real *rotation, const real *shift, const real *subspace,
+                  const real *deviation, const real *parent, real *udot)
+{
+    return generic_project[nu](rotation, shift, subspace, deviation, parent, udot);
 }
 
 /* Where a body reads the prescribed accelerations: from udot, from a drive, or zero. */
@@ -317,12 +335,51 @@ static void clear_efforts(mstmm_state *state, const real *efforts, mstmm_balance
     }
 }
 
+/* Applied loads alone, per body (6 numbers, body axes): what the load pass took from e. */
+static int load_pass(mstmm_state *state, mstmm_balance *balance, real *applied)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; applied && i < model->n_bodies; i++)
+        memcpy(applied + 6 * i, state->workspace + model->bodies[i].block + MSTMM_BLOCK_E,
+               6 * sizeof(real));
+    int code = model->needs_pose ? mstmm_load_pass(state, balance) : 0;
+    for (int i = 0; applied && i < model->n_bodies; i++) {
+        const real *load = state->workspace + model->bodies[i].block + MSTMM_BLOCK_E;
+        for (int j = 0; j < 6; j++) applied[6 * i + j] -= load[j];
+    }
+    return code;
+}
+
+/* Largest deviation of the product from the Riccati sweep; keeps the product's values. */
+static int compare_product(mstmm_state *state, const real *product, real *udot)
+{
+    const mstmm_product *check = state->model->product;
+    real gap = 0, size = 0;
+    int worst = 0;
+    for (int i = 0; i < state->model->nu; i++) {
+        real here = fabs(product[i] - udot[i]);
+        if (!(here <= gap)) {
+            gap = here;
+            worst = i;
+        }
+        if (fabs(udot[i]) > size) size = fabs(udot[i]);
+        udot[i] = product[i];
+    }
+    real relative = size > 0 ? gap / size : gap;
+    if (!(relative <= *check->estimate)) *check->estimate = relative;
+    return relative <= check->accuracy
+               ? 0
+               : mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, worst, MSTMM_FAILED_PRODUCT_ERROR);
+}
+
 int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
                         const real *u, const real *memory, const real *efforts, real *qdot,
                         real *udot, mstmm_balance *balance, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model, .workspace = workspace, .t = t, .memory = memory,
                          .failure = failure};
+    real *applied = model->product ? model->product->workspace + 400 * model->n_bodies : NULL;
+    real *product = applied ? applied + 6 * model->n_bodies : NULL;
     int code = mstmm_state_begin(&state, q, u);
     if (code) return code;
     code = mstmm_forward_pass(&state, qdot);
@@ -331,16 +388,20 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
     clear_efforts(&state, efforts, balance);
     code = mstmm_law_pass(&state, balance);
     if (code) return code;
-    if (model->needs_pose) {
+    if (model->needs_pose || model->product) {
         mstmm_pose_pass(&state, 0);
-        code = mstmm_load_pass(&state, balance);
+        code = load_pass(&state, balance, applied);
+        if (code) return code;
+    }
+    if (model->product) {
+        code = mstmm_product_pass(&state, applied, product);
         if (code) return code;
     }
     code = condense_pass(&state);
     if (code) return code;
     recover_pass(&state, udot);
     if (balance) drive_power(&state, udot, balance);
-    return 0;
+    return model->product ? compare_product(&state, product, udot) : 0;
 }
 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,

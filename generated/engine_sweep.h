@@ -34,6 +34,8 @@
 #define MSTMM_FAILED_FORCE 2
 #define MSTMM_FAILED_EXPRESSION 3
 #define MSTMM_FAILED_HINGE 4
+#define MSTMM_FAILED_PRODUCT_PIVOT 5
+#define MSTMM_FAILED_PRODUCT_ERROR 6
 
 /* One body with its inboard hinge, in depth-first order. */
 typedef struct {
@@ -87,8 +89,21 @@ typedef struct {
     int body, coordinate, speed; /* within the hinge */
 } mstmm_drive;
 
+/* Kinds of hinge that the plain product of classical matrices knows, one kind for a whole chain. */
+#define MSTMM_PRODUCT_PIN 0
+#define MSTMM_PRODUCT_BALL 1
+#define MSTMM_PRODUCT_ACCELERATION 2
+
+typedef struct {
+    int kind;
+    real accuracy;   /* largest relative deviation from the Riccati sweep that is accepted */
+    real *estimate;  /* the largest one seen */
+    real *workspace; /* n_bodies x 400 */
+} mstmm_product;
+
 typedef struct {
     int n_bodies, nq, nu, n_memory;
+    const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
     const mstmm_body *bodies;
     real gravity[3];
     int n_drives;
@@ -172,6 +187,10 @@ int mstmm_law_pass(mstmm_state *state, mstmm_balance *balance);
 int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance);
 /* tau = H^T f for any number of speeds. */
 void mstmm_effort(int nu, const real *subspace, const real *load, real *tau);
+/* Accelerations by the product of classical matrices, before the Riccati sweep of the same state. */
+int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot);
+int mstmm_project(int nu, const real *rotation, const real *shift, const real *subspace,
+                  const real *deviation, const real *parent, real *udot);
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);
 
 #endif

@@ -5,6 +5,13 @@
 
 const mstmm_element *const mstmm_elements[] = {
     &mstmm_body_rigid,
+    &mstmm_classical_acceleration,
+    &mstmm_classical_acceleration_planar,
+    &mstmm_classical_ball,
+    &mstmm_classical_body_planar,
+    &mstmm_classical_body_spatial,
+    &mstmm_classical_pin_planar,
+    &mstmm_classical_pin_spatial,
     &mstmm_force_spring,
     &mstmm_hinge_ball,
     &mstmm_hinge_cylindrical,
@@ -28,4 +35,4 @@ const mstmm_element *const mstmm_elements[] = {
     NULL,
 };
 
-const int mstmm_element_count = 21;
+const int mstmm_element_count = 28;

@@ -40,6 +40,13 @@ int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict
     real *restrict T);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
+int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
+int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
+    const real *restrict motion, const real *restrict load, const real *restrict ro_n,
+    real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
+    real *restrict omega, real *restrict f_C, real *restrict m_C);
+int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
+    const real *restrict z, real *restrict delta);
 
 /* pose of a body
  * in  A_I[3][3] rotation, parent axes to inertial axes
@@ -1326,6 +1333,359 @@ static const mstmm_port mstmm_sweep_frames_length_outputs[] = {
     {"l", 2, "m, m/s", 0, 0},
 };
 
+/* vector in inertial axes
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  b[3] body axes
+ * out b_0[3] inertial axes
+ */
+int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0)
+{
+    const real t0 = A[0] * b[0];
+    const real t1 = A[1] * b[1];
+    const real t2 = t0 + t1;
+    const real t3 = A[2] * b[2];
+    const real t4 = t2 + t3;
+    b_0[0] = t4;
+    const real t5 = A[3] * b[0];
+    const real t6 = A[4] * b[1];
+    const real t7 = t5 + t6;
+    const real t8 = A[5] * b[2];
+    const real t9 = t7 + t8;
+    b_0[1] = t9;
+    const real t10 = A[6] * b[0];
+    const real t11 = A[7] * b[1];
+    const real t12 = t10 + t11;
+    const real t13 = A[8] * b[2];
+    const real t14 = t12 + t13;
+    b_0[2] = t14;
+    return 0;
+}
+
+static int mstmm_sweep_frames_turned_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_turned(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_turned_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"b", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_turned_outputs[] = {
+    {"b_0", 3, "", 0, 0},
+};
+
+/* inputs of the classical body matrix
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  p[10] parameters of the rigid body
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  load[6] (N, N*m) applied force and moment at P, body axes
+ * in  ro_n[3] (m) inboard point of the next hinge, body axes
+ * out M[1] (kg) mass
+ * out r_IO[3] (m) output end from input end, inertial axes
+ * out r_IC[3] (m) mass centre from input end, inertial axes
+ * out J_I[6] (kg*m2) about the input end, inertial axes
+ * out omega[3] (rad/s) angular velocity, inertial axes
+ * out f_C[3] (N) force at the mass centre
+ * out m_C[3] (N*m) moment
+ */
+int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
+    const real *restrict motion, const real *restrict load, const real *restrict ro_n,
+    real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
+    real *restrict omega, real *restrict f_C, real *restrict m_C)
+{
+    M[0] = p[0];
+    const real t0 = A[0] * ro_n[0];
+    const real t1 = A[1] * ro_n[1];
+    const real t2 = t0 + t1;
+    const real t3 = A[2] * ro_n[2];
+    const real t4 = t2 + t3;
+    r_IO[0] = t4;
+    const real t5 = A[3] * ro_n[0];
+    const real t6 = A[4] * ro_n[1];
+    const real t7 = t5 + t6;
+    const real t8 = A[5] * ro_n[2];
+    const real t9 = t7 + t8;
+    r_IO[1] = t9;
+    const real t10 = A[6] * ro_n[0];
+    const real t11 = A[7] * ro_n[1];
+    const real t12 = t10 + t11;
+    const real t13 = A[8] * ro_n[2];
+    const real t14 = t12 + t13;
+    r_IO[2] = t14;
+    const real t15 = 1.0 / p[0];
+    const real t16 = p[1] * t15;
+    const real t17 = A[0] * t16;
+    const real t18 = p[2] * t15;
+    const real t19 = A[1] * t18;
+    const real t20 = t17 + t19;
+    const real t21 = p[3] * t15;
+    const real t22 = A[2] * t21;
+    const real t23 = t20 + t22;
+    r_IC[0] = t23;
+    const real t24 = A[3] * t16;
+    const real t25 = A[4] * t18;
+    const real t26 = t24 + t25;
+    const real t27 = A[5] * t21;
+    const real t28 = t26 + t27;
+    r_IC[1] = t28;
+    const real t29 = A[6] * t16;
+    const real t30 = A[7] * t18;
+    const real t31 = t29 + t30;
+    const real t32 = A[8] * t21;
+    const real t33 = t31 + t32;
+    r_IC[2] = t33;
+    const real t34 = A[0] * p[4];
+    const real t35 = A[1] * p[5];
+    const real t36 = t34 + t35;
+    const real t37 = A[2] * p[6];
+    const real t38 = t36 + t37;
+    const real t39 = A[0] * t38;
+    const real t40 = A[0] * p[5];
+    const real t41 = A[1] * p[7];
+    const real t42 = t40 + t41;
+    const real t43 = A[2] * p[8];
+    const real t44 = t42 + t43;
+    const real t45 = A[1] * t44;
+    const real t46 = t39 + t45;
+    const real t47 = A[0] * p[6];
+    const real t48 = A[1] * p[8];
+    const real t49 = t47 + t48;
+    const real t50 = A[2] * p[9];
+    const real t51 = t49 + t50;
+    const real t52 = A[2] * t51;
+    const real t53 = t46 + t52;
+    J_I[0] = t53;
+    const real t54 = A[3] * t38;
+    const real t55 = A[4] * t44;
+    const real t56 = t54 + t55;
+    const real t57 = A[5] * t51;
+    const real t58 = t56 + t57;
+    J_I[1] = t58;
+    const real t59 = A[6] * t38;
+    const real t60 = A[7] * t44;
+    const real t61 = t59 + t60;
+    const real t62 = A[8] * t51;
+    const real t63 = t61 + t62;
+    J_I[2] = t63;
+    const real t64 = A[3] * p[4];
+    const real t65 = A[4] * p[5];
+    const real t66 = t64 + t65;
+    const real t67 = A[5] * p[6];
+    const real t68 = t66 + t67;
+    const real t69 = A[3] * t68;
+    const real t70 = A[3] * p[5];
+    const real t71 = A[4] * p[7];
+    const real t72 = t70 + t71;
+    const real t73 = A[5] * p[8];
+    const real t74 = t72 + t73;
+    const real t75 = A[4] * t74;
+    const real t76 = t69 + t75;
+    const real t77 = A[3] * p[6];
+    const real t78 = A[4] * p[8];
+    const real t79 = t77 + t78;
+    const real t80 = A[5] * p[9];
+    const real t81 = t79 + t80;
+    const real t82 = A[5] * t81;
+    const real t83 = t76 + t82;
+    J_I[3] = t83;
+    const real t84 = A[6] * t68;
+    const real t85 = A[7] * t74;
+    const real t86 = t84 + t85;
+    const real t87 = A[8] * t81;
+    const real t88 = t86 + t87;
+    J_I[4] = t88;
+    const real t89 = A[6] * p[4];
+    const real t90 = A[7] * p[5];
+    const real t91 = t89 + t90;
+    const real t92 = A[8] * p[6];
+    const real t93 = t91 + t92;
+    const real t94 = A[6] * t93;
+    const real t95 = A[6] * p[5];
+    const real t96 = A[7] * p[7];
+    const real t97 = t95 + t96;
+    const real t98 = A[8] * p[8];
+    const real t99 = t97 + t98;
+    const real t100 = A[7] * t99;
+    const real t101 = t94 + t100;
+    const real t102 = A[6] * p[6];
+    const real t103 = A[7] * p[8];
+    const real t104 = t102 + t103;
+    const real t105 = A[8] * p[9];
+    const real t106 = t104 + t105;
+    const real t107 = A[8] * t106;
+    const real t108 = t101 + t107;
+    J_I[5] = t108;
+    const real t109 = A[0] * motion[0];
+    const real t110 = A[1] * motion[1];
+    const real t111 = t109 + t110;
+    const real t112 = A[2] * motion[2];
+    const real t113 = t111 + t112;
+    omega[0] = t113;
+    const real t114 = A[3] * motion[0];
+    const real t115 = A[4] * motion[1];
+    const real t116 = t114 + t115;
+    const real t117 = A[5] * motion[2];
+    const real t118 = t116 + t117;
+    omega[1] = t118;
+    const real t119 = A[6] * motion[0];
+    const real t120 = A[7] * motion[1];
+    const real t121 = t119 + t120;
+    const real t122 = A[8] * motion[2];
+    const real t123 = t121 + t122;
+    omega[2] = t123;
+    const real t124 = A[0] * load[0];
+    const real t125 = A[1] * load[1];
+    const real t126 = t124 + t125;
+    const real t127 = A[2] * load[2];
+    const real t128 = t126 + t127;
+    f_C[0] = t128;
+    const real t129 = A[3] * load[0];
+    const real t130 = A[4] * load[1];
+    const real t131 = t129 + t130;
+    const real t132 = A[5] * load[2];
+    const real t133 = t131 + t132;
+    f_C[1] = t133;
+    const real t134 = A[6] * load[0];
+    const real t135 = A[7] * load[1];
+    const real t136 = t134 + t135;
+    const real t137 = A[8] * load[2];
+    const real t138 = t136 + t137;
+    f_C[2] = t138;
+    const real t139 = p[3] * load[1];
+    const real t140 = t15 * t139;
+    const real t141 = p[2] * load[2];
+    const real t142 = t15 * t141;
+    const real t143 = t140 - t142;
+    const real t144 = load[3] + t143;
+    const real t145 = A[0] * t144;
+    const real t146 = p[1] * load[2];
+    const real t147 = t15 * t146;
+    const real t148 = p[3] * load[0];
+    const real t149 = t15 * t148;
+    const real t150 = t147 - t149;
+    const real t151 = load[4] + t150;
+    const real t152 = A[1] * t151;
+    const real t153 = t145 + t152;
+    const real t154 = p[2] * load[0];
+    const real t155 = t15 * t154;
+    const real t156 = p[1] * load[1];
+    const real t157 = t15 * t156;
+    const real t158 = t155 - t157;
+    const real t159 = load[5] + t158;
+    const real t160 = A[2] * t159;
+    const real t161 = t153 + t160;
+    m_C[0] = t161;
+    const real t162 = A[3] * t144;
+    const real t163 = A[4] * t151;
+    const real t164 = t162 + t163;
+    const real t165 = A[5] * t159;
+    const real t166 = t164 + t165;
+    m_C[1] = t166;
+    const real t167 = A[6] * t144;
+    const real t168 = A[7] * t151;
+    const real t169 = t167 + t168;
+    const real t170 = A[8] * t159;
+    const real t171 = t169 + t170;
+    m_C[2] = t171;
+    return 0;
+}
+
+static int mstmm_sweep_frames_classical_body_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_classical_body(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_sweep_frames_classical_body_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"p", 10, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"load", 6, "N, N*m", 0, 0},
+    {"ro_n", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_classical_body_outputs[] = {
+    {"M", 1, "kg", 0, 0},
+    {"r_IO", 3, "m", 0, 0},
+    {"r_IC", 3, "m", 0, 0},
+    {"J_I", 6, "kg*m2", 0, 0},
+    {"omega", 3, "rad/s", 0, 0},
+    {"f_C", 3, "N", 0, 0},
+    {"m_C", 3, "N*m", 0, 0},
+};
+
+/* deviation read from a classical state vector
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  z[13] [rdd; omegadot; m; q; 1] at P, inertial axes
+ * out delta[6] deviation of the body's acceleration
+ */
+int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
+    const real *restrict z, real *restrict delta)
+{
+    const real t0 = A[0] * z[0];
+    const real t1 = A[3] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = A[6] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = t4 - motion[6];
+    delta[0] = t5;
+    const real t6 = A[1] * z[0];
+    const real t7 = A[4] * z[1];
+    const real t8 = t6 + t7;
+    const real t9 = A[7] * z[2];
+    const real t10 = t8 + t9;
+    const real t11 = t10 - motion[7];
+    delta[1] = t11;
+    const real t12 = A[2] * z[0];
+    const real t13 = A[5] * z[1];
+    const real t14 = t12 + t13;
+    const real t15 = A[8] * z[2];
+    const real t16 = t14 + t15;
+    const real t17 = t16 - motion[8];
+    delta[2] = t17;
+    const real t18 = A[0] * z[3];
+    const real t19 = A[3] * z[4];
+    const real t20 = t18 + t19;
+    const real t21 = A[6] * z[5];
+    const real t22 = t20 + t21;
+    const real t23 = t22 - motion[3];
+    delta[3] = t23;
+    const real t24 = A[1] * z[3];
+    const real t25 = A[4] * z[4];
+    const real t26 = t24 + t25;
+    const real t27 = A[7] * z[5];
+    const real t28 = t26 + t27;
+    const real t29 = t28 - motion[4];
+    delta[4] = t29;
+    const real t30 = A[2] * z[3];
+    const real t31 = A[5] * z[4];
+    const real t32 = t30 + t31;
+    const real t33 = A[8] * z[5];
+    const real t34 = t32 + t33;
+    const real t35 = t34 - motion[5];
+    delta[5] = t35;
+    return 0;
+}
+
+static int mstmm_sweep_frames_state_deviation_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_state_deviation(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_state_deviation_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"z", 13, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
     {
         .name = "pose",
@@ -1495,13 +1855,49 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "turned",
+        .function = (void (*)(void))mstmm_sweep_frames_turned,
+        .call = mstmm_sweep_frames_turned_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_turned_inputs,
+        .outputs = mstmm_sweep_frames_turned_outputs,
+        .ir_hash = "91b284cec3555bea70e1b171449767df3fa83896ea7efbea2188e1f5fc8fb8ae",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "classical_body",
+        .function = (void (*)(void))mstmm_sweep_frames_classical_body,
+        .call = mstmm_sweep_frames_classical_body_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_sweep_frames_classical_body_inputs,
+        .outputs = mstmm_sweep_frames_classical_body_outputs,
+        .ir_hash = "c090364b284f4639b2c20617f53a7b4d3491a6082966bbe659438feeb11ab69d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "state_deviation",
+        .function = (void (*)(void))mstmm_sweep_frames_state_deviation,
+        .call = mstmm_sweep_frames_state_deviation_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_state_deviation_inputs,
+        .outputs = mstmm_sweep_frames_state_deviation_outputs,
+        .ir_hash = "12eb6a870ab59d82f57c2713bcd91a691f2a6e2dddaf711e8032564cd6b710ce",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "db2a410555a08d9329e8f2b3491f73f2e37de2711f7d14d294f19a894edc7dc4",
+    .hash = "e0b812cf3b15b8ececcc6d0fc91439e6714f59b95ac64d6d75f7fa09fd4318c0",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1511,6 +1907,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 14,
+    .n_kernels = 17,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -22,6 +22,9 @@ int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 0 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -884,6 +887,45 @@ static const mstmm_port mstmm_sweep_generic0_effort_outputs[] = {
     {"tau", 0, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 0 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][0] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[0] accelerations of the coordinates
+ */
+int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    (void)Rc;
+    (void)r;
+    (void)H;
+    (void)delta;
+    (void)delta_I;
+    (void)udot;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 0, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
+    {"udot", 0, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
     {
         .name = "forward",
@@ -933,13 +975,25 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic0_project,
+        .call = mstmm_sweep_generic0_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_project_inputs,
+        .outputs = mstmm_sweep_generic0_project_outputs,
+        .ir_hash = "1c62b6e9dc39b1aca8af7aa5dcb7d7442ee7b6f96729d8b638ae7a7dbda8604d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "af9aa7efddd46b19f0d56d6bbccf957f4a016d3b813f2b653fbadf64a5fd29fb",
+    .hash = "6d93a1ac0aa45ac8c7467efadcad1c2b96d82ae67c33a05219eb1c99bf6c4eb2",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -949,6 +1003,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic0_kernels,
 };

@@ -22,6 +22,9 @@ int mstmm_sweep_generic1_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1126,6 +1129,118 @@ static const mstmm_port mstmm_sweep_generic1_effort_outputs[] = {
     {"tau", 1, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 1 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[1] accelerations of the coordinates
+ */
+int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    const real t0 = H[0] * H[0];
+    const real t1 = H[1] * H[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * H[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * H[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * H[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * H[5];
+    const real t10 = t8 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t12 = r[2] * delta_I[4];
+    const real t13 = r[1] * delta_I[5];
+    const real t14 = t12 - t13;
+    const real t15 = delta_I[0] + t14;
+    const real t16 = Rc[0] * t15;
+    const real t17 = r[0] * delta_I[5];
+    const real t18 = r[2] * delta_I[3];
+    const real t19 = t17 - t18;
+    const real t20 = delta_I[1] + t19;
+    const real t21 = Rc[3] * t20;
+    const real t22 = t16 + t21;
+    const real t23 = r[1] * delta_I[3];
+    const real t24 = r[0] * delta_I[4];
+    const real t25 = t23 - t24;
+    const real t26 = delta_I[2] + t25;
+    const real t27 = Rc[6] * t26;
+    const real t28 = t22 + t27;
+    const real t29 = delta[0] - t28;
+    const real t30 = H[0] * t29;
+    const real t31 = Rc[1] * t15;
+    const real t32 = Rc[4] * t20;
+    const real t33 = t31 + t32;
+    const real t34 = Rc[7] * t26;
+    const real t35 = t33 + t34;
+    const real t36 = delta[1] - t35;
+    const real t37 = H[1] * t36;
+    const real t38 = t30 + t37;
+    const real t39 = Rc[2] * t15;
+    const real t40 = Rc[5] * t20;
+    const real t41 = t39 + t40;
+    const real t42 = Rc[8] * t26;
+    const real t43 = t41 + t42;
+    const real t44 = delta[2] - t43;
+    const real t45 = H[2] * t44;
+    const real t46 = t38 + t45;
+    const real t47 = Rc[0] * delta_I[3];
+    const real t48 = Rc[3] * delta_I[4];
+    const real t49 = t47 + t48;
+    const real t50 = Rc[6] * delta_I[5];
+    const real t51 = t49 + t50;
+    const real t52 = delta[3] - t51;
+    const real t53 = H[3] * t52;
+    const real t54 = t46 + t53;
+    const real t55 = Rc[1] * delta_I[3];
+    const real t56 = Rc[4] * delta_I[4];
+    const real t57 = t55 + t56;
+    const real t58 = Rc[7] * delta_I[5];
+    const real t59 = t57 + t58;
+    const real t60 = delta[4] - t59;
+    const real t61 = H[4] * t60;
+    const real t62 = t54 + t61;
+    const real t63 = Rc[2] * delta_I[3];
+    const real t64 = Rc[5] * delta_I[4];
+    const real t65 = t63 + t64;
+    const real t66 = Rc[8] * delta_I[5];
+    const real t67 = t65 + t66;
+    const real t68 = delta[5] - t67;
+    const real t69 = H[5] * t68;
+    const real t70 = t62 + t69;
+    const real t71 = 1.0 / t10;
+    const real t72 = t70 * t71;
+    udot[0] = t72;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_project_outputs[] = {
+    {"udot", 1, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -1175,13 +1290,25 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic1_project,
+        .call = mstmm_sweep_generic1_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_project_inputs,
+        .outputs = mstmm_sweep_generic1_project_outputs,
+        .ir_hash = "5f6475ea60dbd3fc522a41cb9b8e734cac79db28e47007550d32e305766c0f23",
+        .n_guards = 1,
+        .guards = mstmm_sweep_generic1_project_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "d10f18a24a665ff78b113ac4baf8c0dddbf6d9272444ca8d348b9f6cdce76579",
+    .hash = "1c7e53de9c181bdc25e3075323097dded1e2c135ddca70be5d36ab3896344604",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1191,6 +1318,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic1_kernels,
 };

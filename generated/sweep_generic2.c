@@ -22,6 +22,9 @@ int mstmm_sweep_generic2_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1412,6 +1415,165 @@ static const mstmm_port mstmm_sweep_generic2_effort_outputs[] = {
     {"tau", 2, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 2 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][2] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[2] accelerations of the coordinates
+ */
+int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    const real t0 = H[0] * H[0];
+    const real t1 = H[2] * H[2];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * H[4];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * H[6];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * H[8];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * H[10];
+    const real t10 = t8 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[3] * H[3];
+    const real t14 = t12 + t13;
+    const real t15 = H[5] * H[5];
+    const real t16 = t14 + t15;
+    const real t17 = H[7] * H[7];
+    const real t18 = t16 + t17;
+    const real t19 = H[9] * H[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[11] * H[11];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[0] * H[1];
+    const real t25 = H[2] * H[3];
+    const real t26 = t24 + t25;
+    const real t27 = H[4] * H[5];
+    const real t28 = t26 + t27;
+    const real t29 = H[6] * H[7];
+    const real t30 = t28 + t29;
+    const real t31 = H[8] * H[9];
+    const real t32 = t30 + t31;
+    const real t33 = H[10] * H[11];
+    const real t34 = t32 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t40 = r[2] * delta_I[4];
+    const real t41 = r[1] * delta_I[5];
+    const real t42 = t40 - t41;
+    const real t43 = delta_I[0] + t42;
+    const real t44 = Rc[0] * t43;
+    const real t45 = r[0] * delta_I[5];
+    const real t46 = r[2] * delta_I[3];
+    const real t47 = t45 - t46;
+    const real t48 = delta_I[1] + t47;
+    const real t49 = Rc[3] * t48;
+    const real t50 = t44 + t49;
+    const real t51 = r[1] * delta_I[3];
+    const real t52 = r[0] * delta_I[4];
+    const real t53 = t51 - t52;
+    const real t54 = delta_I[2] + t53;
+    const real t55 = Rc[6] * t54;
+    const real t56 = t50 + t55;
+    const real t57 = delta[0] - t56;
+    const real t58 = H[0] * t57;
+    const real t59 = Rc[1] * t43;
+    const real t60 = Rc[4] * t48;
+    const real t61 = t59 + t60;
+    const real t62 = Rc[7] * t54;
+    const real t63 = t61 + t62;
+    const real t64 = delta[1] - t63;
+    const real t65 = H[2] * t64;
+    const real t66 = t58 + t65;
+    const real t67 = Rc[2] * t43;
+    const real t68 = Rc[5] * t48;
+    const real t69 = t67 + t68;
+    const real t70 = Rc[8] * t54;
+    const real t71 = t69 + t70;
+    const real t72 = delta[2] - t71;
+    const real t73 = H[4] * t72;
+    const real t74 = t66 + t73;
+    const real t75 = Rc[0] * delta_I[3];
+    const real t76 = Rc[3] * delta_I[4];
+    const real t77 = t75 + t76;
+    const real t78 = Rc[6] * delta_I[5];
+    const real t79 = t77 + t78;
+    const real t80 = delta[3] - t79;
+    const real t81 = H[6] * t80;
+    const real t82 = t74 + t81;
+    const real t83 = Rc[1] * delta_I[3];
+    const real t84 = Rc[4] * delta_I[4];
+    const real t85 = t83 + t84;
+    const real t86 = Rc[7] * delta_I[5];
+    const real t87 = t85 + t86;
+    const real t88 = delta[4] - t87;
+    const real t89 = H[8] * t88;
+    const real t90 = t82 + t89;
+    const real t91 = Rc[2] * delta_I[3];
+    const real t92 = Rc[5] * delta_I[4];
+    const real t93 = t91 + t92;
+    const real t94 = Rc[8] * delta_I[5];
+    const real t95 = t93 + t94;
+    const real t96 = delta[5] - t95;
+    const real t97 = H[10] * t96;
+    const real t98 = t90 + t97;
+    const real t99 = t98 * t35;
+    const real t100 = 1.0 / t38;
+    const real t101 = H[1] * t57;
+    const real t102 = H[3] * t64;
+    const real t103 = t101 + t102;
+    const real t104 = H[5] * t72;
+    const real t105 = t103 + t104;
+    const real t106 = H[7] * t80;
+    const real t107 = t105 + t106;
+    const real t108 = H[9] * t88;
+    const real t109 = t107 + t108;
+    const real t110 = H[11] * t96;
+    const real t111 = t109 + t110;
+    const real t112 = t98 * t36;
+    const real t113 = t111 - t112;
+    const real t114 = t100 * t113;
+    const real t115 = t36 * t114;
+    const real t116 = t99 - t115;
+    udot[0] = t116;
+    udot[1] = t114;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_project_outputs[] = {
+    {"udot", 2, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
     {
         .name = "forward",
@@ -1461,13 +1623,25 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic2_project,
+        .call = mstmm_sweep_generic2_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_project_inputs,
+        .outputs = mstmm_sweep_generic2_project_outputs,
+        .ir_hash = "f1fa509cb7c51f46950b8be2acc745c314c5a8bdc75d6af878462665ad3ceb58",
+        .n_guards = 2,
+        .guards = mstmm_sweep_generic2_project_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "1ad5f135fbc9f8b06192e08cf6dc27607d97427e64009d8a21ebc709f40a429a",
+    .hash = "5b650b93efdc0c555c68257bf44d33e3e802a9da482081d876be29b63f572005",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1477,6 +1651,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic2_kernels,
 };

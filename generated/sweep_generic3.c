@@ -22,6 +22,9 @@ int mstmm_sweep_generic3_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1742,6 +1745,232 @@ static const mstmm_port mstmm_sweep_generic3_effort_outputs[] = {
     {"tau", 3, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 3 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[3] accelerations of the coordinates
+ */
+int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    const real t0 = H[0] * H[0];
+    const real t1 = H[3] * H[3];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * H[6];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * H[9];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * H[12];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * H[15];
+    const real t10 = t8 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[4] * H[4];
+    const real t14 = t12 + t13;
+    const real t15 = H[7] * H[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[10] * H[10];
+    const real t18 = t16 + t17;
+    const real t19 = H[13] * H[13];
+    const real t20 = t18 + t19;
+    const real t21 = H[16] * H[16];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[0] * H[1];
+    const real t25 = H[3] * H[4];
+    const real t26 = t24 + t25;
+    const real t27 = H[6] * H[7];
+    const real t28 = t26 + t27;
+    const real t29 = H[9] * H[10];
+    const real t30 = t28 + t29;
+    const real t31 = H[12] * H[13];
+    const real t32 = t30 + t31;
+    const real t33 = H[15] * H[16];
+    const real t34 = t32 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[5] * H[5];
+    const real t42 = t40 + t41;
+    const real t43 = H[8] * H[8];
+    const real t44 = t42 + t43;
+    const real t45 = H[11] * H[11];
+    const real t46 = t44 + t45;
+    const real t47 = H[14] * H[14];
+    const real t48 = t46 + t47;
+    const real t49 = H[17] * H[17];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[0] * H[2];
+    const real t53 = H[3] * H[5];
+    const real t54 = t52 + t53;
+    const real t55 = H[6] * H[8];
+    const real t56 = t54 + t55;
+    const real t57 = H[9] * H[11];
+    const real t58 = t56 + t57;
+    const real t59 = H[12] * H[14];
+    const real t60 = t58 + t59;
+    const real t61 = H[15] * H[17];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[4] * H[5];
+    const real t68 = t66 + t67;
+    const real t69 = H[7] * H[8];
+    const real t70 = t68 + t69;
+    const real t71 = H[10] * H[11];
+    const real t72 = t70 + t71;
+    const real t73 = H[13] * H[14];
+    const real t74 = t72 + t73;
+    const real t75 = H[16] * H[17];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t84 = r[2] * delta_I[4];
+    const real t85 = r[1] * delta_I[5];
+    const real t86 = t84 - t85;
+    const real t87 = delta_I[0] + t86;
+    const real t88 = Rc[0] * t87;
+    const real t89 = r[0] * delta_I[5];
+    const real t90 = r[2] * delta_I[3];
+    const real t91 = t89 - t90;
+    const real t92 = delta_I[1] + t91;
+    const real t93 = Rc[3] * t92;
+    const real t94 = t88 + t93;
+    const real t95 = r[1] * delta_I[3];
+    const real t96 = r[0] * delta_I[4];
+    const real t97 = t95 - t96;
+    const real t98 = delta_I[2] + t97;
+    const real t99 = Rc[6] * t98;
+    const real t100 = t94 + t99;
+    const real t101 = delta[0] - t100;
+    const real t102 = H[0] * t101;
+    const real t103 = Rc[1] * t87;
+    const real t104 = Rc[4] * t92;
+    const real t105 = t103 + t104;
+    const real t106 = Rc[7] * t98;
+    const real t107 = t105 + t106;
+    const real t108 = delta[1] - t107;
+    const real t109 = H[3] * t108;
+    const real t110 = t102 + t109;
+    const real t111 = Rc[2] * t87;
+    const real t112 = Rc[5] * t92;
+    const real t113 = t111 + t112;
+    const real t114 = Rc[8] * t98;
+    const real t115 = t113 + t114;
+    const real t116 = delta[2] - t115;
+    const real t117 = H[6] * t116;
+    const real t118 = t110 + t117;
+    const real t119 = Rc[0] * delta_I[3];
+    const real t120 = Rc[3] * delta_I[4];
+    const real t121 = t119 + t120;
+    const real t122 = Rc[6] * delta_I[5];
+    const real t123 = t121 + t122;
+    const real t124 = delta[3] - t123;
+    const real t125 = H[9] * t124;
+    const real t126 = t118 + t125;
+    const real t127 = Rc[1] * delta_I[3];
+    const real t128 = Rc[4] * delta_I[4];
+    const real t129 = t127 + t128;
+    const real t130 = Rc[7] * delta_I[5];
+    const real t131 = t129 + t130;
+    const real t132 = delta[4] - t131;
+    const real t133 = H[12] * t132;
+    const real t134 = t126 + t133;
+    const real t135 = Rc[2] * delta_I[3];
+    const real t136 = Rc[5] * delta_I[4];
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * delta_I[5];
+    const real t139 = t137 + t138;
+    const real t140 = delta[5] - t139;
+    const real t141 = H[15] * t140;
+    const real t142 = t134 + t141;
+    const real t143 = t142 * t35;
+    const real t144 = H[1] * t101;
+    const real t145 = H[4] * t108;
+    const real t146 = t144 + t145;
+    const real t147 = H[7] * t116;
+    const real t148 = t146 + t147;
+    const real t149 = H[10] * t124;
+    const real t150 = t148 + t149;
+    const real t151 = H[13] * t132;
+    const real t152 = t150 + t151;
+    const real t153 = H[16] * t140;
+    const real t154 = t152 + t153;
+    const real t155 = t142 * t36;
+    const real t156 = t154 - t155;
+    const real t157 = t79 * t156;
+    const real t158 = 1.0 / t82;
+    const real t159 = H[2] * t101;
+    const real t160 = H[5] * t108;
+    const real t161 = t159 + t160;
+    const real t162 = H[8] * t116;
+    const real t163 = t161 + t162;
+    const real t164 = H[11] * t124;
+    const real t165 = t163 + t164;
+    const real t166 = H[14] * t132;
+    const real t167 = t165 + t166;
+    const real t168 = H[17] * t140;
+    const real t169 = t167 + t168;
+    const real t170 = t142 * t63;
+    const real t171 = t169 - t170;
+    const real t172 = t80 * t156;
+    const real t173 = t171 - t172;
+    const real t174 = t158 * t173;
+    const real t175 = t80 * t174;
+    const real t176 = t157 - t175;
+    const real t177 = t36 * t176;
+    const real t178 = t143 - t177;
+    const real t179 = t63 * t174;
+    const real t180 = t178 - t179;
+    udot[0] = t180;
+    udot[1] = t176;
+    udot[2] = t174;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_project_outputs[] = {
+    {"udot", 3, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
     {
         .name = "forward",
@@ -1791,13 +2020,25 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic3_project,
+        .call = mstmm_sweep_generic3_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_project_inputs,
+        .outputs = mstmm_sweep_generic3_project_outputs,
+        .ir_hash = "4b45ecaa0c3cf437593bb8bc3bc35e36a763f1d3daae3a3a069f39af88a0bd3f",
+        .n_guards = 3,
+        .guards = mstmm_sweep_generic3_project_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "65fc52f82a5a97054853372c9c142a12b045eeb3f46d7e8a3b0d4af0ae6e9112",
+    .hash = "7c1aa701650ac798a679e3735d64267388c98306035f81a07391bc5d48423a68",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1807,6 +2048,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic3_kernels,
 };

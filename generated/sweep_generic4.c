@@ -22,6 +22,9 @@ int mstmm_sweep_generic4_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 4 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2118,6 +2121,321 @@ static const mstmm_port mstmm_sweep_generic4_effort_outputs[] = {
     {"tau", 4, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 4 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][4] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[4] accelerations of the coordinates
+ */
+int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    const real t0 = H[0] * H[0];
+    const real t1 = H[4] * H[4];
+    const real t2 = t0 + t1;
+    const real t3 = H[8] * H[8];
+    const real t4 = t2 + t3;
+    const real t5 = H[12] * H[12];
+    const real t6 = t4 + t5;
+    const real t7 = H[16] * H[16];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * H[20];
+    const real t10 = t8 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[5] * H[5];
+    const real t14 = t12 + t13;
+    const real t15 = H[9] * H[9];
+    const real t16 = t14 + t15;
+    const real t17 = H[13] * H[13];
+    const real t18 = t16 + t17;
+    const real t19 = H[17] * H[17];
+    const real t20 = t18 + t19;
+    const real t21 = H[21] * H[21];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[0] * H[1];
+    const real t25 = H[4] * H[5];
+    const real t26 = t24 + t25;
+    const real t27 = H[8] * H[9];
+    const real t28 = t26 + t27;
+    const real t29 = H[12] * H[13];
+    const real t30 = t28 + t29;
+    const real t31 = H[16] * H[17];
+    const real t32 = t30 + t31;
+    const real t33 = H[20] * H[21];
+    const real t34 = t32 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[6] * H[6];
+    const real t42 = t40 + t41;
+    const real t43 = H[10] * H[10];
+    const real t44 = t42 + t43;
+    const real t45 = H[14] * H[14];
+    const real t46 = t44 + t45;
+    const real t47 = H[18] * H[18];
+    const real t48 = t46 + t47;
+    const real t49 = H[22] * H[22];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[0] * H[2];
+    const real t53 = H[4] * H[6];
+    const real t54 = t52 + t53;
+    const real t55 = H[8] * H[10];
+    const real t56 = t54 + t55;
+    const real t57 = H[12] * H[14];
+    const real t58 = t56 + t57;
+    const real t59 = H[16] * H[18];
+    const real t60 = t58 + t59;
+    const real t61 = H[20] * H[22];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[5] * H[6];
+    const real t68 = t66 + t67;
+    const real t69 = H[9] * H[10];
+    const real t70 = t68 + t69;
+    const real t71 = H[13] * H[14];
+    const real t72 = t70 + t71;
+    const real t73 = H[17] * H[18];
+    const real t74 = t72 + t73;
+    const real t75 = H[21] * H[22];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[3] * H[3];
+    const real t85 = H[7] * H[7];
+    const real t86 = t84 + t85;
+    const real t87 = H[11] * H[11];
+    const real t88 = t86 + t87;
+    const real t89 = H[15] * H[15];
+    const real t90 = t88 + t89;
+    const real t91 = H[19] * H[19];
+    const real t92 = t90 + t91;
+    const real t93 = H[23] * H[23];
+    const real t94 = t92 + t93;
+    const real t95 = t94 * ((real)1 / (real)10000000000000);
+    const real t96 = H[0] * H[3];
+    const real t97 = H[4] * H[7];
+    const real t98 = t96 + t97;
+    const real t99 = H[8] * H[11];
+    const real t100 = t98 + t99;
+    const real t101 = H[12] * H[15];
+    const real t102 = t100 + t101;
+    const real t103 = H[16] * H[19];
+    const real t104 = t102 + t103;
+    const real t105 = H[20] * H[23];
+    const real t106 = t104 + t105;
+    const real t107 = t106 * t35;
+    const real t108 = t106 * t107;
+    const real t109 = t94 - t108;
+    const real t110 = H[1] * H[3];
+    const real t111 = H[5] * H[7];
+    const real t112 = t110 + t111;
+    const real t113 = H[9] * H[11];
+    const real t114 = t112 + t113;
+    const real t115 = H[13] * H[15];
+    const real t116 = t114 + t115;
+    const real t117 = H[17] * H[19];
+    const real t118 = t116 + t117;
+    const real t119 = H[21] * H[23];
+    const real t120 = t118 + t119;
+    const real t121 = t106 * t36;
+    const real t122 = t120 - t121;
+    const real t123 = t79 * t122;
+    const real t124 = t122 * t123;
+    const real t125 = t109 - t124;
+    const real t126 = H[2] * H[3];
+    const real t127 = H[6] * H[7];
+    const real t128 = t126 + t127;
+    const real t129 = H[10] * H[11];
+    const real t130 = t128 + t129;
+    const real t131 = H[14] * H[15];
+    const real t132 = t130 + t131;
+    const real t133 = H[18] * H[19];
+    const real t134 = t132 + t133;
+    const real t135 = H[22] * H[23];
+    const real t136 = t134 + t135;
+    const real t137 = t106 * t63;
+    const real t138 = t136 - t137;
+    const real t139 = t80 * t122;
+    const real t140 = t138 - t139;
+    const real t141 = 1.0 / t82;
+    const real t142 = t141 * t140;
+    const real t143 = t140 * t142;
+    const real t144 = t125 - t143;
+    const real t145 = t95 < t144;
+    if (!(t145 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t146 = r[2] * delta_I[4];
+    const real t147 = r[1] * delta_I[5];
+    const real t148 = t146 - t147;
+    const real t149 = delta_I[0] + t148;
+    const real t150 = Rc[0] * t149;
+    const real t151 = r[0] * delta_I[5];
+    const real t152 = r[2] * delta_I[3];
+    const real t153 = t151 - t152;
+    const real t154 = delta_I[1] + t153;
+    const real t155 = Rc[3] * t154;
+    const real t156 = t150 + t155;
+    const real t157 = r[1] * delta_I[3];
+    const real t158 = r[0] * delta_I[4];
+    const real t159 = t157 - t158;
+    const real t160 = delta_I[2] + t159;
+    const real t161 = Rc[6] * t160;
+    const real t162 = t156 + t161;
+    const real t163 = delta[0] - t162;
+    const real t164 = H[0] * t163;
+    const real t165 = Rc[1] * t149;
+    const real t166 = Rc[4] * t154;
+    const real t167 = t165 + t166;
+    const real t168 = Rc[7] * t160;
+    const real t169 = t167 + t168;
+    const real t170 = delta[1] - t169;
+    const real t171 = H[4] * t170;
+    const real t172 = t164 + t171;
+    const real t173 = Rc[2] * t149;
+    const real t174 = Rc[5] * t154;
+    const real t175 = t173 + t174;
+    const real t176 = Rc[8] * t160;
+    const real t177 = t175 + t176;
+    const real t178 = delta[2] - t177;
+    const real t179 = H[8] * t178;
+    const real t180 = t172 + t179;
+    const real t181 = Rc[0] * delta_I[3];
+    const real t182 = Rc[3] * delta_I[4];
+    const real t183 = t181 + t182;
+    const real t184 = Rc[6] * delta_I[5];
+    const real t185 = t183 + t184;
+    const real t186 = delta[3] - t185;
+    const real t187 = H[12] * t186;
+    const real t188 = t180 + t187;
+    const real t189 = Rc[1] * delta_I[3];
+    const real t190 = Rc[4] * delta_I[4];
+    const real t191 = t189 + t190;
+    const real t192 = Rc[7] * delta_I[5];
+    const real t193 = t191 + t192;
+    const real t194 = delta[4] - t193;
+    const real t195 = H[16] * t194;
+    const real t196 = t188 + t195;
+    const real t197 = Rc[2] * delta_I[3];
+    const real t198 = Rc[5] * delta_I[4];
+    const real t199 = t197 + t198;
+    const real t200 = Rc[8] * delta_I[5];
+    const real t201 = t199 + t200;
+    const real t202 = delta[5] - t201;
+    const real t203 = H[20] * t202;
+    const real t204 = t196 + t203;
+    const real t205 = t204 * t35;
+    const real t206 = H[1] * t163;
+    const real t207 = H[5] * t170;
+    const real t208 = t206 + t207;
+    const real t209 = H[9] * t178;
+    const real t210 = t208 + t209;
+    const real t211 = H[13] * t186;
+    const real t212 = t210 + t211;
+    const real t213 = H[17] * t194;
+    const real t214 = t212 + t213;
+    const real t215 = H[21] * t202;
+    const real t216 = t214 + t215;
+    const real t217 = t204 * t36;
+    const real t218 = t216 - t217;
+    const real t219 = t79 * t218;
+    const real t220 = H[2] * t163;
+    const real t221 = H[6] * t170;
+    const real t222 = t220 + t221;
+    const real t223 = H[10] * t178;
+    const real t224 = t222 + t223;
+    const real t225 = H[14] * t186;
+    const real t226 = t224 + t225;
+    const real t227 = H[18] * t194;
+    const real t228 = t226 + t227;
+    const real t229 = H[22] * t202;
+    const real t230 = t228 + t229;
+    const real t231 = t204 * t63;
+    const real t232 = t230 - t231;
+    const real t233 = t80 * t218;
+    const real t234 = t232 - t233;
+    const real t235 = t141 * t234;
+    const real t236 = 1.0 / t144;
+    const real t237 = H[3] * t163;
+    const real t238 = H[7] * t170;
+    const real t239 = t237 + t238;
+    const real t240 = H[11] * t178;
+    const real t241 = t239 + t240;
+    const real t242 = H[15] * t186;
+    const real t243 = t241 + t242;
+    const real t244 = H[19] * t194;
+    const real t245 = t243 + t244;
+    const real t246 = H[23] * t202;
+    const real t247 = t245 + t246;
+    const real t248 = t204 * t107;
+    const real t249 = t247 - t248;
+    const real t250 = t123 * t218;
+    const real t251 = t249 - t250;
+    const real t252 = t142 * t234;
+    const real t253 = t251 - t252;
+    const real t254 = t236 * t253;
+    const real t255 = t142 * t254;
+    const real t256 = t235 - t255;
+    const real t257 = t80 * t256;
+    const real t258 = t219 - t257;
+    const real t259 = t123 * t254;
+    const real t260 = t258 - t259;
+    const real t261 = t36 * t260;
+    const real t262 = t205 - t261;
+    const real t263 = t63 * t256;
+    const real t264 = t262 - t263;
+    const real t265 = t107 * t254;
+    const real t266 = t264 - t265;
+    udot[0] = t266;
+    udot[1] = t260;
+    udot[2] = t256;
+    udot[3] = t254;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_project_outputs[] = {
+    {"udot", 4, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic4_project_guards[] = {
+    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
     {
         .name = "forward",
@@ -2167,13 +2485,25 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic4_project,
+        .call = mstmm_sweep_generic4_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_project_inputs,
+        .outputs = mstmm_sweep_generic4_project_outputs,
+        .ir_hash = "1c99162a137363764b4ab6c111c45dec5eb6ba47731bb813958fee177ad920f6",
+        .n_guards = 4,
+        .guards = mstmm_sweep_generic4_project_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "fe8d0d5c20e4477f277513cb3e818fac0ef6d7d1f9ad6e332eeb20483a7635f6",
+    .hash = "cbd8dd88a922127c382589b6a0f449735c8a0ef8bf959b5b4d56d8ed1814f841",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2183,6 +2513,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -22,6 +22,9 @@ int mstmm_sweep_generic5_recover(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, real *restrict tau);
+int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot);
 
 /* bias motion behind a hinge with 5 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2542,6 +2545,434 @@ static const mstmm_port mstmm_sweep_generic5_effort_outputs[] = {
     {"tau", 5, "N, N*m", 0, 0},
 };
 
+/* accelerations of a hinge with 5 speeds from those of its bodies
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][5] motion subspace
+ * in  delta[6] deviation of the body's acceleration, at P
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[5] accelerations of the coordinates
+ */
+int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
+    real *restrict udot)
+{
+    const real t0 = H[0] * H[0];
+    const real t1 = H[5] * H[5];
+    const real t2 = t0 + t1;
+    const real t3 = H[10] * H[10];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * H[15];
+    const real t6 = t4 + t5;
+    const real t7 = H[20] * H[20];
+    const real t8 = t6 + t7;
+    const real t9 = H[25] * H[25];
+    const real t10 = t8 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[6] * H[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[11] * H[11];
+    const real t16 = t14 + t15;
+    const real t17 = H[16] * H[16];
+    const real t18 = t16 + t17;
+    const real t19 = H[21] * H[21];
+    const real t20 = t18 + t19;
+    const real t21 = H[26] * H[26];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[0] * H[1];
+    const real t25 = H[5] * H[6];
+    const real t26 = t24 + t25;
+    const real t27 = H[10] * H[11];
+    const real t28 = t26 + t27;
+    const real t29 = H[15] * H[16];
+    const real t30 = t28 + t29;
+    const real t31 = H[20] * H[21];
+    const real t32 = t30 + t31;
+    const real t33 = H[25] * H[26];
+    const real t34 = t32 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[7] * H[7];
+    const real t42 = t40 + t41;
+    const real t43 = H[12] * H[12];
+    const real t44 = t42 + t43;
+    const real t45 = H[17] * H[17];
+    const real t46 = t44 + t45;
+    const real t47 = H[22] * H[22];
+    const real t48 = t46 + t47;
+    const real t49 = H[27] * H[27];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[0] * H[2];
+    const real t53 = H[5] * H[7];
+    const real t54 = t52 + t53;
+    const real t55 = H[10] * H[12];
+    const real t56 = t54 + t55;
+    const real t57 = H[15] * H[17];
+    const real t58 = t56 + t57;
+    const real t59 = H[20] * H[22];
+    const real t60 = t58 + t59;
+    const real t61 = H[25] * H[27];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[6] * H[7];
+    const real t68 = t66 + t67;
+    const real t69 = H[11] * H[12];
+    const real t70 = t68 + t69;
+    const real t71 = H[16] * H[17];
+    const real t72 = t70 + t71;
+    const real t73 = H[21] * H[22];
+    const real t74 = t72 + t73;
+    const real t75 = H[26] * H[27];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[3] * H[3];
+    const real t85 = H[8] * H[8];
+    const real t86 = t84 + t85;
+    const real t87 = H[13] * H[13];
+    const real t88 = t86 + t87;
+    const real t89 = H[18] * H[18];
+    const real t90 = t88 + t89;
+    const real t91 = H[23] * H[23];
+    const real t92 = t90 + t91;
+    const real t93 = H[28] * H[28];
+    const real t94 = t92 + t93;
+    const real t95 = t94 * ((real)1 / (real)10000000000000);
+    const real t96 = H[0] * H[3];
+    const real t97 = H[5] * H[8];
+    const real t98 = t96 + t97;
+    const real t99 = H[10] * H[13];
+    const real t100 = t98 + t99;
+    const real t101 = H[15] * H[18];
+    const real t102 = t100 + t101;
+    const real t103 = H[20] * H[23];
+    const real t104 = t102 + t103;
+    const real t105 = H[25] * H[28];
+    const real t106 = t104 + t105;
+    const real t107 = t106 * t35;
+    const real t108 = t106 * t107;
+    const real t109 = t94 - t108;
+    const real t110 = H[1] * H[3];
+    const real t111 = H[6] * H[8];
+    const real t112 = t110 + t111;
+    const real t113 = H[11] * H[13];
+    const real t114 = t112 + t113;
+    const real t115 = H[16] * H[18];
+    const real t116 = t114 + t115;
+    const real t117 = H[21] * H[23];
+    const real t118 = t116 + t117;
+    const real t119 = H[26] * H[28];
+    const real t120 = t118 + t119;
+    const real t121 = t106 * t36;
+    const real t122 = t120 - t121;
+    const real t123 = t79 * t122;
+    const real t124 = t122 * t123;
+    const real t125 = t109 - t124;
+    const real t126 = H[2] * H[3];
+    const real t127 = H[7] * H[8];
+    const real t128 = t126 + t127;
+    const real t129 = H[12] * H[13];
+    const real t130 = t128 + t129;
+    const real t131 = H[17] * H[18];
+    const real t132 = t130 + t131;
+    const real t133 = H[22] * H[23];
+    const real t134 = t132 + t133;
+    const real t135 = H[27] * H[28];
+    const real t136 = t134 + t135;
+    const real t137 = t106 * t63;
+    const real t138 = t136 - t137;
+    const real t139 = t80 * t122;
+    const real t140 = t138 - t139;
+    const real t141 = 1.0 / t82;
+    const real t142 = t141 * t140;
+    const real t143 = t140 * t142;
+    const real t144 = t125 - t143;
+    const real t145 = t95 < t144;
+    if (!(t145 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t146 = H[4] * H[4];
+    const real t147 = H[9] * H[9];
+    const real t148 = t146 + t147;
+    const real t149 = H[14] * H[14];
+    const real t150 = t148 + t149;
+    const real t151 = H[19] * H[19];
+    const real t152 = t150 + t151;
+    const real t153 = H[24] * H[24];
+    const real t154 = t152 + t153;
+    const real t155 = H[29] * H[29];
+    const real t156 = t154 + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[0] * H[4];
+    const real t159 = H[5] * H[9];
+    const real t160 = t158 + t159;
+    const real t161 = H[10] * H[14];
+    const real t162 = t160 + t161;
+    const real t163 = H[15] * H[19];
+    const real t164 = t162 + t163;
+    const real t165 = H[20] * H[24];
+    const real t166 = t164 + t165;
+    const real t167 = H[25] * H[29];
+    const real t168 = t166 + t167;
+    const real t169 = t168 * t35;
+    const real t170 = t168 * t169;
+    const real t171 = t156 - t170;
+    const real t172 = H[1] * H[4];
+    const real t173 = H[6] * H[9];
+    const real t174 = t172 + t173;
+    const real t175 = H[11] * H[14];
+    const real t176 = t174 + t175;
+    const real t177 = H[16] * H[19];
+    const real t178 = t176 + t177;
+    const real t179 = H[21] * H[24];
+    const real t180 = t178 + t179;
+    const real t181 = H[26] * H[29];
+    const real t182 = t180 + t181;
+    const real t183 = t168 * t36;
+    const real t184 = t182 - t183;
+    const real t185 = t79 * t184;
+    const real t186 = t184 * t185;
+    const real t187 = t171 - t186;
+    const real t188 = H[2] * H[4];
+    const real t189 = H[7] * H[9];
+    const real t190 = t188 + t189;
+    const real t191 = H[12] * H[14];
+    const real t192 = t190 + t191;
+    const real t193 = H[17] * H[19];
+    const real t194 = t192 + t193;
+    const real t195 = H[22] * H[24];
+    const real t196 = t194 + t195;
+    const real t197 = H[27] * H[29];
+    const real t198 = t196 + t197;
+    const real t199 = t168 * t63;
+    const real t200 = t198 - t199;
+    const real t201 = t80 * t184;
+    const real t202 = t200 - t201;
+    const real t203 = t141 * t202;
+    const real t204 = t202 * t203;
+    const real t205 = t187 - t204;
+    const real t206 = H[3] * H[4];
+    const real t207 = H[8] * H[9];
+    const real t208 = t206 + t207;
+    const real t209 = H[13] * H[14];
+    const real t210 = t208 + t209;
+    const real t211 = H[18] * H[19];
+    const real t212 = t210 + t211;
+    const real t213 = H[23] * H[24];
+    const real t214 = t212 + t213;
+    const real t215 = H[28] * H[29];
+    const real t216 = t214 + t215;
+    const real t217 = t168 * t107;
+    const real t218 = t216 - t217;
+    const real t219 = t123 * t184;
+    const real t220 = t218 - t219;
+    const real t221 = t142 * t202;
+    const real t222 = t220 - t221;
+    const real t223 = 1.0 / t144;
+    const real t224 = t223 * t222;
+    const real t225 = t222 * t224;
+    const real t226 = t205 - t225;
+    const real t227 = t157 < t226;
+    if (!(t227 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t228 = r[2] * delta_I[4];
+    const real t229 = r[1] * delta_I[5];
+    const real t230 = t228 - t229;
+    const real t231 = delta_I[0] + t230;
+    const real t232 = Rc[0] * t231;
+    const real t233 = r[0] * delta_I[5];
+    const real t234 = r[2] * delta_I[3];
+    const real t235 = t233 - t234;
+    const real t236 = delta_I[1] + t235;
+    const real t237 = Rc[3] * t236;
+    const real t238 = t232 + t237;
+    const real t239 = r[1] * delta_I[3];
+    const real t240 = r[0] * delta_I[4];
+    const real t241 = t239 - t240;
+    const real t242 = delta_I[2] + t241;
+    const real t243 = Rc[6] * t242;
+    const real t244 = t238 + t243;
+    const real t245 = delta[0] - t244;
+    const real t246 = H[0] * t245;
+    const real t247 = Rc[1] * t231;
+    const real t248 = Rc[4] * t236;
+    const real t249 = t247 + t248;
+    const real t250 = Rc[7] * t242;
+    const real t251 = t249 + t250;
+    const real t252 = delta[1] - t251;
+    const real t253 = H[5] * t252;
+    const real t254 = t246 + t253;
+    const real t255 = Rc[2] * t231;
+    const real t256 = Rc[5] * t236;
+    const real t257 = t255 + t256;
+    const real t258 = Rc[8] * t242;
+    const real t259 = t257 + t258;
+    const real t260 = delta[2] - t259;
+    const real t261 = H[10] * t260;
+    const real t262 = t254 + t261;
+    const real t263 = Rc[0] * delta_I[3];
+    const real t264 = Rc[3] * delta_I[4];
+    const real t265 = t263 + t264;
+    const real t266 = Rc[6] * delta_I[5];
+    const real t267 = t265 + t266;
+    const real t268 = delta[3] - t267;
+    const real t269 = H[15] * t268;
+    const real t270 = t262 + t269;
+    const real t271 = Rc[1] * delta_I[3];
+    const real t272 = Rc[4] * delta_I[4];
+    const real t273 = t271 + t272;
+    const real t274 = Rc[7] * delta_I[5];
+    const real t275 = t273 + t274;
+    const real t276 = delta[4] - t275;
+    const real t277 = H[20] * t276;
+    const real t278 = t270 + t277;
+    const real t279 = Rc[2] * delta_I[3];
+    const real t280 = Rc[5] * delta_I[4];
+    const real t281 = t279 + t280;
+    const real t282 = Rc[8] * delta_I[5];
+    const real t283 = t281 + t282;
+    const real t284 = delta[5] - t283;
+    const real t285 = H[25] * t284;
+    const real t286 = t278 + t285;
+    const real t287 = t286 * t35;
+    const real t288 = H[1] * t245;
+    const real t289 = H[6] * t252;
+    const real t290 = t288 + t289;
+    const real t291 = H[11] * t260;
+    const real t292 = t290 + t291;
+    const real t293 = H[16] * t268;
+    const real t294 = t292 + t293;
+    const real t295 = H[21] * t276;
+    const real t296 = t294 + t295;
+    const real t297 = H[26] * t284;
+    const real t298 = t296 + t297;
+    const real t299 = t286 * t36;
+    const real t300 = t298 - t299;
+    const real t301 = t79 * t300;
+    const real t302 = H[2] * t245;
+    const real t303 = H[7] * t252;
+    const real t304 = t302 + t303;
+    const real t305 = H[12] * t260;
+    const real t306 = t304 + t305;
+    const real t307 = H[17] * t268;
+    const real t308 = t306 + t307;
+    const real t309 = H[22] * t276;
+    const real t310 = t308 + t309;
+    const real t311 = H[27] * t284;
+    const real t312 = t310 + t311;
+    const real t313 = t286 * t63;
+    const real t314 = t312 - t313;
+    const real t315 = t80 * t300;
+    const real t316 = t314 - t315;
+    const real t317 = t141 * t316;
+    const real t318 = H[3] * t245;
+    const real t319 = H[8] * t252;
+    const real t320 = t318 + t319;
+    const real t321 = H[13] * t260;
+    const real t322 = t320 + t321;
+    const real t323 = H[18] * t268;
+    const real t324 = t322 + t323;
+    const real t325 = H[23] * t276;
+    const real t326 = t324 + t325;
+    const real t327 = H[28] * t284;
+    const real t328 = t326 + t327;
+    const real t329 = t286 * t107;
+    const real t330 = t328 - t329;
+    const real t331 = t123 * t300;
+    const real t332 = t330 - t331;
+    const real t333 = t142 * t316;
+    const real t334 = t332 - t333;
+    const real t335 = t223 * t334;
+    const real t336 = 1.0 / t226;
+    const real t337 = H[4] * t245;
+    const real t338 = H[9] * t252;
+    const real t339 = t337 + t338;
+    const real t340 = H[14] * t260;
+    const real t341 = t339 + t340;
+    const real t342 = H[19] * t268;
+    const real t343 = t341 + t342;
+    const real t344 = H[24] * t276;
+    const real t345 = t343 + t344;
+    const real t346 = H[29] * t284;
+    const real t347 = t345 + t346;
+    const real t348 = t286 * t169;
+    const real t349 = t347 - t348;
+    const real t350 = t185 * t300;
+    const real t351 = t349 - t350;
+    const real t352 = t203 * t316;
+    const real t353 = t351 - t352;
+    const real t354 = t224 * t334;
+    const real t355 = t353 - t354;
+    const real t356 = t336 * t355;
+    const real t357 = t224 * t356;
+    const real t358 = t335 - t357;
+    const real t359 = t142 * t358;
+    const real t360 = t317 - t359;
+    const real t361 = t203 * t356;
+    const real t362 = t360 - t361;
+    const real t363 = t80 * t362;
+    const real t364 = t301 - t363;
+    const real t365 = t123 * t358;
+    const real t366 = t364 - t365;
+    const real t367 = t185 * t356;
+    const real t368 = t366 - t367;
+    const real t369 = t36 * t368;
+    const real t370 = t287 - t369;
+    const real t371 = t63 * t362;
+    const real t372 = t370 - t371;
+    const real t373 = t107 * t358;
+    const real t374 = t372 - t373;
+    const real t375 = t169 * t356;
+    const real t376 = t374 - t375;
+    udot[0] = t376;
+    udot[1] = t368;
+    udot[2] = t362;
+    udot[3] = t358;
+    udot[4] = t356;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_project_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_project(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_project_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_project_outputs[] = {
+    {"udot", 5, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic5_project_guards[] = {
+    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
     {
         .name = "forward",
@@ -2591,13 +3022,25 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "project",
+        .function = (void (*)(void))mstmm_sweep_generic5_project,
+        .call = mstmm_sweep_generic5_project_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_project_inputs,
+        .outputs = mstmm_sweep_generic5_project_outputs,
+        .ir_hash = "0c359d9d84790dd89d940884a751fa48e01be58bae8748dd93638628531dcea6",
+        .n_guards = 5,
+        .guards = mstmm_sweep_generic5_project_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "190e94603df66d3d93ac6ff7758eb6ece0ed85f6d85e470b002c5d8664ac3876",
+    .hash = "053fe824bcf34a7eeb3c43fe82902c1291f3b5c4940c06e0ebd3521935e0b2df",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2607,6 +3050,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_sweep_generic5_kernels,
 };

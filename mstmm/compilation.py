@@ -28,7 +28,9 @@ class Generated:
     how: str
 
 
-def compile_scene(scene: Scene, engine: str = "auto", sweep: str = "riccati") -> Model:
+def compile_scene(
+    scene: Scene, engine: str = "auto", sweep: str = "riccati", accuracy: float = 1e-8
+) -> Model:
     """Model of a scene, ready to compute.
 
     Args:
@@ -36,6 +38,8 @@ def compile_scene(scene: Scene, engine: str = "auto", sweep: str = "riccati") ->
         engine: "auto" or "looped" (element kernels driven by a loop; any size, no compiler).
         sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
             matrices, chains only, guarded).
+        accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
+            largest acceleration, that is not an error.
 
     Raises SceneError for hinges that do not form a tree and types that nobody defines.
     """
@@ -49,7 +53,8 @@ def compile_scene(scene: Scene, engine: str = "auto", sweep: str = "riccati") ->
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
     why = "looped: the only engine of this release"
-    return Model(scene, known=elements, why=why)
+    product = accuracy if sweep == "product" else None
+    return Model(scene, known=elements, why=why, product_accuracy=product)
 
 
 def generate(elements: Iterable[Element]) -> list[Generated]:

@@ -16,7 +16,7 @@ from .pack import Packed
 
 Array = NDArray[np.float64]
 
-_UNDETERMINED, _FORCE, _EXPRESSION, _HINGE = 1, 2, 3, 4
+_UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT = 1, 2, 3, 4, 5, 6
 
 
 @dataclass(frozen=True)
@@ -199,4 +199,15 @@ class Engine:
             return f'spring "{name}" {at}: its direction is undefined because its ends coincide'
         if reason == _HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
+        if reason == _PIVOT:
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical transfer matrix '
+                'vanishes, so the product does not exist in this state; use sweep = "riccati"'
+            )
+        if reason == _PRODUCT:
+            return (
+                f"the product of transfer matrices {at}: its deviation from the Riccati sweep exceeds "
+                'the accuracy asked for (errors grow geometrically along the chain); '
+                'use sweep = "riccati"'
+            )
         return f"an expression of the scene cannot be evaluated {at}"

@@ -31,10 +31,16 @@ class Model:
     quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
     """
 
-    def __init__(self, scene: Scene, known: Known | None = None, why: str = "") -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        known: Known | None = None,
+        why: str = "",
+        product_accuracy: float | None = None,
+    ) -> None:
         self.scene, self.known = scene, known
-        self.engine_choice = why
-        self._engine = Engine(pack(scene, known))
+        self.engine_choice, self._product_accuracy = why, product_accuracy
+        self._engine = Engine(pack(scene, known, product_accuracy))
         self._static = self._without_motion()
 
     @property
@@ -145,7 +151,10 @@ class Model:
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
         """
-        return Model(named_parameters.changed(self.scene, changes), self.known, self.engine_choice)
+        return Model(
+            named_parameters.changed(self.scene, changes), self.known, self.engine_choice,
+            self._product_accuracy,
+        )  # fmt: skip
 
     def simulate(
         self,

@@ -15,6 +15,7 @@ from mstmm.topology import GROUND_INDEX, Topology, build
 
 from . import placement, prebuilt, values
 from .laws import pack_laws
+from .product import attach
 from .layout import HingeSlots, Layout
 from .placement import GROUND, KERNEL_OF, Placement
 from .prebuilt import Element
@@ -68,12 +69,20 @@ def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
     return KERNEL_OF.get(hinge.type, hinge.type)
 
 
-def pack(scene: Scene, known: Known | None = None) -> Packed:
+def pack(
+    scene: Scene, known: Known | None = None, product_accuracy: float | None = None
+) -> Packed:
     """Engine arrays of a scene; `known` are elements beyond the prebuilt ones.
+
+    With `product_accuracy` accelerations come from the plain product of classical matrices, which
+    may deviate from the Riccati sweep by that much.
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    return _Packing(scene, known or {}).run()
+    packed = _Packing(scene, known or {}).run()
+    if product_accuracy is not None:
+        attach(packed, product_accuracy)
+    return packed
 
 
 class _Packing:

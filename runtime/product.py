@@ -1,0 +1,65 @@
+"""The plain product of classical transfer matrices as a way to the accelerations of a chain.
+
+A didactic reference, not a solver: its pivots belong to one body and may vanish, and its error
+grows geometrically with the number of bodies.  Every evaluation is compared with the Riccati
+sweep, and stops where the deviation exceeds the accuracy asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.errors import SceneError
+
+if TYPE_CHECKING:
+    from .pack import Packed
+
+#: Hinge type -> kind of the C engine; a hinge and its successor must be of one kind.
+_KINDS = {"pin": "PIN", "ball": "BALL", "elastic": "ACCELERATION", "free": "ACCELERATION"}
+
+
+def attach(packed: Packed, accuracy: float) -> None:
+    """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
+    scene, lib, ffi = packed.scene, packed.lib, packed.ffi
+    _refuse(packed)
+    kind = _KINDS[scene.hinge[0].type]
+    bodies = len(scene.body)
+    arrays = np.zeros(bodies * 406 + packed.layout.nu), np.zeros(1)
+    record = ffi.new("mstmm_product *")
+    record.kind = getattr(lib, f"MSTMM_PRODUCT_{kind}")
+    record.accuracy = accuracy
+    record.workspace, record.estimate = (ffi.from_buffer("real[]", a) for a in arrays)
+    packed.model.product = record
+    packed.kept += [*arrays, record]
+
+
+def _refuse(packed: Packed) -> None:
+    """Name what the classical product has no matrix for."""
+    scene = packed.scene
+    way_out = 'use sweep = "riccati"'
+    if not packed.topology.is_chain:
+        raise SceneError(f"the product of transfer matrices needs an unbranched chain; {way_out}")
+    types = [scene.hinge[link.hinge].type for link in packed.topology.links]
+    for hinge, kind in zip(packed.topology.links, types, strict=True):
+        name = scene.hinge[hinge.hinge].name
+        if kind not in _KINDS:
+            raise SceneError(
+                f'hinge "{name}": there is no classical matrix for the type {kind}; {way_out}'
+            )
+        if _KINDS[kind] != _KINDS[types[0]]:
+            raise SceneError(
+                f'hinge "{name}": a {kind} behind a {types[0]} has no classical matrix, because its '
+                f"condition does not determine the free accelerations before it; {way_out}"
+            )
+    for body in scene.body:
+        if body.type != "rigid" or body.mass == 0:
+            raise SceneError(
+                f'body "{body.name}": the classical matrix is that of a rigid body with mass; {way_out}'
+            )
+    for hinge in scene.hinge:
+        if hinge.drive is not None or any(hinge.law.inertia):
+            raise SceneError(
+                f'hinge "{hinge.name}": drives and rotor inertia have no classical matrix; {way_out}'
+            )
