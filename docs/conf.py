@@ -11,7 +11,7 @@ from typing import Any
 project = "mstmm"
 author = "mstmm contributors"
 copyright = "2026, mstmm contributors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.apidoc", "sphinx.ext.viewcode"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.apidoc"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 apidoc_modules = [
@@ -27,7 +27,7 @@ apidoc_modules = [
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 suppress_warnings = ["ref.python"]  # short names that several classes share
-html_theme = "furo"
+toc_object_entries = False
 
 
 def plain_text(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
