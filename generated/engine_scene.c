@@ -252,8 +252,8 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
     const mstmm_model *model = run->model;
     memset(system, 0, sizeof *system);
     system->context = run;
-    system->n_error = model->nq + model->nu;
-    system->n_state = system->n_error + (run->with_power ? 1 : 0);
+    system->n_state = model->nq + model->nu + (run->with_power ? 1 : 0);
+    system->n_error = system->n_state; /* the work too: its power has kinks that motion has not */
     system->rhs = scene_rhs;
     system->accept = scene_accept;
     system->n_events = run->n_events;

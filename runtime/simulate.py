@@ -16,7 +16,7 @@ from mstmm.errors import SceneError
 
 from . import values
 from .engine import Engine, Probe
-from .integrate import Run, Statistics, Status
+from .integrate import Run, Samples, Statistics, Status
 from .pack import resize
 from .steppers import get
 
@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 
 #: Seconds between looks at progress, Ctrl-C and checkpoints.
 SLICE = 0.1
+
+#: The work is a by-product of a run: it may err by this many times rtol of the energy.
+_WORK_TOLERANCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -155,16 +158,30 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
         raise SceneError(
             f"method {settings.method!r} takes fixed steps: give step in s, or choose dopri5 or dop853"
         )
+    start = system.start(settings.t_start, q, u)
     breaks = [
         b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end
     ]
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau,
         t_start=settings.t_start, t_end=settings.t_end,
-        y0=system.start(settings.t_start, q, u), rtol=settings.rtol, atol=settings.atol,
+        y0=start, rtol=settings.rtol, atol=_tolerances(system, settings, start),
         step=settings.step, output_times=settings.output_times, breaks=breaks,
         max_step=settings.max_step, max_steps=settings.max_steps,
     )  # fmt: skip
+
+
+def _tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
+    """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
+    engine, tolerances = system.engine, np.full(len(start), settings.atol)
+    if system.with_power:
+        q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
+        seen = engine.observe(
+            np.array([settings.t_start]), q[None].copy(), u[None].copy(), system.memory[None].copy()
+        )
+        energy = float(np.abs(seen.sums[0, :3]).sum()) or 1.0
+        tolerances[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
+    return tolerances
 
 
 @contextmanager
@@ -205,6 +222,13 @@ def trajectory(
 ) -> Trajectory:
     """Samples of a run, split into coordinates, speeds and work."""
     samples = run.samples
+    if settings.output_times is not None:  # only the times asked for, not the events between
+        wanted = np.isin(samples.t, np.asarray(settings.output_times)) & (samples.event >= 0)
+        last = np.append(samples.t[1:] != samples.t[:-1], True)  # behind an event at such a time
+        keep = wanted & last
+        samples = Samples(
+            samples.t[keep], samples.y[keep], samples.memory[keep], samples.event[keep]
+        )
     nq, nu = system.engine.nq, system.engine.nu
     y, residual = settled(system.engine, samples.t, samples.y, samples.memory)
     work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
