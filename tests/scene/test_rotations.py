@@ -7,25 +7,20 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from reference.random_scenes import fresh_seed
 from scipy.spatial.transform import Rotation
 
 from mstmm import rotations as r
 
 
-def generator() -> np.random.Generator:
-    return np.random.default_rng(fresh_seed())
-
-
-def test_roll_pitch_yaw_is_about_fixed_axes_in_turn() -> None:
-    for angles in generator().uniform(-4, 4, (20, 3)):
+def test_roll_pitch_yaw_is_about_fixed_axes_in_turn(rng: np.random.Generator) -> None:
+    for angles in rng.uniform(-4, 4, (20, 3)):
         expected = Rotation.from_euler("xyz", angles).as_matrix()
         assert np.allclose(r.from_rpy(angles.tolist()), expected, atol=1e-15)
         assert r.from_orientation(angles.tolist()) == r.from_rpy(angles.tolist())
 
 
-def test_quaternions_there_and_back() -> None:
-    for q in generator().normal(size=(20, 4)):
+def test_quaternions_there_and_back(rng: np.random.Generator) -> None:
+    for q in rng.normal(size=(20, 4)):
         expected = Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
         matrix = r.from_orientation(q.tolist())
         assert np.allclose(matrix, expected, atol=1e-15)
@@ -39,8 +34,7 @@ def test_quaternion_of_half_turns(axis: tuple[float, float, float]) -> None:
     assert np.allclose(r.from_quaternion(r.to_quaternion(turned)), turned, atol=1e-15)
 
 
-def test_rotation_about_an_axis() -> None:
-    rng = generator()
+def test_rotation_about_an_axis(rng: np.random.Generator) -> None:
     for axis, angle in zip(rng.normal(size=(20, 3)), rng.uniform(-7, 7, 20), strict=True):
         expected = Rotation.from_rotvec(axis / np.linalg.norm(axis) * angle).as_matrix()
         assert np.allclose(r.about(axis.tolist(), float(angle)), expected, atol=4e-15)
@@ -58,8 +52,7 @@ def test_right_angles_are_exact(quarter: int) -> None:
         assert all(x in (-1, 0, 1) for row in make(angle) for x in row)
 
 
-def test_products() -> None:
-    rng = generator()
+def test_products(rng: np.random.Generator) -> None:
     a, b = (r.from_rpy(x.tolist()) for x in rng.normal(size=(2, 3)))
     v = rng.normal(size=3)
     assert np.allclose(r.product(a, b), np.array(a) @ np.array(b), atol=1e-15)
@@ -73,8 +66,8 @@ def test_unit_at_any_size(scale: float) -> None:
     assert r.unit((3 * scale, 0, -4 * scale)) == pytest.approx((0.6, 0, -0.8), abs=2e-16)
 
 
-def test_unit_is_idempotent() -> None:
-    for v in generator().normal(size=(200, 4)):
+def test_unit_is_idempotent(rng: np.random.Generator) -> None:
+    for v in rng.normal(size=(200, 4)):
         once = r.unit(v.tolist())
         assert r.unit(once) == pytest.approx(once, abs=2e-16)
 
@@ -85,8 +78,8 @@ def test_no_direction(v: tuple[float, float]) -> None:
         r.unit(v)
 
 
-def test_perpendicular_and_reject() -> None:
-    for v in [*generator().normal(size=(20, 3)).tolist(), [1, 0, 0], [0, -1, 0], [1, 1e-9, 0]]:
+def test_perpendicular_and_reject(rng: np.random.Generator) -> None:
+    for v in [*rng.normal(size=(20, 3)).tolist(), [1, 0, 0], [0, -1, 0], [1, 1e-9, 0]]:
         p = r.perpendicular(v)
         assert abs(np.dot(p, v)) < 1e-14 and r.norm(p) == pytest.approx(1)
     assert r.reject((1, 1, 0), (1, 0, 0)) == pytest.approx((0, 1, 0))
