@@ -105,7 +105,6 @@ static int after_change(const mstmm_work *work, int i) {
 
 static int stop_run(mstmm_run *run) {
   run->count.phase = PHASE_END;
-  run->count.status = MSTMM_STOPPED;
   return MSTMM_STOPPED;
 }
 
@@ -149,22 +148,34 @@ static int phase_here(const mstmm_work *work) {
 
 /* ---- the current state ---- */
 
-static int phase_sample(const mstmm_work *work) {
+/* Samples the current state if it is wanted and not there yet. */
+static int sample_current(const mstmm_work *work) {
   mstmm_run *run = work->run;
   int64_t *i = &run->count.output_index;
-  int wanted = run->n_outputs < 0;
-  if (*i < run->n_outputs && run->outputs[*i] <= run->real.t) wanted = 1;
-  if (wanted && !run->count.sampled) {
+  const int due = *i < run->n_outputs && run->outputs[*i] <= run->real.t;
+  if ((run->n_outputs < 0 || due) && !run->count.sampled) {
     if (!room(run, 1)) return MSTMM_BUFFER_FULL;
     put_sample(run, run->real.t, work->y, 0);
     run->n_samples++;
     run->count.sampled = 1;
   }
   while (*i < run->n_outputs && run->outputs[*i] <= run->real.t) (*i)++;
+  return 0;
+}
+
+static int phase_start(const mstmm_work *work) {
+  const int status = sample_current(work);
+  if (!status) work->run->count.phase = PHASE_HERE;
+  return status;
+}
+
+static int phase_sample(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  const int status = sample_current(work);
+  if (status) return status;
   run->count.phase = PHASE_STEP;
   if (run->real.t < run->t_end) return 0;
   run->count.phase = PHASE_END;
-  run->count.status = MSTMM_FINISHED;
   return MSTMM_FINISHED;
 }
 
@@ -317,14 +328,16 @@ static int phase_scan(const mstmm_work *work) {
 static int phase_output(const mstmm_work *work) {
   mstmm_run *run = work->run;
   int64_t *i = &run->count.output_index;
-  while (*i < run->n_outputs && run->outputs[*i] < run->real.t_stop) {
+  const int event = run->count.event >= 0; /* then the state at t_stop is dense output too */
+  while (*i < run->n_outputs && (run->outputs[*i] < run->real.t_stop ||
+                                 (event && run->outputs[*i] == run->real.t_stop))) {
     if (!room(run, 1)) return MSTMM_BUFFER_FULL;
     mstmm_dense(work, run->outputs[*i], work->y_event);
     put_sample(run, run->outputs[*i], work->y_event, 0);
     run->n_samples++;
     (*i)++;
   }
-  run->count.phase = run->count.event >= 0 ? PHASE_FIRE : PHASE_ACCEPT;
+  run->count.phase = event ? PHASE_FIRE : PHASE_ACCEPT;
   return 0;
 }
 
@@ -395,6 +408,7 @@ static int phase_accept(const mstmm_work *work) {
 
 static int make_phase(const mstmm_work *work) {
   switch (work->run->count.phase) {
+    case PHASE_START: return phase_start(work);
     case PHASE_HERE: return phase_here(work);
     case PHASE_SAMPLE: return phase_sample(work);
     case PHASE_STEP: return phase_step(work);
@@ -412,18 +426,34 @@ static double seconds(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+/* Looks at the clock after the first step, then after as many as pass in about 0.1 ms. */
+typedef struct pace {
+  double deadline, last;
+  int stride, left;
+} pace;
+
+static int time_is_up(pace *at) {
+  if (!isfinite(at->deadline) || --at->left > 0) return 0;
+  const double now = seconds();
+  at->stride = now - at->last > 1e-4 ? 1 : at->stride < 64 ? 2 * at->stride : 64;
+  at->left = at->stride;
+  at->last = now;
+  return now >= at->deadline;
+}
+
 int mstmm_advance(mstmm_run *run, double wall_seconds) {
   mstmm_work work;
   if (run->count.phase == PHASE_END) return (int)run->count.status;
   mstmm_work_cut(run, &work);
-  const double deadline = isfinite(wall_seconds) ? seconds() + wall_seconds : INFINITY;
-  run->count.status = MSTMM_RUNNING;
+  const int64_t steps = run->count.steps;
+  const double now = seconds();
+  pace at = {.deadline = now + wall_seconds, .last = now, .stride = 1, .left = 1};
   for (;;) {
+    const int64_t phase = run->count.phase;
     const int status = make_phase(&work);
     run->count.status = status;
     if (status < 0) run->count.phase = PHASE_END;
     if (status) return status;
-    if (run->count.phase == PHASE_STEP && isfinite(deadline) && seconds() >= deadline)
-      return MSTMM_RUNNING;
+    if (phase == PHASE_SAMPLE && run->count.steps > steps && time_is_up(&at)) return MSTMM_RUNNING;
   }
 }

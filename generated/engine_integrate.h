@@ -113,7 +113,7 @@ typedef struct mstmm_run {
   int64_t n_breaks;
   const double *breaks; /* strictly increasing */
   int64_t n_outputs;    /* < 0: a sample at every accepted step */
-  const double *outputs; /* increasing, within [t_start, t_end] */
+  const double *outputs; /* strictly increasing, within [t_start, t_end] */
   double *workspace;     /* mstmm_workspace_size doubles */
   /* The sample buffer: the caller's; empty it by n_samples = 0.  Samples inside a step are the
    * dense output, not passed through accept, with the memory of the step's start. */
@@ -122,7 +122,9 @@ typedef struct mstmm_run {
   double *sample_t;
   double *sample_y;      /* sample_capacity x n_state */
   double *sample_memory; /* sample_capacity x n_memory */
-  int64_t *sample_event; /* 0; -(i + 1) just before, i + 1 just after event i changed the state */
+  /* 0 for a step's end or an output time; i + 1 just after event i changed the state, -(i + 1) just
+   * before it unless that state stands in the samples already */
+  int64_t *sample_event;
   /* the state: read freely, write never */
   mstmm_run_real real;
   mstmm_run_count count;
@@ -134,8 +136,8 @@ int64_t mstmm_workspace_size(const mstmm_system *system, const mstmm_tableau *ta
  * MSTMM_BAD_ARGUMENT with count.code = 1 sizes, 2 times, 3 tolerances or steps, 4 breaks,
  * 5 output times, 6 sample buffer. */
 int mstmm_run_start(mstmm_run *run, const double *y0);
-/* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed (looked at
- * after every step, so one step is always made). */
+/* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed; one step is
+ * always made, and the clock is looked at about every 0.1 ms or every step. */
 int mstmm_advance(mstmm_run *run, double wall_seconds);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);

@@ -68,11 +68,9 @@ void mstmm_pass_breaks(mstmm_run *run) {
 
 /* ---- starting ---- */
 
-static int increasing(int64_t n, const double *x, int strictly) {
-  for (int64_t i = 0; i < n; i++) {
-    if (!isfinite(x[i])) return 0;
-    if (i && (strictly ? !(x[i] > x[i - 1]) : !(x[i] >= x[i - 1]))) return 0;
-  }
+static int increasing(int64_t n, const double *x) {
+  for (int64_t i = 0; i < n; i++)
+    if (!isfinite(x[i]) || (i && !(x[i] > x[i - 1]))) return 0;
   return 1;
 }
 
@@ -87,8 +85,8 @@ static int bad_argument(const mstmm_run *run) {
   if (run->fixed_step == 0.0 && (!run->tableau->error || (system->n_error && !run->atol))) return 3;
   for (int i = 0; run->atol && i < system->n_error; i++)
     if (!(run->atol[i] > 0.0)) return 3;
-  if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks, 1)) return 4;
-  if (!increasing(run->n_outputs, run->outputs, 0)) return 5;
+  if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks)) return 4;
+  if (!increasing(run->n_outputs, run->outputs)) return 5;
   if (run->n_outputs > 0 &&
       (run->outputs[0] < run->t_start || run->outputs[run->n_outputs - 1] > run->t_end))
     return 5;
@@ -129,7 +127,7 @@ int mstmm_run_start(mstmm_run *run, const double *y0) {
     work.last_fire[i] = NAN;
   }
   mstmm_pass_breaks(run);
-  run->count.phase = PHASE_HERE;
+  run->count.phase = PHASE_START;
   if (!mstmm_all_finite(run->system->n_state, work.y)) {
     run->count.phase = PHASE_END;
     run->count.status = mstmm_note(run, MSTMM_NOT_FINITE, 0,
@@ -146,7 +144,7 @@ const double *mstmm_run_y(const mstmm_run *run) {
 
 static int between_steps(const mstmm_run *run) {
   const int64_t phase = run->count.phase;
-  return phase == PHASE_HERE || phase == PHASE_SAMPLE || phase == PHASE_STEP || phase == PHASE_END;
+  return phase <= PHASE_STEP || phase == PHASE_END;
 }
 
 /* Doubles of workspace in a saved state: all of it within a step, little between steps. */
@@ -181,7 +179,7 @@ static int belongs(const mstmm_run *run, const mstmm_run_count *saved) {
   return saved->n_state == c->n_state && saved->n_events == c->n_events &&
          saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
          saved->n_extra == c->n_extra && saved->n_dense == c->n_dense &&
-         saved->phase >= PHASE_HERE && saved->phase <= PHASE_END && saved->event >= -1 &&
+         saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
          saved->event < c->n_events && saved->break_index >= 0 &&
          saved->break_index <= run->n_breaks && saved->output_index >= 0 &&
          saved->output_index <= (run->n_outputs > 0 ? run->n_outputs : 0);

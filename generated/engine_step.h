@@ -8,6 +8,7 @@
 
 /* Where the loop stands between two calls */
 enum {
+  PHASE_START,   /* sample the start */
   PHASE_HERE,    /* fire what has become true at the current state */
   PHASE_SAMPLE,  /* sample the current state, finish, or go on */
   PHASE_STEP,    /* make the trial step until its error is small enough */

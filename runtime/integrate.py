@@ -30,7 +30,7 @@ _ARGUMENTS = {
     3: "the tolerances or steps: absolute tolerances above zero, nothing negative, "
     "and a method with an error estimate unless the step is fixed",
     4: "the breaks: finite and strictly increasing",
-    5: "the output times: finite, increasing and within the run",
+    5: "the output times: finite, strictly increasing and within the run",
     6: "the sample buffer",
 }
 
@@ -133,7 +133,7 @@ class Run:
         rtol: relative tolerance.
         atol: absolute tolerance, one number or (n_error,), above zero.
         step: fixed step in seconds; None for adaptive steps.
-        output_times: increasing times of samples; None for every accepted step.
+        output_times: strictly increasing times of samples; None for every accepted step.
         breaks: strictly increasing times at which the right-hand side is not smooth.  Steps end
             there; the right-hand side never sees a break itself but the number before or after.
         first_step, min_step, max_step: seconds, 0 to let the loop choose.
@@ -206,7 +206,7 @@ class Run:
         t.error_low = null if tableau.E_low is None else self._doubles(tableau.E_low)
         t.a_extra, t.c_extra = self._doubles(tableau.A_extra), self._doubles(tableau.C_extra)
         t.dense = self._doubles(tableau.dense)
-        t.stability_limit = tableau.real_stability_limit()
+        t.stability_limit = tableau.real_stability_limit
         t.beta = tableau.beta
         self._kept.append(t)
         return t

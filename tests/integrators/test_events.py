@@ -121,13 +121,13 @@ def test_an_event_true_at_the_start_fires_there_once(lab: Lab) -> None:
     problem = rotation(lab, RESTART, y0=0.5)
     run = problem.solved("dopri5", 2.0, (1, 0), rtol=1e-9)
     assert problem.at.calls == 3
-    assert list(run.samples.event[:3]) == [-3, 3, 0]
+    assert list(run.samples.event[:3]) == [0, 3, 0]
     assert list(run.samples.t[:2]) == [0.0, 0.0]
     problem = rotation(lab, STOP, y0=0.5)
     run = problem.run("dopri5", 2.0, (1, 0), rtol=1e-9)
     assert run.advance() is Status.STOPPED
     assert run.t == 0.0
-    assert list(run.samples.event) == [3]
+    assert list(run.samples.event) == [0, 3]
 
 
 def test_answers_of_fire(lab: Lab) -> None:
@@ -181,6 +181,22 @@ def test_events_and_output_times_together(lab: Lab) -> None:
     assert np.all(np.diff(run.samples.t) >= 0.0)
     assert run.samples.y[:, 0] == pytest.approx(np.cos(run.samples.t), abs=1e-9)
     assert list(run.samples.event[~regular]) == [-1, 1]
+
+
+def test_output_times_are_all_there_where_events_coincide(lab: Lab) -> None:
+    # events at the start, at an output time, at a break and at the end
+    for answer in (RESTART, CONTINUE):
+        problem = rotation(lab, answer, t=1.5, y0=0.99)
+        run = problem.solved(
+            "dop853", 2.0, (1, 0), output_times=[0.0, 1.0, 1.5, 2.0], breaks=[1.5], rtol=1e-9
+        )
+        regular = run.samples.event == 0
+        assert run.samples.t[regular].tolist() == [0.0, 1.0, 1.5, 2.0]
+        assert problem.at.calls == 32
+    problem = rotation(lab, RESTART, t=2.0)
+    run = problem.solved("dop853", 2.0, (1, 0), output_times=[2.0], rtol=1e-9)
+    assert run.samples.event.tolist() == [0, -2, 2]
+    assert run.samples.t.tolist() == [2.0, 2.0, 2.0]
 
 
 def test_an_event_that_never_rests_is_reported(lab: Lab) -> None:

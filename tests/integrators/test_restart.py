@@ -138,3 +138,42 @@ def test_a_foreign_state_is_refused(lab: Lab) -> None:
     fresh = bouncing(lab).run("dop853", 1.5, START)
     fresh.restore(state)
     assert fresh.advance(10.0) is Status.FINISHED
+
+
+def drawn(rng: np.random.Generator) -> tuple[str, float, tuple[float, ...], dict[str, Any]]:
+    """Method, end, thresholds and answer of three events, and options of a run of the circle."""
+    t_end = float(rng.uniform(0.5, 12.0))
+    method = str(rng.choice(["rk4", "dopri5", "dop853"]))
+    options: dict[str, Any] = {"breaks": np.sort(rng.uniform(0, t_end, rng.integers(0, 4)))}
+    if rng.random() < 0.7:
+        options["output_times"] = np.unique(rng.choice([0.0, t_end, *rng.uniform(0, t_end, 9)], 7))
+    if method == "rk4" or rng.random() < 0.3:
+        options["step"] = float(rng.uniform(5e-3, 2e-2))
+    else:
+        options |= {"rtol": 1e-9, "atol": 1e-10}
+    events = (*rng.uniform([-1.2, 0.0, -1.2], [1.2, t_end, 1.2]), float(rng.choice([0, 1, 3])))
+    return method, t_end, events, options
+
+
+def circling(lab: Lab, events: tuple[float, ...]) -> Problem:
+    problem = lab.problem("harmonic", 2, 1.0, 0.0, 0.0, *events)
+    lab.lib.test_use_three(problem.system, problem.at)
+    return problem
+
+
+def test_drawn_runs_do_not_depend_on_how_they_are_cut(lab: Lab, rng: np.random.Generator) -> None:
+    for _ in range(30):
+        method, t_end, events, options = drawn(rng)
+        problem, again = circling(lab, events), circling(lab, events)
+        wanted = problem.solved(method, t_end, START, **options)
+        t, y, regular = wanted.samples.t, wanted.samples.y, wanted.samples.event == 0
+        assert np.abs(y - np.stack([np.cos(t), -np.sin(t)], axis=1)).max() < 2e-7
+        assert np.all(np.diff(t) >= 0.0)
+        if "output_times" in options:
+            assert np.array_equal(t[regular], options["output_times"])
+        run = again.run(method, t_end, START, capacity=int(rng.integers(2, 6)), **options)
+        while run.advance(0.0) is Status.RUNNING:
+            pass
+        assert equal(run.samples, wanted.samples)
+        assert run.statistics == wanted.statistics
+        assert again.at.calls == problem.at.calls

@@ -54,11 +54,11 @@ def test_dense_output_is_scipys() -> None:
 
 def test_stability_limits_are_the_published_ones() -> None:
     rk4 = steppers.get("rk4")
-    assert rk4.imaginary_stability_limit() == pytest.approx(2 * np.sqrt(2), abs=1e-6)
-    assert rk4.real_stability_limit() == pytest.approx(2.7853, abs=1e-4)
+    assert rk4.imaginary_stability_limit == pytest.approx(2 * np.sqrt(2), abs=1e-6)
+    assert rk4.real_stability_limit == pytest.approx(2.7853, abs=1e-4)
     # Hairer and Wanner, Solving ODE II, IV.2: about 3.3 for dopri5, 6.1 to 6.4 for dop853
-    assert steppers.get("dopri5").real_stability_limit() == pytest.approx(3.3, abs=0.05)
-    assert 6.1 < steppers.get("dop853").real_stability_limit() < 6.5
+    assert steppers.get("dopri5").real_stability_limit == pytest.approx(3.3, abs=0.05)
+    assert 6.1 < steppers.get("dop853").real_stability_limit < 6.5
 
 
 def test_unknown_method_names_the_known_ones() -> None:
