@@ -1,0 +1,16 @@
+"""`mstmm` and `python -m mstmm`."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    from .cli.guard import leave
+
+    leave(sys.argv[1:])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The command line: one command per file, heavy imports only inside the commands."""

@@ -1,0 +1,57 @@
+"""The commands, joined.  Importing this loads typer and nothing heavier."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .check import check
+from .demo import demo
+from .generate import generate
+from .listing import list_elements
+from .show import show
+from .simulate import simulate
+
+app = typer.Typer(
+    name="mstmm",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 1 a defect of mstmm, 2 bad input, 3 something this machine lacks, "
+    "4 numerical failure, 130 interrupted.",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from mstmm import __version__
+
+        from .output import say
+
+        say(f"mstmm {__version__}")
+        raise typer.Exit(0)
+
+
+@app.callback(invoke_without_command=True)
+def mstmm(
+    context: typer.Context,
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_version, help="Print the version."),
+    ] = False,
+) -> None:
+    """Multibody dynamics by transfer matrices: from a hinge's symbols to a simulation."""
+    if context.invoked_subcommand is None:
+        from .output import say
+
+        say(context.get_help())
+
+
+app.command("demo")(demo)
+app.command("simulate")(simulate)
+app.command("check")(check)
+app.command("list")(list_elements)
+app.command("show")(show)
+app.command("generate")(generate)

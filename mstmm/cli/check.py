@@ -1,0 +1,158 @@
+"""`mstmm check`: is this scene, this element, this file right?  Nothing is simulated or written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mstmm.errors import MstmmError
+
+from .options import Json, quoted
+
+if TYPE_CHECKING:
+    from mstmm.scene import Scene
+
+SCENE_ENDINGS = (".toml", ".json")
+
+Report = dict[str, Any]
+
+
+def check(
+    what: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE_OR_ELEMENT...",
+            help="Scene files (.toml, .json), Python files with elements of your own, or names of "
+            "elements (mstmm list).",
+        ),
+    ],
+    echo: Annotated[
+        bool, typer.Option("--echo", help="Print scenes with every default filled in.")
+    ] = False,
+    hinge: Annotated[
+        list[str] | None,
+        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Check scenes, definitions of elements, and kernels against the equations they come from."""
+    from .guard import explain
+    from .output import complain, emit_json, say
+
+    if hinge:
+        from .simulate import use_files
+
+        use_files(hinge)
+    reports: list[Report] = []
+    worst = 0
+    for each in what:
+        try:
+            report = _checker(each)(each)
+            text = report.pop("text")
+            if echo and "toml" in report:
+                text = report["toml"].rstrip("\n")
+            if not json:
+                say(text)
+        except MstmmError as error:
+            message, code = explain(error)
+            worst = max(worst, code)
+            report = {"ok": False, "message": message, "exit_code": code}
+            complain(message)
+        reports.append({"name": each, **report})
+    if json:
+        emit_json({"ok": worst == 0, "checked": reports})
+    if worst:
+        raise typer.Exit(worst)
+
+
+def _checker(what: str) -> Callable[[str], Report]:
+    ending = os.path.splitext(what)[1].lower()
+    if ending in SCENE_ENDINGS:
+        return _scene
+    if ending == ".py":
+        return _file
+    if not what or ending or "/" in what or os.path.exists(what):
+        raise MstmmError(
+            f"{quoted(what)}: expected a scene (.toml or .json), a Python file (.py) with "
+            "elements, or the name of an element; mstmm list shows the names"
+        )
+    return _element
+
+
+# --- scenes ---------------------------------------------------------------------------------------
+
+
+def _scene(path: str) -> Report:
+    """Validate, compile, and evaluate the accelerations once."""
+    import mstmm
+
+    from .simulate import at_start
+
+    scene = mstmm.load_scene(path)
+    model = mstmm.compile(scene)
+    at_start(path, model)
+    sizes = {
+        "bodies": len(scene.body), "hinges": len(scene.hinge), "coordinates": model.nq,
+        "speeds": model.nu, "springs": len(scene.spring), "loads": len(scene.load),
+        "events": len(scene.event),
+    }  # fmt: skip
+    report = {"ok": True, "kind": "scene", **sizes, "warnings": list(scene.warnings)}
+    return {**report, "toml": scene.to_toml(), "text": _scene_text(path, scene, sizes)}
+
+
+_ONE = {
+    "bodies": "body", "hinges": "hinge", "coordinates": "coordinate", "speeds": "speed",
+    "springs": "spring", "loads": "load", "events": "event",
+}  # fmt: skip
+
+
+def _scene_text(path: str, scene: Scene, sizes: dict[str, int]) -> str:
+    from . import report
+
+    said = ", ".join(
+        report.count(number, _ONE[name], name) for name, number in sizes.items() if number
+    )
+    lines = [f"{path}: ok; {said or 'nothing in it'}", *(f"  note: {w}" for w in scene.warnings)]
+    return "\n".join(lines + _tree_lines(scene))
+
+
+#: Bodies shown of a large scene.
+_SHOWN = 40
+
+
+def _tree_lines(scene: Scene) -> list[str]:
+    """The tree of bodies, each with the hinge it hangs on."""
+    from mstmm.topology import build
+
+    tree = build(scene)
+    depth: list[int] = []
+    lines = ["  ground"] if tree.links else []
+    for link in tree.links:
+        depth.append(1 if link.parent < 0 else depth[link.parent] + 1)
+        if len(depth) <= _SHOWN:
+            hinge, body = scene.hinge[link.hinge], scene.body[link.body]
+            lines.append(
+                "  " + "  " * min(depth[-1], 20) + f"{body.name}  ({hinge.name}: {hinge.type})"
+            )
+    if len(tree.links) > _SHOWN:
+        lines.append(f"  ... and {len(tree.links) - _SHOWN} more bodies")
+    return lines
+
+
+# --- elements -------------------------------------------------------------------------------------
+
+
+def _file(path: str) -> Report:
+    """Check every element that a Python file defines.  The file is executed."""
+    from mstmm.derive.checks import check as check_element
+    from mstmm.derive.registry import kind_of, load_file
+
+    found = []
+    for element in load_file(path):
+        check_element(element)
+        found.append({"kind": kind_of(element), "name": element.name})
+    named = ", ".join(f"{e['kind']} {e['name']}" for e in found)
+    return {"ok": True, "kind": "definitions", "elements": found, "text": f"{path}: ok; {named}"}

@@ -1,0 +1,116 @@
+"""`mstmm demo`: the first example, from its scene to a certified result, a table and a picture."""
+
+from __future__ import annotations
+
+import time
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .extras import install, missing, result_ending
+from .options import Json, output_file
+from .progress import bar
+
+if TYPE_CHECKING:
+    from mstmm.runtime.result import Result
+
+#: The scene of examples/three_bodies_on_balls, as it travels with the package.
+SCENE = "three_bodies_on_balls.toml"
+T_END, SAMPLES = 5.0, 501
+
+TABLE = ("body3.tip.x", "body3.tip.y", "body3.tip.z", "ball0.fz", "energy")
+PICTURE = ("body3.tip.position", "ball0.force", "energy.kinetic", "energy.gravity", "energy")
+
+ABOUT = """\
+Three bodies on ball hinges, a chain swinging in space under gravity:
+
+    ground --(ball0)-- body1 --(ball2)-- body2 --(ball4)-- body3 -- tip
+
+the system of Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems,
+Wiley 2019, section 5.10.1, with data of our own.  Each body and hinge is one
+element; its equations were derived symbolically, printed as C and compiled when
+mstmm was installed.  One sweep along the chain gives all accelerations."""
+
+NEXT = """\
+Next:
+    mstmm simulate demo.toml --t-end 2     your own run; change numbers in it first
+    mstmm show ball                        the equations of a hinge
+    mstmm list                             everything a scene can name"""
+
+
+def scene_text() -> str:
+    """The scene as text."""
+    return files(__package__).joinpath(SCENE).read_text(encoding="utf-8")
+
+
+def demo(json: Json = False) -> None:
+    """Run an example and leave a result, a picture and a table in this folder."""
+    from . import output, report
+
+    scene, result_file, table_file, picture = _targets()
+    kept = _write_scene(scene)
+    result, seconds = _simulate(scene_text())
+    text = "\n".join([
+        ABOUT, "", f"{report.sizes(result)}", report.effort(result, seconds), "",
+        result.table(*TABLE, rows=11),
+    ])  # fmt: skip
+    result.save(result_file)
+    table_file.write_text(text + "\n", encoding="utf-8")
+    if picture is not None:
+        result.plot(*PICTURE, path=picture, title="Three bodies on ball hinges")
+    made = {
+        result_file: f"the result: {len(result.t)} samples of every quantity",
+        table_file: "this text",
+        scene: "the scene" if kept is None else kept,
+    } | ({} if picture is None else {picture: "a picture of it"})
+    if json:
+        output.emit_json({**report.to_json(result, seconds), "files": [str(path) for path in made]})
+        return
+    output.say(text)
+    output.say()
+    for path, what in made.items():
+        output.say(f"{path!s:<11}{what}")
+    for line in _without_extras():
+        output.say(line)
+    output.say()
+    output.say(NEXT)
+
+
+def _targets() -> tuple[Path, Path, Path, Path | None]:
+    """Scene, result, table and picture; what no package can write is left out."""
+    names = ["demo.toml", "demo" + result_ending(), "demo.txt"]
+    scene, result, table = (output_file(name, (), "demo:") for name in names)
+    picture = None if missing("plot") else output_file("demo.png", (), "demo:")
+    return scene, result, table, picture
+
+
+def _write_scene(path: Path) -> str | None:
+    """Leave the scene to play with; a file that somebody changed stays."""
+    text = scene_text()
+    if path.exists() and path.read_bytes() != text.encode():
+        return "a scene of yours, left as it is"
+    path.write_text(text, encoding="utf-8")
+    return None
+
+
+def _simulate(text: str) -> tuple[Result, float]:
+    import tomllib
+
+    import mstmm
+
+    model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
+    times = [T_END * i / (SAMPLES - 1) for i in range(SAMPLES)]
+    with bar() as progress:
+        begin = time.perf_counter()
+        result = model.simulate(T_END, output_times=times, certify=True, progress=progress)
+        seconds = time.perf_counter() - begin
+    return result, seconds
+
+
+def _without_extras() -> list[str]:
+    lines = []
+    if missing("plot"):
+        lines.append(f"no picture: it needs {', '.join(missing('plot'))}: {install('plot')}")
+    if missing("io"):
+        lines.append(f"no NetCDF, so CSV: it needs {', '.join(missing('io'))}: {install('io')}")
+    return lines

@@ -1,0 +1,38 @@
+"""Which optional packages are there, asked before anything is computed."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from mstmm.errors import EnvironmentFailure
+
+#: Extra -> what is imported for it.
+PACKAGES = {"io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",)}
+_EXTRA_OF = {".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot"}
+
+
+def missing(extra: str) -> list[str]:
+    """Packages of an extra that are not installed."""
+    return [name for name in PACKAGES[extra] if find_spec(name) is None]
+
+
+def install(extra: str) -> str:
+    """The command that brings an extra."""
+    return f"pip install 'mstmm[{extra}]'"
+
+
+def need_for(path: Path, option: str) -> None:
+    """EnvironmentFailure if writing this file needs a package that is not installed."""
+    extra = _EXTRA_OF.get(path.suffix.lower())
+    if extra is not None and missing(extra):
+        other = "; or take a name ending in .csv" if extra == "io" else ""
+        raise EnvironmentFailure(
+            f"{option} {path}: this needs {', '.join(missing(extra))}, not installed: "
+            f"{install(extra)}{other}"
+        )
+
+
+def result_ending() -> str:
+    """Ending of a result file nobody named: .nc where NetCDF can be written, else .csv."""
+    return ".csv" if missing("io") else ".nc"

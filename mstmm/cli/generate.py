@@ -1,0 +1,126 @@
+"""`mstmm generate`: the committed C of the package, or the kernels of an element of your own."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mstmm.errors import EnvironmentFailure, MstmmError
+
+from .options import Json
+
+OUT_OF_DATE = 2
+
+
+def generate(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FILE]...",
+            help="Python files with elements of your own; without one, the package's own C.",
+        ),
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Derive afresh and compare with the committed C; write nothing."
+        ),
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Derive, generate and compile: your own elements, or generated/ of a checkout."""
+    if files and check:
+        raise MstmmError("--check compares the package's own C; to check a file: mstmm check FILE")
+    if files:
+        _own(files, json)
+    elif check:
+        _compare(json)
+    else:
+        _regenerate(json)
+
+
+# --- elements of the user's -----------------------------------------------------------------------
+
+
+def _own(files: list[str], json: bool) -> None:
+    import mstmm
+
+    from .output import emit_json, say
+
+    made: list[dict[str, Any]] = []
+    for file in files:
+        begin = time.perf_counter()
+        elements = mstmm.generate_file(file)
+        seconds = time.perf_counter() - begin
+        for each in elements:
+            spec = each.spec
+            entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": each.how}
+            made.append({**entry, "folder": str(each.folder), "seconds": seconds})
+            if not json:
+                say(f"{spec.kind} {spec.name}: {each.how}; kept in {each.folder} ({seconds:.1f} s)")
+    if json:
+        emit_json({"generated": made})
+    else:
+        say("Scenes name it by its type.")
+
+
+# --- the package's own ----------------------------------------------------------------------------
+
+
+def _folder() -> Path:
+    import mstmm.generated
+
+    return Path(mstmm.generated.__file__ or "").resolve().parent
+
+
+def _checkout() -> Path:
+    """generated/ of the checkout that this program runs from."""
+    folder = _folder()
+    if not (folder.parent / "pyproject.toml").is_file():
+        raise EnvironmentFailure(
+            "mstmm is installed without its checkout, so there is no generated/ to write; run this "
+            "from a clone with pip install -e ., or name a file of your own: mstmm generate FILE"
+        )
+    return folder
+
+
+def _regenerate(json: bool) -> None:
+    from mstmm.derive.generate import regenerate
+
+    from .output import emit_json, note, say
+
+    folder = _checkout()
+    note("deriving every element; this takes a while")
+    written = [path.name for path in regenerate(folder)]
+    if json:
+        emit_json({"folder": str(folder), "files": written})
+    else:
+        say(f"{len(written)} files in {folder}")
+        say("Compile them: python setup.py -q build_ext --inplace")
+
+
+def _compare(json: bool) -> None:
+    from mstmm.derive.generate import differences
+
+    from .output import complain, emit_json, note, say
+
+    folder = _folder()
+    if not json:
+        note("deriving every element; this takes a while")
+    found = differences(folder)
+    if json:
+        emit_json({"ok": not found, "folder": str(folder), "differences": found})
+    if not found:
+        if not json:
+            say(f"{folder} is what the derivations give, byte for byte")
+        return
+    if not json:
+        say("\n".join(found))
+    complain(
+        f"{len(found)} files of {folder} are not what the derivations give; "
+        "update them: mstmm generate, and commit generated/"
+    )
+    raise typer.Exit(OUT_OF_DATE)

@@ -1,0 +1,177 @@
+"""`mstmm list`: what scenes can name and what `mstmm show` can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from .options import Json, quoted
+
+if TYPE_CHECKING:
+    from .stored import Entry
+
+
+class Section(NamedTuple):
+    """A part of the list: its title, column headings, rows, and the same as plain data."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    data: Any
+
+
+def _hinges() -> Section:
+    from mstmm.hinge_types import HINGE_TYPES
+
+    from .stored import Entry, with_unit
+
+    entries = [
+        Entry(
+            "hinge", kind.name, kind.title,
+            tuple(with_unit(c.name, c.unit) for c in kind.coordinates),
+            tuple(with_unit(c.name, c.unit) for c in kind.speeds), kind.keys,
+        )
+        for kind in HINGE_TYPES.values()
+    ]  # fmt: skip
+    rows = [(e.name, e.title, _joined(e.coordinates), ", ".join(e.parameters)) for e in entries]
+    columns = ("hinge", "what it allows", "coordinates q", "keys of its own")
+    return Section("hinges", columns, rows, [_plain_hinge(e) for e in entries])
+
+
+def _plain_hinge(entry: Entry) -> dict[str, Any]:
+    data = entry.to_json()
+    data["keys"] = data.pop("parameters")
+    return data
+
+
+def _elements(kind: str, title: str) -> Section:
+    from .stored import builtin
+
+    entries = builtin(kind)
+    rows = [(e.name, e.title, _joined(e.parameters)) for e in entries]
+    return Section(title, (kind, "what it is", "parameters"), rows, [e.to_json() for e in entries])
+
+
+def _laws() -> Section:
+    from mstmm.scene_law import Friction, Law, Limits, SpringLaw
+
+    owners = (
+        ("law", Law),
+        ("friction", Friction),
+        ("limits", Limits),
+        ("law of a spring", SpringLaw),
+    )
+    rows = []
+    for owner, model in owners:
+        for key, entry in model.model_json_schema()["properties"].items():
+            rows.append((owner, key, str(entry.get("description", "a table, see scenes"))))
+    data = [dict(zip(("table", "key", "expected"), row, strict=True)) for row in rows]
+    return Section("laws on coordinates", ("table", "key", "expected"), rows, data)
+
+
+def _matrices() -> Section:
+    from .stored import builtin
+
+    found = [
+        (f"classical_{entry.name}", entry.title, "; ".join(entry.sources))
+        for entry in builtin("classical")
+    ] or _derived_matrices()
+    data = [dict(zip(("name", "title", "sources"), row, strict=True)) for row in found]
+    return Section("classical transfer matrices", ("matrix", "what it is", "source"), found, data)
+
+
+def _derived_matrices() -> list[tuple[str, ...]]:
+    from mstmm.derive.classical import CLASSICAL
+
+    made = ((name, derive()) for name, derive in CLASSICAL.items())
+    return [(f"classical_{name}", d.title, "; ".join(d.sources)) for name, d in made]
+
+
+def _sweep() -> Section:
+    from .stored import builtin
+
+    rows = [(f"sweep_{e.name}", e.title) for e in builtin("sweep")]
+    data = [{"name": name, "title": title} for name, title in rows]
+    return Section("steps of the sweep", ("name", "what it is"), rows, data)
+
+
+def _methods() -> Section:
+    from mstmm.runtime.steppers import get, names
+
+    rows, data = [], []
+    for name in names():
+        method = get(name)
+        steps = "adaptive or fixed" if method.adaptive else "fixed"
+        rows.append((name, str(method.order), steps, method.source))
+        data.append({"name": name, "order": method.order, "steps": steps, "source": method.source})
+    scipy = "scipy-NAME"
+    rows.append(
+        (scipy, "", "adaptive", "solve_ivp of SciPy on the same kernels, such as scipy-LSODA")
+    )
+    data.append({"name": scipy, "order": None, "steps": "adaptive", "source": "scipy.integrate"})
+    columns = ("method", "order>", "steps", "source")
+    return Section("methods of integration", columns, rows, data)
+
+
+def _user() -> Section:
+    from mstmm.runtime import store
+
+    from .stored import of_spec
+
+    entries = [of_spec(spec) for spec in store.specs().values()]
+    rows = [
+        (e.kind, e.name, e.title, _joined(e.coordinates), _joined(e.parameters)) for e in entries
+    ]
+    columns = ("kind", "type", "what it is", "coordinates q", "parameters")
+    title = f"your own elements, in {store.folder()}"
+    return Section(title, columns, rows, [e.to_json() for e in entries])
+
+
+def _joined(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "none"
+
+
+SECTIONS: dict[str, Callable[[], Section]] = {
+    "hinges": _hinges,
+    "bodies": lambda: _elements("body", "bodies"),
+    "forces": lambda: _elements("force", "force elements, in [[spring]]"),
+    "laws": _laws,
+    "matrices": _matrices,
+    "sweep": _sweep,
+    "methods": _methods,
+    "user": _user,
+}
+
+
+def _chosen(parts: Sequence[str]) -> list[str]:
+    for part in parts:
+        if part not in SECTIONS:
+            raise typer.BadParameter(f"{quoted(part)}: expected {', '.join(SECTIONS)}")
+    return list(dict.fromkeys(parts)) or list(SECTIONS)
+
+
+def list_elements(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(help=f"What to list ({', '.join(SECTIONS)}); by default everything."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List hinges, bodies, forces, laws, matrices, methods, and your own elements."""
+    from . import output
+
+    sections = {part: SECTIONS[part]() for part in _chosen(parts or [])}
+    if json:
+        output.emit_json({part: section.data for part, section in sections.items()})
+        return
+    console = output.console()
+    for section in sections.values():
+        if section.rows:
+            console.print(output.table(section.title, section.columns, section.rows))
+        else:
+            console.print(f"{section.title}: none")
+        console.print()
+    if not parts:
+        console.print("The equations of each: mstmm show NAME, such as mstmm show pin")

@@ -1,0 +1,130 @@
+"""What the commands' arguments have in common: numbers with limits, output files, `--json`."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mstmm.errors import EnvironmentFailure, MstmmError
+
+#: Most samples of one run.
+MAX_SAMPLES = 10_000_000
+
+json_text = typer.Option("--json", help="Print one JSON document instead of text.")
+Json = Annotated[bool, json_text]
+
+
+def quoted(text: Any) -> str:
+    """The user's own words in a message, cut where they are long."""
+    shown = repr(text)
+    return shown if len(shown) <= 60 else shown[:57] + "..."
+
+
+def finite(text: Any) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except (TypeError, ValueError):
+        raise typer.BadParameter(f"{quoted(text)} is not a number") from None
+    if not math.isfinite(value):
+        raise typer.BadParameter(f"{quoted(text)} is not a finite number")
+    return value
+
+
+def positive(text: Any) -> float:
+    """A finite number above 0."""
+    value = finite(text)
+    if value <= 0:
+        raise typer.BadParameter(f"{quoted(text)}: expected a number above 0")
+    return value
+
+
+def not_negative(text: Any) -> float:
+    """A finite number, 0 or more."""
+    value = finite(text)
+    if value < 0:
+        raise typer.BadParameter(f"{quoted(text)}: expected 0 or more")
+    return value
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times of the samples: `count` of them evenly from start to end, or one every `spacing` s."""
+
+    count: int | None = None
+    spacing: float | None = None
+
+    def until(self, t_end: float) -> list[float]:
+        """The times, s, the end included."""
+        if self.count is not None:
+            return [t_end * i / (self.count - 1) for i in range(self.count)]
+        assert self.spacing is not None
+        if t_end / self.spacing > MAX_SAMPLES:
+            raise MstmmError(
+                f"--times {self.spacing:g} asks for {t_end / self.spacing:.3g} samples, at most "
+                f"{MAX_SAMPLES} can be had; take a wider spacing"
+            )
+        whole = int(t_end / self.spacing * (1 + 1e-12))
+        times = [self.spacing * i for i in range(whole + 1)]
+        if times[-1] >= t_end * (1 - 1e-12):
+            times[-1] = t_end
+        else:
+            times.append(t_end)
+        return times
+
+
+def times(text: Any) -> Times:
+    """`201` is a number of samples; `0.05`, `2.0` or `2s` is a spacing in s."""
+    if isinstance(text, Times):
+        return text
+    if str(text).isdecimal():
+        digits = str(text).lstrip("0")
+        if len(digits) > 8 or int(digits or 0) > MAX_SAMPLES:
+            raise typer.BadParameter(f"{quoted(text)}: at most {MAX_SAMPLES} samples can be had")
+        if int(digits or 0) < 2:
+            raise typer.BadParameter(
+                f"{quoted(text)}: expected 2 samples or more, or a spacing in s such as 0.01 or 1s"
+            )
+        return Times(count=int(digits))
+    try:
+        return Times(spacing=positive(str(text).removesuffix("s")))
+    except typer.BadParameter:
+        raise typer.BadParameter(
+            f"{quoted(text)}: expected a number of samples (201) or a spacing in s (0.05, 1s)"
+        ) from None
+
+
+def output_file(text: str, endings: Sequence[str], option: str = "--output") -> Path:
+    """A file that can be written, checked before anything is computed.
+
+    Raises MstmmError for a wrong ending, a folder, or a folder that does not exist, and
+    EnvironmentFailure where writing is not allowed.
+    """
+    if not text or "\0" in text:
+        raise MstmmError(f"{option}: expected a file name, found {quoted(text)}")
+    path = Path(text)
+    if endings and path.suffix.lower() not in endings:
+        raise MstmmError(f"{option} {text}: expected a name ending in {' or '.join(endings)}")
+    try:
+        if path.is_dir():
+            raise MstmmError(f"{option} {text}: this is a folder; name a file inside it")
+        if not path.parent.is_dir():
+            raise MstmmError(f"{option} {text}: there is no folder {path.parent}; create it first")
+        if path.exists() and not path.is_file():
+            raise MstmmError(f"{option} {text}: this is not a regular file")
+        size = max(len(os.fsencode(path.name)), 1)
+    except (OSError, ValueError) as error:
+        raise MstmmError(f"{option} {text}: {getattr(error, 'strerror', None) or error}") from None
+    if size > 200:
+        raise MstmmError(f"{option} {text[:40]}...: the name is too long; take a shorter one")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise EnvironmentFailure(
+            f"{option} {text}: writing here is not allowed; choose another place"
+        )
+    return path

@@ -1,0 +1,130 @@
+"""Writing to the terminal, to pipes that may close, and to files."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+#: Columns of tables where the output is no terminal.
+PLAIN_WIDTH = 100
+
+
+def prepare_streams() -> None:
+    """No character a terminal cannot show stops the program; closed streams become empty ones."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - lives as long as the process
+        with contextlib.suppress(AttributeError, ValueError):
+            getattr(sys, name).reconfigure(errors="backslashreplace")
+
+
+def flush() -> None:
+    """Write out what is buffered; OSError if that fails (a full disk, a closed pipe)."""
+    sys.stdout.flush()
+
+
+def discard() -> None:
+    """Stop writing to standard output: what is buffered is dropped, without complaint at exit."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+
+
+def settle_streams() -> None:
+    """Flush for the last time, so that the interpreter has nothing left to fail at."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            discard()
+
+
+def printable(text: str) -> str:
+    """Text without control characters, which a file name or a scene may contain."""
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+
+
+def say(text: str = "") -> None:
+    """One or more lines on standard output, as they are."""
+    sys.stdout.write(text + "\n")
+
+
+def complain(message: str) -> None:
+    """A problem, on standard error."""
+    _on_stderr("mstmm: ", printable(message), "31")
+
+
+def note(message: str) -> None:
+    """Something worth knowing that is no problem, on standard error."""
+    _on_stderr("", printable(message), "2")
+
+
+def _on_stderr(head: str, text: str, colour: str) -> None:
+    if sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
+        text = f"\x1b[{colour}m{head}\x1b[0m{text}" if head else f"\x1b[{colour}m{text}\x1b[0m"
+    else:
+        text = head + text
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
+
+
+def console(file: Any = None) -> Console:
+    """Where tables go: as wide as the terminal, or COLUMNS, or PLAIN_WIDTH."""
+    from rich.console import Console
+
+    target = sys.stdout if file is None else file
+    sized = target.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    return Console(
+        file=target, width=None if sized and file is None else PLAIN_WIDTH,
+        highlight=False, markup=False, emoji=False,
+    )  # fmt: skip
+
+
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **more: Any) -> Table:
+    """A plain table; columns whose heading ends in ">" are aligned to the right."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    made = Table(
+        title=Text(title, style="bold") if title else None,
+        title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, **more,
+    )  # fmt: skip
+    for heading in columns:
+        right = heading.endswith(">")
+        made.add_column(
+            Text(heading.rstrip(">")), justify="right" if right else "left", overflow="fold"
+        )
+    for row in rows:
+        made.add_row(*(Text(printable(cell)) for cell in row))
+    return made
+
+
+def emit_json(data: Any) -> None:
+    """One JSON document on standard output: numbers finite, everything else null or text."""
+    sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False, ensure_ascii=True) + "\n")
+
+
+def plain(value: Any) -> Any:
+    """Plain JSON values: arrays become lists, numbers that are not finite become null."""
+    if isinstance(value, dict):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value)

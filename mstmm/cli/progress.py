@@ -1,0 +1,70 @@
+"""A progress bar with the time left, on standard error and only on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+#: Seconds before a bar appears: short runs need none.
+PATIENCE = 0.7
+
+
+class Bar:
+    """Appears once a run has lasted `PATIENCE`; call it with (t, t_end) in s of the simulation."""
+
+    def __init__(self, shown: bool) -> None:
+        self._shown, self._begin = shown, time.monotonic()
+        self._bar: Any = None
+        self._task: Any = None
+        self._label = "simulating"
+
+    def label(self, text: str) -> None:
+        """Name what follows, such as a second run."""
+        self._label = text
+        if self._bar is not None:
+            self._bar.reset(self._task, description=text)
+
+    def __call__(self, t: float, t_end: float) -> None:
+        if not self._shown:
+            return
+        if self._bar is None:
+            if time.monotonic() - self._begin < PATIENCE:
+                return
+            self._start()
+        share = t / t_end if t_end > 0 else 1.0
+        self._bar.update(self._task, completed=share, state=f"t = {t:.4g} of {t_end:.4g} s")
+
+    def _start(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %  {task.fields[state]}  left"),
+            TimeRemainingColumn(compact=True),
+            console=Console(stderr=True), transient=True,
+        )  # fmt: skip
+        self._bar.start()
+        self._task = self._bar.add_task(self._label, total=1.0, state="")
+
+    def stop(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+
+@contextmanager
+def bar() -> Iterator[Bar]:
+    """A bar that is gone when the block ends, however it ends."""
+    made = Bar(sys.stderr.isatty())
+    try:
+        yield made
+    finally:
+        made.stop()
+
+
+Progress = Callable[[float, float], None]

@@ -1,0 +1,145 @@
+"""`mstmm show`: stop the line from symbols to C at any stage, and read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mstmm.errors import ElementError
+
+from .options import Json, output_file, quoted
+
+if TYPE_CHECKING:
+    from mstmm.derive.show_document import ElementView
+    from mstmm.spec import ElementSpec
+
+STAGES = ("equations", "matrix", "ir", "c")
+FORMATS = ("text", "latex", "html")
+
+
+def one_of(words: tuple[str, ...]) -> str:
+    """Choices as the help shows them."""
+    return "|".join(words)
+
+
+def _choice(text: str, words: tuple[str, ...]) -> str:
+    if text not in words:
+        raise typer.BadParameter(f"{quoted(text)}: expected one of {', '.join(words)}")
+    return text
+
+
+def show(
+    element: Annotated[
+        str,
+        typer.Argument(
+            help="Name of an element (mstmm list), or the Python file that defines your own."
+        ),
+    ],
+    at: Annotated[
+        str,
+        typer.Option(
+            "--at", metavar=one_of(STAGES), help="Where to stop.",
+            parser=lambda text: _choice(text, STAGES),
+        ),
+    ] = "equations",
+    format: Annotated[
+        str,
+        typer.Option(
+            "--format", metavar=one_of(FORMATS), help="How to write it.",
+            parser=lambda text: _choice(text, FORMATS),
+        ),
+    ] = "text",
+    output: Annotated[
+        str | None, typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead.")
+    ] = None,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """Show an element's equations, matrix, intermediate form or C, with units and sources."""
+    from .output import emit_json, note, say
+
+    target = None if output is None else output_file(output, ())
+    pages = {view.name: _page(view, at, format) for view in _views(element, at)}
+    text = "\n".join(pages.values())
+    if target is not None:
+        target.write_text(text, encoding="utf-8")
+    if json:
+        written = None if target is None else str(target)
+        emit_json({"at": at, "format": format, "pages": pages, "file": written})
+    elif target is None:
+        say(text.rstrip("\n"))
+    else:
+        note(f"wrote {target}")
+
+
+def _page(view: ElementView, at: str, format: str) -> str:
+    from mstmm.derive.show import show_view
+
+    return show_view(view, at, format)
+
+
+def _views(element: str, at: str) -> list[ElementView]:
+    """Views of a built-in element, of one in the kernel store, or of all in a file."""
+    from mstmm.derive import views
+
+    if element.endswith(".py"):
+        from mstmm.derive.checks import check
+        from mstmm.derive.registry import load_file
+
+        found = load_file(element)
+        for each in found:
+            check(each)
+        return [views.of_element(each) for each in found]
+    return [_generated(element, at) or _kept(element, at) or views.view(element)]
+
+
+def _generated(element: str, at: str) -> ElementView | None:
+    """The committed kernels and C: no need to derive them again."""
+    if at not in ("ir", "c"):
+        return None
+    from mstmm.derive import views
+    from mstmm.stored import element_from_json
+
+    from . import stored
+
+    full = views.full_name(element, views.names())
+    text = None if full is None else stored.text(full, ".json")
+    source = None if full is None else stored.text(full, ".c")
+    if text is None or source is None:
+        return None
+    return _of_spec(element_from_json(text), source)
+
+
+def _kept(element: str, at: str) -> ElementView | None:
+    """An element of the user's kernel store: its kernels, as its equations are in its file."""
+    from mstmm.derive import views
+    from mstmm.runtime import store
+
+    if views.full_name(element, views.names()) is not None:
+        return None
+    kept = store.specs()
+    full = views.full_name(element, [f"{kind}_{name}" for kind, name in kept])
+    if full is None:
+        return None
+    spec = next(s for (kind, name), s in kept.items() if f"{kind}_{name}" == full)
+    if at not in ("ir", "c"):
+        raise ElementError(
+            f"{full}: the kernel store keeps kernels, not equations; "
+            f"show its file: mstmm show MY_FILE.py --at {at}"
+        )
+    path = Path(store.folder()) / full / f"{full}.c"
+    return _of_spec(spec, path.read_text(encoding="utf-8"))
+
+
+def _of_spec(spec: ElementSpec, source: str) -> ElementView:
+    from mstmm.derive.show_document import ElementView
+
+    return ElementView(
+        f"{spec.kind}_{spec.name}",
+        spec.title,
+        (),
+        lambda: spec.kernels,
+        lambda: source,
+        spec.sources,
+    )

@@ -1,0 +1,242 @@
+"""`mstmm simulate`: run a scene, keep what was computed, say how far it can be trusted."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mstmm.errors import MstmmError, NumericalFailure, SceneError
+
+from .extras import need_for, result_ending
+from .options import Json, Times, not_negative, output_file, positive, times
+from .progress import Bar, bar
+
+if TYPE_CHECKING:
+    from mstmm.runtime.model import Model
+    from mstmm.runtime.result import Result
+
+RESULTS = (".nc", ".csv")
+PICTURES = (".png", ".svg", ".pdf")
+
+#: A run shorter than this (s) is followed by the second one that estimates its error.
+SHORT = 2.0
+#: Rows of the table on the terminal.
+_ROWS = 9
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was asked for, checked."""
+
+    scene: str
+    t_end: float
+    method: str
+    step: float | None
+    rtol: float
+    atol: float
+    times: Times | None
+    output: Path
+    plot: Path | None
+    quantities: tuple[str, ...]
+    certify: bool | None
+    resume: bool
+
+    @property
+    def checkpoint(self) -> Path:
+        """Where an interrupted run keeps its state."""
+        return self.output.with_name(self.output.name + ".checkpoint")
+
+
+def simulate(
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
+    t_end: Annotated[
+        float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the run, s.")
+    ] = 10.0,
+    method: Annotated[
+        str, typer.Option("--method", metavar="NAME", help="dop853, dopri5, rk4, or scipy-NAME.")
+    ] = "dop853",
+    step: Annotated[
+        float | None,
+        typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s (rk4 needs one)."),
+    ] = None,
+    rtol: Annotated[
+        float, typer.Option("--rtol", metavar="X", parser=positive, help="Relative tolerance.")
+    ] = 1e-9,
+    atol: Annotated[
+        float, typer.Option("--atol", metavar="X", parser=not_negative, help="Absolute tolerance.")
+    ] = 1e-12,
+    times: Annotated[
+        Times | None,
+        typer.Option(
+            "--times", metavar="N|DT", parser=times,
+            help="Samples: how many (201), or how far apart in s (0.05, 1s); else every step.",
+        ),
+    ] = None,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Result, .nc or .csv; by default the "
+                     "scene's name, here."),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Picture, .png, .svg or .pdf."),
+    ] = None,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option("--quantity", "-q", metavar="NAME", help="What to plot and to print, such as "
+                     "shoulder.angle, rod1.tip.position, energy; may be repeated."),
+    ] = None,
+    hinge: Annotated[
+        list[str] | None,
+        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
+                     "be repeated. The file is executed."),
+    ] = None,
+    certify: Annotated[
+        bool | None,
+        typer.Option("--certify/--no-certify", help="Estimate the error by a second, more accurate "
+                     "run; by default after short runs."),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted run, with the same options.")
+    ] = False,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
+    plan = Plan(
+        scene, t_end, method, step, rtol, atol, times,
+        output_file(_default_output(scene) if output is None else output, RESULTS),
+        None if plot is None else output_file(plot, PICTURES, "--plot"),
+        tuple(quantity or ()), certify, resume,
+    )  # fmt: skip
+    need_for(plan.output, "--output")
+    if plan.plot is not None:
+        need_for(plan.plot, "--plot")
+    use_files(hinge or [])
+    model = _model(plan)
+    with _terminated_as_interrupted(), bar() as progress:
+        begin = time.perf_counter()
+        result = _run(plan, model, progress)
+        seconds = time.perf_counter() - begin
+        result.save(plan.output)
+    if plan.plot is not None:
+        result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
+    _report(plan, result, seconds, json)
+    if interrupted(result):
+        raise typer.Exit(130)
+    if not result.success:
+        raise typer.Exit(NumericalFailure.exit_code)
+
+
+def _default_output(scene: str) -> str:
+    stem = Path(scene).stem or "result"
+    return stem + result_ending()
+
+
+def use_files(paths: list[str]) -> None:
+    """Generate the elements of Python files, so that scenes can name them.  Executes the files."""
+    if paths:
+        import mstmm
+
+        for path in paths:
+            mstmm.generate_file(path)
+
+
+def _model(plan: Plan) -> Model:
+    """The compiled scene; a first look at its start finds what cannot move at all."""
+    import mstmm
+
+    model = mstmm.compile(mstmm.load_scene(plan.scene))
+    at_start(plan.scene, model)
+    if plan.quantities:
+        start = model.simulate(t_end=0.0, method="dop853")
+        for name in plan.quantities:
+            start.quantity(name)
+    return model
+
+
+def at_start(path: str, model: Model) -> None:
+    """SceneError if the accelerations of the start cannot be computed: the scene is at fault."""
+    import numpy as np
+
+    try:
+        udot = model.accelerations(*model.initial_state())
+    except NumericalFailure as failure:
+        raise SceneError(f"{path}: at the start, {failure}") from None
+    if not np.isfinite(udot).all():
+        raise SceneError(f"{path}: the accelerations at the start are not finite")
+
+
+def _run(plan: Plan, model: Model, progress: Bar) -> Result:
+    if plan.resume and not plan.checkpoint.is_file():
+        raise MstmmError(
+            f"--resume: there is no checkpoint {plan.checkpoint}; it is written when a run is "
+            "interrupted, beside its --output"
+        )
+    return model.simulate(
+        plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
+        None if plan.times is None else plan.times.until(plan.t_end),
+        certify=bool(plan.certify), progress=progress, checkpoint=str(plan.checkpoint), resume=plan.resume,
+    )  # fmt: skip
+
+
+def interrupted(result: Result) -> bool:
+    """True if Ctrl-C ended the run."""
+    return result.status is None
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """A polite kill (SIGTERM, as batch systems send it) keeps the result as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+# --- what it says ---------------------------------------------------------------------------------
+
+
+def _report(plan: Plan, result: Result, seconds: float, json: bool) -> None:
+    from . import output, report
+
+    made = [str(path) for path in (plan.output, plan.plot) if path is not None]
+    if json:
+        data = report.to_json(result, seconds)
+        data |= {"scene": plan.scene, "files": made}
+        if interrupted(result):
+            data["checkpoint"] = str(plan.checkpoint)
+        output.emit_json(data)
+    else:
+        _say(plan, result, seconds, made)
+    if interrupted(result):
+        output.complain(f"{result.message}; continue with the same command and --resume")
+    elif not result.success:
+        output.complain(f"{plan.scene}: {result.message}; what was computed is in {plan.output}")
+
+
+def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
+    from . import output, report
+
+    console = output.console()
+    output.say(f"{plan.scene}: {report.sizes(result)}")
+    output.say(report.effort(result, seconds))
+    output.say(result.message)
+    if len(result.t):
+        output.say()
+        output.say(report.fitting_table(result, plan.quantities, _ROWS, console.width))
+    output.say()
+    for warning in result.warnings:
+        output.say(f"note: {warning}")
+    output.say(f"wrote {' and '.join(made)} ({len(result.t)} samples)")

@@ -1,0 +1,66 @@
+"""Elements as they were generated: read from JSON, so that no derivation is repeated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mstmm.spec import ElementSpec
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One element for a list: names with units in brackets."""
+
+    kind: str
+    name: str
+    title: str
+    coordinates: tuple[str, ...] = ()
+    speeds: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        return dict(vars(self))
+
+
+def with_unit(name: str, unit: str) -> str:
+    """angle [rad]; a pure number has no bracket."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def builtin(kind: str) -> list[Entry]:
+    """The generated elements of one kind, by name."""
+    found = []
+    for file in sorted(files("mstmm.generated").iterdir(), key=lambda f: f.name):
+        if file.name.startswith(f"{kind}_") and file.name.endswith(".json"):
+            found.append(_entry(json.loads(file.read_text(encoding="utf-8"))))
+    return found
+
+
+def of_spec(spec: ElementSpec) -> Entry:
+    """Entry of an element that is read already."""
+    groups = (spec.coordinates, spec.speeds, spec.parameters)
+    coordinates, speeds, parameters = (tuple(with_unit(p.name, p.unit) for p in g) for g in groups)
+    return Entry(spec.kind, spec.name, spec.title, coordinates, speeds, parameters, spec.sources)
+
+
+def _entry(data: dict[str, Any]) -> Entry:
+    groups = {
+        group: tuple(with_unit(name, unit) for name, unit, *_ in data[group])
+        for group in ("coordinates", "speeds", "parameters")
+    }
+    return Entry(
+        data["kind"], data["name"], data["title"], sources=tuple(data["sources"]), **groups
+    )
+
+
+def text(full_name: str, ending: str) -> str | None:
+    """Text of a generated file, such as ("hinge_pin", ".c"); None if there is none."""
+    if not full_name.replace("_", "").isalnum():
+        return None
+    file = files("mstmm.generated").joinpath(full_name + ending)
+    return file.read_text(encoding="utf-8") if file.is_file() else None
