@@ -4,138 +4,69 @@ from __future__ import annotations
 
 from functools import partial
 
-import sympy as sp
-
 from mstmm.ir import KernelIR
 from mstmm.spec import ElementSpec
 
-from . import body as body_kernels
-from . import force as force_kernels
-from . import frames, laws, sweep
+from . import sweep
 from .classical import CLASSICAL, classical_spec
-from .derivation import Quantity, vector
-from .element import Body, ForceElement, Hinge
-from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of, speeds_of
-from .lower import lower
-from .registry import Element, builtin_elements
+from .element import Hinge
+from .hinge import speeds_of
+from .kernels import (
+    FRAME_DERIVATIONS,
+    MAX_SPEEDS,
+    Kernel,
+    frame_kernels,
+    generic_kernels,
+    kernels_of,
+    law_kernels,
+)
+from .registry import Element, builtin_elements, kind_of
 
-FRAME_DERIVATIONS = (
-    frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
-    frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
-    frames.reaction, frames.transport, frames.rotor_energy,
-    frames.length, frames.turned, frames.classical_body, frames.state_deviation,
-)  # fmt: skip
+__all__ = [
+    "FRAME_DERIVATIONS",
+    "MAX_SPEEDS",
+    "all_specs",
+    "generic_spec",
+    "shared_specs",
+    "spec_of",
+]
 
-#: Largest number of speeds of a hinge.
-MAX_SPEEDS = 6
+
+def _lowered(kernels: tuple[Kernel, ...]) -> tuple[KernelIR, ...]:
+    return tuple(kernel.ir() for kernel in kernels)
 
 
 def spec_of(element: Element) -> ElementSpec:
     """Kernels of any element, built in or the user's."""
-    if isinstance(element, Hinge):
-        return hinge_spec(element)
-    if isinstance(element, Body):
-        return body_spec(element)
-    return force_spec(element)
-
-
-def hinge_spec(hinge: Hinge) -> ElementSpec:
-    """`hinge` always; `forward`, `condense`, `recover` specialised to its motion subspace."""
-    motion = motion_of(hinge)
-    inputs = hinge_quantities(hinge)
-    kernels = [
-        lower(hinge_derivation(motion), "hinge"),
-        lower(sweep.forward(motion, inputs), "forward"),
-        *_elimination(motion),
-    ]
-    measure = hinge.singular_when(motion.q, motion.p)
-    if measure is not None:
-        kernels.append(_singularity(motion, measure))
+    kernels = _lowered(kernels_of(element))
+    hinge = element if isinstance(element, Hinge) else None
     return ElementSpec(
-        "hinge", hinge.name, hinge.title or hinge.name, hinge.coordinates, speeds_of(hinge),
-        hinge.parameters, tuple(kernels), hinge.sources,
-    )  # fmt: skip
-
-
-def _elimination(motion: HingeMotion) -> tuple[KernelIR, KernelIR]:
-    subspace = motion.in_arrays(motion.subspace)
-    inputs = hinge_quantities(motion.hinge)[:2]  # p and q
-    nu, name = motion.nu, motion.hinge.name
-    across = sweep.condense(nu, subspace, inputs, name)
-    back = sweep.recover(nu, subspace, inputs, name)
-    return (
-        lower(across, "condense", sweep.pivot_guards(nu, subspace)),
-        lower(back, "recover"),
+        kind_of(element),
+        element.name,
+        element.title or element.name,
+        hinge.coordinates if hinge else (),
+        speeds_of(hinge) if hinge else (),
+        element.parameters,
+        kernels,
+        element.sources,
     )
-
-
-def _singularity(motion: HingeMotion, measure: sp.Expr) -> KernelIR:
-    from .derivation import Derivation, Equation
-
-    value = Quantity(vector("measure", 1), "", "tends to zero where the coordinates fail")
-    return lower(
-        Derivation(
-            motion.hinge.name,
-            "distance from the singular configuration",
-            hinge_quantities(motion.hinge)[:2],
-            (value,),
-            (Equation("measure", value.symbol, motion.in_arrays(sp.Matrix([measure]))),),
-        ),
-        "singularity",
-    )
-
-
-def body_spec(body: Body) -> ElementSpec:
-    """`inertia`, `bias_load` and `energy`."""
-    kernels = (
-        lower(body_kernels.inertia(body), "inertia"),
-        lower(body_kernels.bias_load(body), "bias_load"),
-        lower(body_kernels.kinetic_energy(body), "energy"),
-    )
-    return ElementSpec(
-        "body", body.name, body.title or body.name, (), (), body.parameters, kernels, body.sources
-    )
-
-
-def force_spec(force: ForceElement) -> ElementSpec:
-    """`wrench` between two ends."""
-    kernel = lower(force_kernels.wrench(force), "wrench", force_kernels.wrench_guards(force))
-    return ElementSpec(
-        "force", force.name, force.title or force.name, (), (), force.parameters, (kernel,),
-        force.sources,
-    )  # fmt: skip
 
 
 def generic_spec(nu: int) -> ElementSpec:
     """The sweep's steps for any hinge with `nu` free speeds."""
-    kernels = [
-        lower(sweep.forward_generic(nu), "forward"),
-        lower(sweep.condense(nu), "condense", sweep.pivot_guards(nu)),
-        lower(sweep.recover(nu), "recover"),
-        lower(sweep.effort(nu), "effort"),
-        lower(sweep.project(nu), "project"),
-    ]
     return ElementSpec(
         "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
-        tuple(kernels), sweep.SOURCES,
+        _lowered(generic_kernels(nu)), sweep.SOURCES,
     )  # fmt: skip
 
 
 def shared_specs() -> list[ElementSpec]:
     """What is no element of a scene: frames, laws, generic sweep."""
-    plain = partial(ElementSpec, coordinates=(), speeds=(), parameters=())
-    frame_kernels = tuple(
-        lower(derivation(), derivation.__name__) for derivation in FRAME_DERIVATIONS
-    )
-    law_kernels = (
-        lower(laws.coordinate_law(full=False), "linear"),
-        lower(laws.coordinate_law(full=True), "full"),
-        lower(laws.rotation_law(), "rotation"),
-        lower(laws.six_direction_law(), "six"),
-    )
+    plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
+    frames, laws = _lowered(frame_kernels()), _lowered(law_kernels())
     return [
-        plain(kind="sweep", name="frames", title="poses, points and loads", kernels=frame_kernels),
-        plain(kind="sweep", name="laws", title="laws on hinge coordinates", kernels=law_kernels),
+        plain(name="frames", title="poses, points and loads", kernels=frames),
+        plain(name="laws", title="laws on hinge coordinates", kernels=laws),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
     ]
 
