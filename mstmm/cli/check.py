@@ -24,9 +24,8 @@ def check(
     what: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE_OR_ELEMENT...",
-            help="Scene files (.toml, .json), Python files with elements of your own, or names of "
-            "elements (mstmm list).",
+            metavar="FILE...",
+            help="Scene files (.toml, .json), Python files with elements of your own.",
         ),
     ],
     echo: Annotated[
@@ -38,7 +37,7 @@ def check(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Check scenes, definitions of elements, and kernels against the equations they come from."""
+    """Check scenes and definitions of elements; nothing is simulated or written."""
     from .guard import explain
     from .output import complain, emit_json, say
 
@@ -74,12 +73,9 @@ def _checker(what: str) -> Callable[[str], Report]:
         return _scene
     if ending == ".py":
         return _file
-    if not what or ending or "/" in what or os.path.exists(what):
-        raise MstmmError(
-            f"{quoted(what)}: expected a scene (.toml or .json), a Python file (.py) with "
-            "elements, or the name of an element; mstmm list shows the names"
-        )
-    return _element
+    raise MstmmError(
+        f"{quoted(what)}: expected a scene (.toml or .json) or a Python file (.py) with elements"
+    )
 
 
 # --- scenes ---------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,8 +124,14 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
         raise MstmmError(f"{option} {text}: {getattr(error, 'strerror', None) or error}") from None
     if size > 200:
         raise MstmmError(f"{option} {text[:40]}...: the name is too long; take a shorter one")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
+    if path.exists() and not os.access(path, os.W_OK):
         raise EnvironmentFailure(
-            f"{option} {text}: writing here is not allowed; choose another place"
+            f"{option} {text}: this file is write-protected; take another name"
         )
-    return path
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            return path
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"{option} {text}: nothing can be written there ({error.strerror}); take another place"
+        ) from None

@@ -183,7 +183,8 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     return model.simulate(
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
-        certify=bool(plan.certify), progress=progress, checkpoint=str(plan.checkpoint), resume=plan.resume,
+        certify=bool(plan.certify), progress=progress,
+        checkpoint=str(plan.checkpoint), resume=plan.resume,
     )  # fmt: skip
 
 
