@@ -14,135 +14,91 @@ from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
 from mstmm.spec import ElementSpec
 
-from . import body as body_kernels
-from . import force as force_kernels
-from . import laws, sweep
-from .classical import CLASSICAL, classical_spec
-from .derivation import Derivation
-from .element import Body, ForceElement, Hinge
-from .hinge import hinge_derivation, hinge_quantities, motion_of
+from .classical import classical_spec
+from .kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, kernels_of
 from .registry import Element, builtin_elements, kind_of
 from .render import element_source
 from .show_document import ElementView
-from .specs import FRAME_DERIVATIONS, MAX_SPEEDS, generic_spec, shared_specs, spec_of
+from .specs import generic_spec, shared_specs, spec_of
+
+__all__ = ["KINDS", "ElementView", "full_name", "names", "of_element", "view"]
 
 KINDS = ("hinge", "body", "force", "classical", "sweep")
+
+#: A second name of an element: the same motion, its law is in sweep_laws.
+_ALIASES = {"hinge_elastic": ("hinge", "free")}
 
 
 def names() -> list[str]:
     """Every full name, by kind."""
-    return list(_makers())
+    return list(_keys())
 
 
-def view(name: str, more: Iterable[Element] = ()) -> ElementView:
-    """The view of a built-in element, or of one of `more` (a user's).
-
-    Raises ElementError, with the nearest name, for an unknown one.
-    """
-    makers = {f"{kind_of(e)}_{e.name}": partial(of_element, e) for e in more} | _makers()
-    full = full_name(name, makers)
-    if full is None:
-        near = difflib.get_close_matches(name, [*makers, *_short(makers)], 1, 0.6)
-        hint = f'; did you mean "{near[0]}"?' if near else "; mstmm list shows what there is"
-        raise ElementError(f'element "{name:.60}": there is no such element{hint}')
-    return makers[full]()
+@cache
+def _keys() -> dict[str, tuple[str, str]]:
+    keys = sorted(built_in(), key=lambda key: KINDS.index(key[0]))
+    return {f"{kind}_{name}": (kind, name) for kind, name in keys} | _ALIASES
 
 
 def full_name(name: str, known: Iterable[str]) -> str | None:
     """The full name that a user means, None if there is none."""
-    candidates = [name, *(f"{kind}_{name}" for kind in KINDS)]
     there = set(known)
-    return next((c for c in candidates if c in there), None)
+    return next((c for c in (name, *(f"{kind}_{name}" for kind in KINDS)) if c in there), None)
 
 
-def _short(full: Iterable[str]) -> list[str]:
-    return [name.split("_", 1)[1] for name in full]
-
-
-@cache
-def _makers() -> dict[str, Callable[[], ElementView]]:
-    elements = sorted(builtin_elements(), key=lambda e: KINDS.index(kind_of(e)))
-    makers: dict[str, Callable[[], ElementView]] = {
-        f"{kind_of(e)}_{e.name}": partial(of_element, e) for e in elements
-    }
-    makers |= {f"classical_{name}": partial(_of_classical, name) for name in CLASSICAL}
-    makers["hinge_elastic"] = makers["hinge_free"]  # the same motion; its law is in sweep_laws
-    makers["sweep_frames"] = partial(_of_shared, "frames")
-    makers["sweep_laws"] = partial(_of_shared, "laws")
-    makers |= {f"sweep_generic{nu}": partial(_of_generic, nu) for nu in range(MAX_SPEEDS + 1)}
-    return makers
+def view(name: str) -> ElementView:
+    """The view of a built-in element.  Raises ElementError, with the nearest name, for another."""
+    full = full_name(name, _keys())
+    if full is None:
+        short = [key.split("_", 1)[1] for key in _keys()]
+        near = difflib.get_close_matches(name, [*_keys(), *short], 1, 0.6)
+        hint = f'; did you mean "{near[0]}"?' if near else "; mstmm list shows what there is"
+        raise ElementError(f'element "{name:.60}": there is no such element{hint}')
+    kind, own = _keys()[full]
+    for element in builtin_elements():
+        if (kind_of(element), element.name) == (kind, own):
+            return of_element(element)
+    return _of_step(kind, own)
 
 
 def of_element(element: Element) -> ElementView:
-    """View of a hinge, body or force element."""
-    return _view(kind_of(element), element.name, element.title or element.name,
-                 _derivations(element), partial(spec_of, element), element.sources)  # fmt: skip
-
-
-def _derivations(element: Element) -> tuple[Derivation, ...]:
-    if isinstance(element, Hinge):
-        motion = motion_of(element)
-        inputs, subspace = hinge_quantities(element), motion.in_arrays(motion.subspace)
-        return (
-            hinge_derivation(motion),
-            sweep.forward(motion, inputs),
-            sweep.condense(motion.nu, subspace, inputs[:2], element.name),
-            sweep.recover(motion.nu, subspace, inputs[:2], element.name),
-        )
-    if isinstance(element, Body):
-        return (
-            body_kernels.inertia(element),
-            body_kernels.bias_load(element),
-            body_kernels.kinetic_energy(element),
-        )
-    assert isinstance(element, ForceElement)
-    return (force_kernels.wrench(element),)
-
-
-def _of_classical(name: str) -> ElementView:
-    derivation = CLASSICAL[name]()
-    return _view("classical", name, derivation.title, (derivation,), partial(classical_spec, name),
-                 derivation.sources)  # fmt: skip
-
-
-def _of_generic(nu: int) -> ElementView:
-    made = (
-        sweep.forward_generic(nu), sweep.condense(nu), sweep.recover(nu), sweep.effort(nu),
+    """View of a hinge, body or force element, built in or a user's."""
+    name = f"{kind_of(element)}_{element.name}"
+    return _view(
+        name, element.title or element.name, kernels_of(element), element.sources,
+        lambda: element_source(spec_of(element)),
     )  # fmt: skip
-    title = f"sweep across a hinge with {nu} speeds"
-    return _view("sweep", f"generic{nu}", title, made, partial(generic_spec, nu), sweep.SOURCES)
 
 
-def _of_shared(name: str) -> ElementView:
-    made = {
-        "frames": tuple(derivation() for derivation in FRAME_DERIVATIONS),
-        "laws": (
-            laws.coordinate_law(full=False), laws.coordinate_law(full=True),
-            laws.rotation_law(), laws.six_direction_law(),
-        ),
-    }  # fmt: skip
-    titles = {"frames": "poses, points and loads", "laws": "laws on hinge coordinates"}
-    find = partial(_shared_spec, name)
-    return _view("sweep", name, titles[name], made[name], find, ())
+def _of_step(kind: str, name: str) -> ElementView:
+    """A classical matrix or a step of the sweep."""
+    spec = cache(partial(_spec_of_step, kind, name))
+    kernels = built_in_kernels(kind, name)
+    title = kernels[0].derivation.title if kind == "classical" else _TITLES.get(name, name)
+    return _view(f"{kind}_{name}", title, kernels, (), lambda: element_source(spec()))
 
 
-def _shared_spec(name: str) -> ElementSpec:
+_TITLES = {"frames": "poses, points and loads", "laws": "laws on hinge coordinates"} | {
+    f"generic{nu}": f"sweep across a hinge with {nu} speeds" for nu in range(MAX_SPEEDS + 1)
+}
+
+
+def _spec_of_step(kind: str, name: str) -> ElementSpec:
+    if kind == "classical":
+        return classical_spec(name)
+    if name.startswith("generic"):
+        return generic_spec(int(name.removeprefix("generic")))
     return next(spec for spec in shared_specs() if spec.name == name)
 
 
 def _view(
-    kind: str,
     name: str,
     title: str,
-    derivations: tuple[Derivation, ...],
-    make: Callable[[], ElementSpec],
+    kernels: tuple[Kernel, ...],
     sources: tuple[str, ...],
+    c_text: Callable[[], str],
 ) -> ElementView:
-    spec = cache(make)
+    def lowered() -> tuple[KernelIR, ...]:
+        return tuple(kernel.ir() for kernel in kernels)
 
-    def kernels() -> tuple[KernelIR, ...]:
-        return spec().kernels
-
-    return ElementView(
-        f"{kind}_{name}", title, derivations, kernels, lambda: element_source(spec()), sources
-    )
+    return ElementView(name, title, tuple(k.derivation for k in kernels), lowered, c_text, sources)

@@ -125,9 +125,7 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
     if size > 200:
         raise MstmmError(f"{option} {text[:40]}...: the name is too long; take a shorter one")
     if path.exists() and not os.access(path, os.W_OK):
-        raise EnvironmentFailure(
-            f"{option} {text}: this file is write-protected; take another name"
-        )
+        raise EnvironmentFailure(f"{option} {text}: it is write-protected; take another name")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             return path
