@@ -12,6 +12,8 @@ enum { BLOCK = 256 }; /* components handled together, so that sums stay in the f
 /* Two components at once, wherever they lie in memory: what every 64-bit processor has */
 typedef double lanes __attribute__((vector_size(16), aligned(8), may_alias));
 
+static lanes load(const double *x) { return *(const lanes *)x; }
+
 int mstmm_all_finite(int64_t n, const double *x) {
   double a = 0.0, b = 0.0, c = 0.0, d = 0.0; /* 0 * x is 0 for finite x and NaN otherwise */
   int64_t i = 0;
@@ -65,8 +67,8 @@ static void combine(int64_t count, int m, const double *w, int stride, const dou
   for (; i + 2 <= count; i += 2) {
     lanes a = {0.0};
     for (int j = 0; j < m; j++)
-      if (w[j * stride] != 0.0) a += w[j * stride] * *(const lanes *)(k + j * n + i);
-    *(lanes *)(out + i) = *(const lanes *)(base + i) + h * a;
+      if (w[j * stride] != 0.0) a += w[j * stride] * load(k + j * n + i);
+    *(lanes *)(out + i) = load(base + i) + h * a;
   }
   for (; i < count; i++) {
     double a = 0.0;
@@ -232,24 +234,35 @@ int64_t mstmm_worst_component(const mstmm_work *work) {
 
 /* h |f(t_new, y_new) - k_(s-1)| / |y_new - Y_(s-1)|: both stages lie at the step's end, so the
  * quotient follows the Jacobian alone (Hairer, Wanner, Solving ODE II, section IV.2).  Components
- * are measured by their own size |y| + h |f|, or metres beside metres per second would make an
- * oscillation of frequency w look as fast as w^2.  0 where the last stage does not lie at the end
- * or the difference is rounding. */
+ * are measured by their own size (y^2 + h^2 f^2)^(1/2), or metres beside metres per second would
+ * make an oscillation of frequency w look as fast as w^2.  0 where the last stage does not lie at
+ * the end or the difference is rounding. */
 double mstmm_stiffness(const mstmm_work *work) {
   const int s = work->tableau->n_stages;
   const int64_t n = work->system->n_error, row = work->system->n_state;
-  const double h = work->run->real.h;
-  double top = 0.0, bottom = 0.0;
+  const double h = work->run->real.h, tiny = 1e-300;
+  const double *k_end = work->k + s * row, *k_last = k_end - row;
+  const double *y_new = work->y_new, *y_last = work->y_stage, *atol = work->run->atol;
+  const lanes zero = {0.0};
+  lanes top = zero, bottom = zero;
+  int64_t i = 0;
   if (s < 2 || work->tableau->c[s - 1] != 1.0) return 0.0;
-  const double *k_end = work->k + s * row, *k_last = work->k + (s - 1) * row;
-  for (int64_t i = 0; i < n; i++) {
-    const double df = h * (k_end[i] - k_last[i]), dy = work->y_new[i] - work->y_stage[i];
-    const double size = fabs(work->y_new[i]) + h * fabs(k_end[i]) + tolerance(work, i, 0.0);
-    const double unit = size > 0.0 ? 1.0 / size : 0.0;
-    top += (df * unit) * (df * unit);
-    bottom += (dy * unit) * (dy * unit);
+  for (; i + 2 <= n; i += 2) {
+    const lanes y = load(y_new + i), f = h * load(k_end + i), a = atol ? load(atol + i) : zero;
+    const lanes df = f - h * load(k_last + i), dy = y - load(y_last + i);
+    const lanes unit = 1.0 / (y * y + f * f + a * a + tiny);
+    top += df * df * unit;
+    bottom += dy * dy * unit;
   }
-  return bottom > 1e-26 ? sqrt(top / bottom) : 0.0;
+  double above = top[0] + top[1], below = bottom[0] + bottom[1];
+  if (i < n) {
+    const double y = y_new[i], f = h * k_end[i], a = atol ? atol[i] : 0.0;
+    const double df = f - h * k_last[i], dy = y - y_last[i];
+    const double unit = 1.0 / (y * y + f * f + a * a + tiny);
+    above += df * df * unit;
+    below += dy * dy * unit;
+  }
+  return below > 1e-26 ? sqrt(above / below) : 0.0;
 }
 
 static double scaled_norm(const mstmm_work *work, const double *x, const double *minus) {

@@ -223,9 +223,8 @@ class Run:
         n, nm = self._system.n_state, self._system.n_memory
         if capacity is None:
             capacity = min(4096, max(2, _SAMPLE_DOUBLES // max(1, n + nm)))
-        self._t, self._y = np.zeros(capacity), np.zeros((capacity, max(n, 1)))
-        self._y, self._memory = self._y[:, :n].copy(), np.zeros((capacity, nm))
-        self._event = np.zeros(capacity, dtype=np.int64)
+        self._t, self._y = np.empty(capacity), np.empty((capacity, n))
+        self._memory, self._event = np.empty((capacity, nm)), np.empty(capacity, dtype=np.int64)
         run.sample_capacity = capacity
         for name, array in (("sample_t", self._t), ("sample_y", self._y)):
             setattr(run, name, self._ffi.from_buffer("double[]", array))
