@@ -63,6 +63,9 @@ int64_t mstmm_worst_component(const mstmm_work *work);
 double mstmm_stiffness(const mstmm_work *work);
 double mstmm_initial_step(const mstmm_work *work, double interval);
 
+/* Makes the next step, shorter and shorter until its error is small enough. */
+int mstmm_try_step(const mstmm_work *work);
+
 /* The event functions at (t, y); a value that is not a number is a failure. */
 int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g);
 /* Looks for the first event in (t_scan, t_new]; sets t_stop and count.event (-1: none). */

@@ -19,7 +19,7 @@ from mstmm.runtime.steppers import Tableau, get
 
 from .c_library import compile_library
 
-SOURCES = ("engine_integrate", "engine_run", "engine_step", "engine_event")
+SOURCES = ("engine_integrate", "engine_run", "engine_control", "engine_step", "engine_event")
 HEADERS = ("engine_integrate", "engine_step")
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
 TEST_DECLARATIONS = """
