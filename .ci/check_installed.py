@@ -10,12 +10,14 @@ from pathlib import Path
 
 checkout = Path(sys.argv[1]).resolve()
 setuptools = tomllib.loads((checkout / "pyproject.toml").read_text())["tool"]["setuptools"]
+mapping = setuptools["package-dir"]
 
 for name in setuptools["packages"]:
     module = importlib.import_module(name)
     folder = Path(module.__file__ or "").resolve().parent
     assert checkout not in folder.parents, f"{name} was imported from the checkout"
-    real = checkout.joinpath(*(name.split(".")[1:] or ["mstmm"]))
+    mapped = next(m for m in sorted(mapping, reverse=True) if f"{name}.".startswith(f"{m}."))
+    real = checkout.joinpath(mapping[mapped], *name.removeprefix(mapped).split(".")[1:])
     for pattern in ("*.py", *setuptools["package-data"].get(name, [])):
         missing = {path.name for path in real.glob(pattern)} - {p.name for p in folder.iterdir()}
         assert not missing, f"{name} lacks {sorted(missing)}"

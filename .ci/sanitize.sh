@@ -8,15 +8,11 @@ trap 'rm -rf "$scratch"' EXIT
 strict=(-std=c17 -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Werror)
 sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 
-echo "--- warnings as errors"
-for compiler in gcc clang; do
-    for source in generated/*.c; do
-        "$compiler" "${strict[@]}" -O2 -Igenerated -c "$source" -o /dev/null
-    done
-done
+echo "--- warnings as errors: clang"
+clang "${strict[@]}" -fsyntax-only -Igenerated generated/*.c
 
-echo "--- every kernel, sanitized"
-gcc -std=c17 -g -O1 "${sanitize[@]}" -Igenerated generated/*.c .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
+echo "--- warnings as errors: gcc; every kernel, sanitized"
+gcc "${strict[@]}" -g -O1 "${sanitize[@]}" -Igenerated generated/*.c .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
 "$scratch/kernels"
 
 echo "--- the engine under its tests, sanitized"
@@ -27,4 +23,4 @@ export CC="$scratch/cc" PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks
 cd "$scratch/checkout"
 "$VENV/bin/python" setup.py -q build_ext --inplace
 LD_PRELOAD="$(gcc -print-file-name=libasan.so)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
-    tests/generated tests/runtime
+    tests/generated tests/runtime tests/integrators
