@@ -10,8 +10,8 @@ static const double AFTER_FAILURE = 0.25; /* of the step whose stages could not 
 static const double SAME = 1e-9;      /* of a step: a grid point so near to a break is the break */
 static const double STRETCH = 1.01;   /* a step may be this much longer to end at a stop */
 static const double HOPELESS = 1e-24; /* of the run: smallest step where t is near 0 */
-enum { STIFF_STREAK = 15, CALM_STREAK = 6, MANY_STEPS = 50 };
-enum { MOST_REJECTIONS = 200 };
+static const double NEAR_LIMIT = 0.9; /* of the stability limit: the step goes no further */
+enum { MANY_STEPS = 50, LARGE_PART = 10, MOST_REJECTIONS = 200 };
 
 static double next_stop(const mstmm_run *run, int *is_break) {
   const int64_t i = run->count.break_index;
@@ -83,16 +83,10 @@ static void count_step(const mstmm_work *work, double error, double absolute) {
   }
   run->real.stiffness = mstmm_stiffness(work);
   run->real.largest_stiffness = fmax(run->real.largest_stiffness, run->real.stiffness);
-  if (run->real.stiffness > 0.9 * work->tableau->stability_limit) {
-    count->calm_streak = 0;
+  if (run->real.stiffness > NEAR_LIMIT * work->tableau->stability_limit)
     count->stability_limited_steps++;
-    const int64_t limited = count->stability_limited_steps;
-    const int often = limited >= MANY_STEPS && 10 * limited >= count->steps;
-    /* an undamped spring shakes the step about the limit, without long streaks */
-    if (++count->stiff_streak >= STIFF_STREAK || often) count->stability_limited = 1;
-  } else if (++count->calm_streak >= CALM_STREAK) {
-    count->stiff_streak = 0;
-  }
+  count->stability_limited = count->stability_limited_steps >= MANY_STEPS &&
+                             LARGE_PART * count->stability_limited_steps >= count->steps;
 }
 
 /* One attempt; *error < 1 on success.  0, or the status of a stage that could not be evaluated. */

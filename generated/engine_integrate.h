@@ -97,7 +97,8 @@ typedef struct mstmm_run_count {
   int64_t first_stage_valid, restarted, sampled, rejected_last;
   int64_t fires_here; /* events fired without time passing */
   int64_t steps, rejected, evaluations, events_fired;
-  int64_t stiff_streak, calm_streak, stability_limited_steps, stability_limited;
+  /* how many steps were about as long as stability allows, and whether that is a good part */
+  int64_t stability_limited_steps, stability_limited;
 } mstmm_run_count;
 
 typedef struct mstmm_run {

@@ -102,8 +102,8 @@ class Statistics:
             Not the error of the result, which may be larger by any factor.
         sum_scaled_error: the same in units of the tolerance.  Both None without an estimate.
         stiffness_index: last estimate of h |lambda|; largest_stiffness_index its maximum.
-        stability_limited: True if many steps in a row were as long as stability allows: an
-            explicit method does not suit the system, or the fixed step is too long.
+        stability_limited: True if at least fifty steps, and a tenth of all, were about as long as
+            stability allows: an explicit method suits the system badly, or the fixed step is long.
         stability_limited_steps: how many steps were.
     """
 

@@ -173,9 +173,10 @@ def test_rk4_is_stable_up_to_its_boundary(lab: Lab, zeta: float, limit: float) -
         h = part * limit / omega
         run = problem.solved("rk4", 2000 * h, (1e-3, 0.0), step=h)
         sizes.append(abs(run.y[0]) + abs(run.y[1]) / omega)
-        assert run.statistics.stability_limited
+        assert run.statistics.largest_stiffness_index > 0.85 * 2.785
     assert sizes[0] < 1e-3
     assert sizes[1] > 1.0
+    assert run.statistics.stability_limited
 
 
 def method_from_outside() -> Tableau:
