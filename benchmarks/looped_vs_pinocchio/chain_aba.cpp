@@ -1,7 +1,9 @@
 // Pinocchio's articulated-body algorithm on chains of pins, behind plain C functions.
 //
 // chain_new makes a chain of uniform rods (1 m along x, 1 kg) on pins whose axes alternate x, y, z;
-// chain_aba evaluates `count` states, one after the other, in a native loop.
+// chain_aba evaluates `count` states, one after the other, in a native loop.  The workspace holds
+// the arrays of this algorithm alone: pinocchio::Data(model) also sets up tensors of nv^3 numbers,
+// for which a thousand bodies are too many.
 
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/algorithm/aba.hpp>
@@ -11,16 +13,32 @@ namespace {
 struct Chain {
   pinocchio::Model model;
   pinocchio::Data data;
-  explicit Chain(const pinocchio::Model &m) : model(m), data(model) {}
 };
+
+void reserve(const pinocchio::Model &model, pinocchio::Data &data) {
+  const auto n = static_cast<std::size_t>(model.njoints);
+  const auto still = pinocchio::Motion::Zero();
+  const auto none = pinocchio::Force::Zero();
+  const auto here = pinocchio::SE3::Identity();
+  for (auto *list : {&data.v, &data.ov, &data.a, &data.oa, &data.a_gf, &data.oa_gf}) list->assign(n, still);
+  for (auto *list : {&data.f, &data.of, &data.h, &data.oh}) list->assign(n, none);
+  for (auto *list : {&data.oMi, &data.liMi}) list->assign(n, here);
+  for (auto *list : {&data.oYcrb, &data.oinertias}) list->assign(n, pinocchio::Inertia::Zero());
+  for (auto *list : {&data.Yaba, &data.oYaba}) list->assign(n, pinocchio::Inertia::Matrix6::Zero());
+  data.J.setZero(6, model.nv);
+  data.u.setZero(model.nv);
+  data.ddq.setZero(model.nv);
+  data.a_gf[0] = -model.gravity;
+  data.joints.reserve(n);
+  for (const auto &joint : model.joints) data.joints.push_back(joint.createData());
+}
 
 template <class Joint>
 pinocchio::JointIndex add(pinocchio::Model &model, pinocchio::JointIndex parent, const pinocchio::SE3 &at) {
   return model.addJoint(parent, Joint(), at, "");
 }
 
-pinocchio::Model chain_model(int n, double transverse, double axial) {
-  pinocchio::Model model;
+void build(pinocchio::Model &model, int n, double transverse, double axial) {
   model.gravity.linear() = Eigen::Vector3d(0, 0, -9.81);
   const Eigen::Vector3d tip(1, 0, 0), center(0.5, 0, 0);
   const Eigen::Matrix3d inertia = Eigen::Vector3d(axial, transverse, transverse).asDiagonal();
@@ -36,7 +54,6 @@ pinocchio::Model chain_model(int n, double transverse, double axial) {
     }
     model.appendBodyToJoint(parent, rod, pinocchio::SE3::Identity());
   }
-  return model;
 }
 
 }  // namespace
@@ -44,7 +61,10 @@ pinocchio::Model chain_model(int n, double transverse, double axial) {
 extern "C" {
 
 void *chain_new(int n, double transverse, double axial) {
-  return new Chain(chain_model(n, transverse, axial));
+  auto *chain = new Chain;
+  build(chain->model, n, transverse, axial);
+  reserve(chain->model, chain->data);
+  return chain;
 }
 
 void chain_free(void *chain) { delete static_cast<Chain *>(chain); }

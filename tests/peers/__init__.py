@@ -1,0 +1,1 @@
+"""Comparisons with Pinocchio and MuJoCo, in an environment of their own."""
