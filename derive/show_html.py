@@ -30,8 +30,20 @@ figure .formula { overflow-x: auto; padding: .35rem 0; }
 figcaption { display: flex; gap: 1rem; justify-content: space-between; font-size: .87rem;
   color: var(--soft); }
 figcaption .source { white-space: nowrap; font-style: italic; }
-math { font-size: 1.12rem; }
-math mtable.matrix mtd { padding: .18em .55em; }
+math { font-size: 1.12rem; font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math",
+  "Libertinus Math", "DejaVu Math TeX Gyre", math; }
+figure math { display: block math; text-align: left; margin: 0 0 0 1.2rem; }
+mover > mo { padding-bottom: .1em; }
+/* Brackets and braces are drawn, so that they stretch with any font. */
+mtable.matrix, mtable.cases { padding: .1em .25em; margin: 0 .12em; }
+mtable.matrix { border-left: 1.3px solid; border-right: 1.3px solid;
+  background: linear-gradient(currentColor, currentColor) 0 0 / .4em 1.3px no-repeat,
+    linear-gradient(currentColor, currentColor) 100% 0 / .4em 1.3px no-repeat,
+    linear-gradient(currentColor, currentColor) 0 100% / .4em 1.3px no-repeat,
+    linear-gradient(currentColor, currentColor) 100% 100% / .4em 1.3px no-repeat; }
+mtable.cases { border-left: 1.3px solid; }
+mtable.matrix mtd { padding: .16em .55em; }
+mtable.cases mtd { padding: .16em .7em; text-align: left; }
 pre { background: var(--block); border-radius: 6px; padding: .9rem 1rem; overflow-x: auto;
   font: 13px/1.5 "JetBrains Mono", "DejaVu Sans Mono", Menlo, Consolas, monospace; }
 @media print { main { max-width: none; } figure { break-inside: avoid; } }
@@ -47,9 +59,9 @@ def mathml(node: Node, display: bool = True) -> str:
 def name_markup(name: ShownName, accent: str = "", index: str = "") -> str:
     """A name with its dots, accent, subscript and index."""
     base = GREEK.get(name.base, name.base)
-    core = f"<mi{_variant(name, base)}>{escape(base.replace('_', ' '))}</mi>"
+    core = f"<mi{_variant(name, base)}>{escape(base)}</mi>"
     for mark in _marks(name.dots, accent):
-        core = f'<mover accent="true">{core}<mo>{mark}</mo></mover>'
+        core = f'<mover accent="true">{core}<mo stretchy="false">{mark}</mo></mover>'
     parts = [f"<mtext>{escape(name.subscript)}</mtext>"] if name.subscript else []
     parts += [f"<mtext>{escape(index)}</mtext>"] if index else []
     below = "<mo>,</mo>".join(parts)
@@ -110,16 +122,11 @@ def _sign(sign: Sign) -> str:
 
 
 def _table(table: Table) -> str:
-    align = ' columnalign="left"' if table.cases else ' class="matrix"'
+    kind = "cases" if table.cases else "matrix"
     rows = "".join(
         f"<mtr>{''.join(f'<mtd>{_markup(cell)}</mtd>' for cell in row)}</mtr>" for row in table.rows
     )
-    left, right = ("{", "") if table.cases else ("[", "]")
-    closing = f'<mo fence="true" stretchy="true">{right}</mo>' if right else ""
-    return (
-        f'<mrow><mo fence="true" stretchy="true">{left}</mo>'
-        f"<mtable{align}>{rows}</mtable>{closing}</mrow>"
-    )
+    return f'<mtable class="{kind}">{rows}</mtable>'
 
 
 def page(title: str, body: str) -> str:

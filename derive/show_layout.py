@@ -7,7 +7,7 @@ below, and each format only renders nine kinds of node.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -95,17 +95,22 @@ class Table:
 
 Node = Name | Word | Sign | Row | Fraction | Raised | Fence | Root | Table
 
+#: Arrays of coordinates, speeds, parameters and efforts: their entries are counted, not x y z.
+COORDINATE_ARRAYS = frozenset(
+    ("q", "qdot", "u", "udot", "p", "g", "s", "tau", "tau_n", "alpha", "effort")
+)
+
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)
 _RELATIONS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥", "==": "=", "!=": "≠"}
 
 
-def layout(expression: sp.Basic, blocks: bool = True) -> Node:
+def layout(expression: sp.Basic, names: Mapping[sp.Basic, Node] | None = None) -> Node:
     """Layout of a scalar, matrix or boolean expression.
 
-    With `blocks`, explicit matrices that are sums of vectors, cross-product matrices and the like
-    are shown as such.
+    Explicit matrices that are sums of vectors, cross-product matrices and the like are shown as
+    such; sub-expressions in `names` are shown by the name given there.
     """
-    return _Layout(blocks).node(expression)
+    return _Layout(names or {}).node(expression)
 
 
 def equation(left: Node, right: Node) -> Row:
@@ -136,8 +141,8 @@ def _is_negative(term: sp.Basic) -> bool:
 class _Layout:
     """Dispatch by class, along the method resolution order as SymPy's printers do."""
 
-    def __init__(self, blocks: bool) -> None:
-        self.blocks = blocks
+    def __init__(self, names: Mapping[sp.Basic, Node]) -> None:
+        self.names = names
 
     def node(self, e: sp.Basic) -> Node:
         return self._print(e)[0]
@@ -147,6 +152,8 @@ class _Layout:
         return node if own >= level else Fence("(", node, ")")
 
     def _print(self, e: sp.Basic) -> tuple[Node, int]:
+        if self.names and e in self.names:
+            return self.names[e], _ATOM
         if isinstance(e, sp.MatrixBase):
             return self._matrix(e)
         if isinstance(e, (BooleanTrue, BooleanFalse)):
@@ -198,7 +205,7 @@ class _Layout:
     # --- matrices ---------------------------------------------------------------------------
 
     def _matrix(self, e: sp.MatrixBase) -> tuple[Node, int]:
-        found = recognise(e) if self.blocks else None
+        found = recognise(e)
         if found is not None:
             return self._print(found)
         if e.shape == (1, 1):
@@ -274,7 +281,7 @@ class _Layout:
 
     def relation(self, e: Relational) -> tuple[Node, int]:
         sign = Sign(_RELATIONS[e.rel_op], True)
-        return Row((self.node(e.lhs), sign, self.node(e.rhs))), _SUM
+        return Row((self.node(e.lhs), sign, self.node(e.rhs))), _PRODUCT
 
     def logic(self, e: sp.Basic) -> tuple[Node, int]:
         word = " and " if isinstance(e, sp.And) else " or "
@@ -295,11 +302,16 @@ def _spaced(factors: list[Node]) -> tuple[Node, ...]:
 
 def element_index(parent: sp.MatrixSymbol, i: int, j: int) -> str:
     """Index of an entry as shown: x y z of a plane or space vector, else counted from one."""
-    rows, columns = int(parent.rows), int(parent.cols)
-    if (rows, columns) == (1, 1):
-        return ""
+    shape = int(parent.rows), int(parent.cols)
+    return "" if shape == (1, 1) else entry_index(parent.name, shape, i, j)
+
+
+def entry_index(name: str, shape: tuple[int, int], i: int, j: int) -> str:
+    """Index of the entry i, j (from zero) of an array of this name and shape."""
+    rows, columns = shape
     if columns == 1:
-        return "xyz"[i] if rows in (2, 3) else str(i + 1)
+        spatial = rows in (2, 3) and name not in COORDINATE_ARRAYS
+        return "xyz"[i] if spatial else str(i + 1)
     return f"{i + 1},{j + 1}"
 
 

@@ -26,6 +26,10 @@ class ShownName:
     subscript: str = ""
     upright: bool = False
 
+    def written(self) -> str:
+        """The name as it is written in code, dots aside."""
+        return "_".join(filter(None, (self.base, self.subscript)))
+
 
 def shown_name(name: str) -> ShownName:
     """Split a port's or symbol's name into what is shown."""

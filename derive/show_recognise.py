@@ -56,6 +56,8 @@ def recognise(matrix: sp.MatrixBase) -> sp.MatrixExpr | None:
         return part
     if (rows, columns) not in _CANDIDATES or sp.count_ops(matrix) > LIMIT:
         return None
+    if not all(_is_multilinear(entry) for entry in matrix):
+        return None
     rest = Matrix(matrix).applyfunc(sp.expand)
     found: list[sp.MatrixExpr] = []
     for term in _terms(rest):
@@ -69,6 +71,17 @@ def recognise(matrix: sp.MatrixBase) -> sp.MatrixExpr | None:
     if any(entry != 0 for entry in rest) or not found:
         return None
     return sp.MatAdd(*found) if len(found) > 1 else found[0]
+
+
+def _is_multilinear(entry: sp.Expr) -> bool:
+    """Sums and products of entries and symbols only: nothing that would grow when expanded."""
+    if isinstance(entry, (sp.Add, sp.Mul)):
+        return all(_is_multilinear(part) for part in entry.args)
+    if isinstance(entry, sp.Abs):
+        return _is_multilinear(entry.args[0]) and not _owned(entry)
+    if isinstance(entry, sp.Pow):
+        return not entry.base.args or isinstance(entry.base, MatrixElement)
+    return isinstance(entry, (sp.Number, sp.Symbol, MatrixElement))
 
 
 def _part(matrix: sp.MatrixBase) -> sp.MatrixExpr | None:

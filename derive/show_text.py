@@ -41,10 +41,7 @@ def text_name(name: ShownName, accent: str = "") -> str:
     """A name in one line: r̈_IO, ω̇_I, r̃_IC, mass matrix."""
     base = GREEK.get(name.base, name.base)
     marks = _DOTS[min(name.dots, 2)]
-    if name.upright or len(base) > 1:
-        core = base.replace("_", " ") if not accent else f"({base})"
-    else:
-        core = base
+    core = f"({base})" if accent and len(base) > 1 else base
     mark = _ACCENTS[accent]
     subscript = f"_{name.subscript}" if name.subscript else ""
     if mark and not unicodedata.combining(mark[0]):
@@ -88,8 +85,11 @@ def _tight(text: str) -> str:
 
 def _grouped(node: Node) -> Box:
     """Parts of a quotient in one line: sums and products in parentheses."""
-    plain = isinstance(node, (Name, Word, Fence, Raised, Root))
-    return box(node if plain else Fence("(", node, ")"))
+    return box(node if _plain(node) else Fence("(", node, ")"))
+
+
+def _plain(node: Node) -> bool:
+    return isinstance(node, (Name, Word, Fence, Raised, Root))
 
 
 def _exponent(node: Node) -> str:
@@ -162,11 +162,9 @@ def wrapped(node: Node, indent: int = 4, width: int = WIDTH) -> list[str]:
     if whole.width + indent <= width or not isinstance(node, Row) or len(whole.lines) > 1:
         return [" " * indent + line.rstrip() for line in whole.lines]
     pieces = [""]
-    for item in _flattened(node):
-        text = box(item).lines[0]
+    for text in _flattened(node):
         room = width - indent - (4 if len(pieces) > 1 else 0)
-        breakable = isinstance(item, Sign) and item.spaced and item.text != "="
-        if breakable and columns(pieces[-1]) + columns(text) + _ahead(node, item) > room:
+        if pieces[-1] and columns(pieces[-1]) + columns(text.rstrip()) > room:
             pieces.append("")
             text = text.lstrip()
         pieces[-1] += text
@@ -175,21 +173,28 @@ def wrapped(node: Node, indent: int = 4, width: int = WIDTH) -> list[str]:
     return [(" " * indent + first).rstrip(), *((hanging + piece).rstrip() for piece in rest)]
 
 
-def _flattened(row: Row) -> list[Node]:
-    """Items of a row, with nested rows opened up."""
-    items: list[Node] = []
-    for item in row.items:
-        items += _flattened(item) if isinstance(item, Row) else [item]
-    return items
+def _flattened(node: Node) -> list[str]:
+    """Pieces of a one-line node that may be parted: text that begins a new piece is a sign."""
+    if isinstance(node, Row):
+        return _glued([_flattened(item) for item in node.items])
+    if isinstance(node, Fence):
+        return _glued([[node.left], _flattened(node.body), [node.right]])
+    if isinstance(node, Root):
+        return _glued([["√("], _flattened(node.body), [")"]])
+    if isinstance(node, Fraction):
+        parts = (node.above, node.below)
+        above, below = ([p] if _plain(p) else ["(", p, ")"] for p in parts)
+        opened = [[x] if isinstance(x, str) else _flattened(x) for x in (*above, " / ", *below)]
+        return _glued(opened)
+    text = box(node).lines[0]
+    breakable = isinstance(node, Sign) and node.spaced and node.text not in "=,"
+    return ["", text] if breakable else [text]
 
 
-def _ahead(row: Row, sign: Node) -> int:
-    """Columns up to the next place where the row may break."""
-    items = _flattened(row)
-    start = next(k for k, item in enumerate(items) if item is sign) + 1
-    total = 0
-    for item in items[start:]:
-        if isinstance(item, Sign) and item.spaced:
-            break
-        total += box(item).width
-    return total
+def _glued(groups: list[list[str]]) -> list[str]:
+    """Groups joined end to start: only breaks inside a group stay breaks."""
+    pieces = [""]
+    for group in groups:
+        pieces[-1] += group[0]
+        pieces += group[1:]
+    return pieces
