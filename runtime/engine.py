@@ -68,6 +68,11 @@ class Engine:
             self._local.size = size
         return self._local.pointer
 
+    def workspace_array(self) -> Array:
+        """The numbers this thread's last call left in its workspace, a view."""
+        self.workspace()
+        return np.asarray(self._local.array)
+
     def pointer(self, array: Array) -> Any:
         """`real *` to a contiguous array of doubles."""
         return self.ffi.from_buffer("real[]", array)

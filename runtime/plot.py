@@ -11,7 +11,7 @@ import numpy as np
 from mstmm.errors import SceneError
 
 from .dataset import extra
-from .storage import replacing
+from .files import replacing
 from .table import default_names
 
 if TYPE_CHECKING:

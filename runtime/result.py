@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .certificate import Certificate, certificate
+from .checkpoint import Checkpoint
+from .error_estimate import ErrorEstimate
+from .execution import Watch, first_run, second_run
 from .integrate import Statistics, Status
 from .layout import HingeSlots
 from .observed import Observed
 from .quantities import Quantities, Quantity
-from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
+from .simulate import Settings, Trajectory
+from .stability import StepCheck
 
 if TYPE_CHECKING:
     from .model import Model
@@ -42,8 +49,15 @@ class Result:
         settings: how the run was made.
     """
 
-    def __init__(self, model: Model, run: Trajectory) -> None:
+    def __init__(
+        self,
+        model: Model,
+        run: Trajectory,
+        error: ErrorEstimate | None = None,
+        step: StepCheck | None = None,
+    ) -> None:
         self.model, self.trajectory = model, run
+        self._error, self._step = error, step
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status, self.message = run.status, run.message
         self.statistics: Statistics | None = run.statistics
@@ -57,10 +71,21 @@ class Result:
         return self.trajectory.success
 
     @property
+    def last_state(self) -> tuple[float, Array, Array]:
+        """(t, q, u) of the last good state: the end, or what a failure left."""
+        kept = self.trajectory.last
+        return (float(self.t[-1]), self.q[-1], self.u[-1]) if kept is None else kept
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
+        return certificate(self, self._error, self._step)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What is worth knowing before the numbers are used, one sentence each."""
-        scene = self.model.scene.warnings
-        return (*scene, *self.trajectory.notes, *self._observed.failures)
+        scene, found = self.model.scene.warnings, self.certificate.warnings
+        return (*scene, *self.trajectory.notes, *found, *self._observed.failures)
 
     # --- bodies and ends ------------------------------------------------------------------------
 
@@ -211,12 +236,13 @@ def simulate(
     checkpoint: str | None,
     resume: bool,
 ) -> Result:
-    """One run."""
-    system = SceneSystem(model._engine)
-    run = make_run(system, settings, q, u)
-    observe = None if progress is None else lambda r: progress(r.t, settings.t_end)
-    status = advance(run, observe)
-    return Result(model, trajectory(system, run, settings, status))
+    """One run, and a second one where its error is asked for; see `Model.simulate`."""
+    watch = Watch(progress, settings, runs=2 if certify else 1)
+    if checkpoint is not None:
+        watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
+    run, step = first_run(model, settings, q, u, watch, resume)
+    error = second_run(model, run, q, u, watch) if certify and run.success else None
+    return Result(model, replace(run, notes=(*run.notes, *watch.notes)), error, step)
 
 
 def load_result(path: str | Path) -> Result:

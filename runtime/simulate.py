@@ -42,6 +42,7 @@ class Settings:
     output_times: tuple[float, ...] | None = None
     max_step: float = 0.0
     max_steps: int = 0
+    first_step: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class Trajectory:
     """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
 
     q and u hold unit quaternions and exact driven coordinates; `norm_residual` is how far the
-    quaternions' lengths were from 1 before.
+    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state, which
+    output times may leave out.
     """
 
     t: Array
@@ -65,6 +67,7 @@ class Trajectory:
     fail_time: float | None = None
     notes: tuple[str, ...] = field(default=())
     norm_residual: float = 0.0
+    last: tuple[float, Array, Array] | None = None
 
     @property
     def success(self) -> bool:
@@ -165,27 +168,27 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau,
         t_start=settings.t_start, t_end=settings.t_end,
-        y0=start, rtol=settings.rtol, atol=_tolerances(system, settings, start),
+        y0=start, rtol=settings.rtol, atol=tolerances(system, settings, start),
         step=settings.step, output_times=settings.output_times, breaks=breaks,
-        max_step=settings.max_step, max_steps=settings.max_steps,
+        max_step=settings.max_step, max_steps=settings.max_steps, first_step=settings.first_step,
     )  # fmt: skip
 
 
-def _tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
+def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
     """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
-    engine, tolerances = system.engine, np.full(len(start), settings.atol)
+    engine, found = system.engine, np.full(len(start), settings.atol)
     if system.with_power:
         q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
         seen = engine.observe(
             np.array([settings.t_start]), q[None].copy(), u[None].copy(), system.memory[None].copy()
         )
         energy = float(np.abs(seen.sums[0, :3]).sum()) or 1.0
-        tolerances[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
-    return tolerances
+        found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
+    return found
 
 
 @contextmanager
-def _interruptible() -> Iterator[list[bool]]:
+def interruptible() -> Iterator[list[bool]]:
     """Ctrl-C sets the flag instead of raising, so that no sample is lost."""
     flag = [False]
     if threading.current_thread() is not threading.main_thread():
@@ -206,7 +209,7 @@ def advance(
     run: Run, observe: Callable[[Run], None] | None = None
 ) -> Status | None:
     """Run to the end; None if Ctrl-C came first.  `observe` is called between slices."""
-    with _interruptible() as interrupted:
+    with interruptible() as interrupted:
         while True:
             status = run.advance(SLICE)
             if status is not Status.RUNNING:
@@ -218,28 +221,47 @@ def advance(
 
 
 def trajectory(
-    system: SceneSystem, run: Run, settings: Settings, status: Status | None
+    system: SceneSystem,
+    run: Run,
+    settings: Settings,
+    status: Status | None,
+    earlier: Samples | None = None,
 ) -> Trajectory:
-    """Samples of a run, split into coordinates, speeds and work."""
-    samples = run.samples
-    if settings.output_times is not None:  # only the times asked for, not the events between
+    """Samples of a run, behind those of an earlier process, split into q, u and work."""
+    samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
+    failure = run.failure
+    message = f"interrupted at t = {run.t:.9g} s" if status is None else _message(system, run)
+    return split(
+        system, samples, settings, status, message, run.statistics, (run.t, run.y),
+        None if failure is None else failure.time,
+    )  # fmt: skip
+
+
+def split(
+    system: SceneSystem,
+    samples: Samples,
+    settings: Settings,
+    status: Status | None,
+    message: str,
+    statistics: Statistics,
+    last: tuple[float, Array],
+    fail_time: float | None = None,
+) -> Trajectory:
+    """Trajectory of samples; with output times only those, not the events between."""
+    if settings.output_times is not None:
         wanted = np.isin(samples.t, np.asarray(settings.output_times)) & (samples.event >= 0)
-        last = np.append(samples.t[1:] != samples.t[:-1], True)  # behind an event at such a time
-        keep = wanted & last
+        behind = np.append(samples.t[1:] != samples.t[:-1], True)  # an event at such a time
+        keep = wanted & behind[: len(wanted)]
         samples = Samples(
             samples.t[keep], samples.y[keep], samples.memory[keep], samples.event[keep]
         )
     nq, nu = system.engine.nq, system.engine.nu
     y, residual = settled(system.engine, samples.t, samples.y, samples.memory)
     work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
-    failure = run.failure
-    message = (
-        f"interrupted at t = {run.t:.9g} s" if status is None else _message(system, run)
-    )
     return Trajectory(
         samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
-        message, settings, run.statistics, None if failure is None else failure.time,
-        norm_residual=residual,
+        message, settings, statistics, fail_time, (), residual,
+        (last[0], last[1][:nq], last[1][nq : nq + nu]),
     )  # fmt: skip
 
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import csv
-import os
-import tempfile
 import tomllib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
 from . import provenance
 from .dataset import dataset, extra
+from .files import replacing
 
 if TYPE_CHECKING:
     from .result import Result
@@ -30,30 +28,6 @@ def save(result: Result, path: Path) -> Path:
     with replacing(path) as temporary:
         writer(result, temporary)
     return path
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file that takes the name `path` when the block ends well.
-
-    Raises EnvironmentFailure, with the old file untouched, if anything cannot be written.
-    """
-    temporary: Path | None = None
-    try:
-        handle, name = tempfile.mkstemp(path.suffix, f".{path.stem}.", path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise EnvironmentFailure(f'"{path}" cannot be written: {reason}') from error
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
 
 
 def _netcdf(result: Result, path: Path) -> None:

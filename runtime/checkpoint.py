@@ -1,0 +1,100 @@
+"""A run kept in a file, so that another process can continue it bit for bit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import EnvironmentFailure, SceneError
+
+from .files import replacing
+from .integrate import Samples
+from .provenance import kernels_hash
+from .simulate import Settings
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+State = Mapping[str, Any]
+
+_FORMAT = "mstmm checkpoint 1"
+_ROWS = ("t", "y", "memory", "event")
+
+
+class Checkpoint:
+    """One file: what was asked for (as hashes), where the run stands, every sample so far.
+
+    Raises EnvironmentFailure at once if its folder cannot be written.
+    """
+
+    def __init__(self, path: Path, model: Model, settings: Settings, q: Array, u: Array) -> None:
+        self.path = path
+        folder = path.absolute().parent
+        if not folder.is_dir() or not os.access(folder, os.W_OK):
+            raise EnvironmentFailure(f'checkpoint "{path}": its folder cannot be written to')
+        self.asked = {
+            "scene": _hash(model.scene.to_toml()),
+            "settings": _hash(json.dumps(asdict(settings)) + q.tobytes().hex() + u.tobytes().hex()),
+            "kernels": _hash(kernels_hash() + _known(model)),
+        }
+
+    def exists(self) -> bool:
+        """True if there is something to continue."""
+        return self.path.exists()
+
+    def save(self, state: State, samples: Samples) -> None:
+        """Write everything; the old file stays until the new one is whole."""
+        rows = {name: getattr(samples, name) for name in _ROWS}
+        with replacing(self.path) as temporary, temporary.open("wb") as file:
+            np.savez(file, format=_FORMAT, real=state["real"], integer=state["integer"],
+                     **self.asked, **rows)  # fmt: skip
+
+    def load(self) -> tuple[State, Samples]:
+        """State and samples.  SceneError if the file is no checkpoint, or one of another run."""
+        try:
+            with np.load(self.path, allow_pickle=False) as file:
+                data = {name: file[name] for name in file.files}
+        except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+            raise SceneError(f'checkpoint "{self.path}" cannot be read: {error}') from None
+        if str(data.get("format")) != _FORMAT:
+            raise SceneError(f'checkpoint "{self.path}" is not one of this version of mstmm')
+        for key, word in (
+            ("scene", "the scene has"),
+            ("settings", "the settings or the start have"),
+            ("kernels", "the compiled kernels have"),
+        ):
+            if str(data.get(key)) != self.asked[key]:
+                raise SceneError(
+                    f'checkpoint "{self.path}" belongs to another run: {word} changed since; '
+                    "run without resume to start again"
+                )
+        samples = Samples(*(data[name] for name in _ROWS))
+        return {"real": data["real"], "integer": data["integer"]}, samples
+
+    def remove(self) -> None:
+        """The run has ended by itself: nothing to continue."""
+        self.path.unlink(missing_ok=True)
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _known(model: Model) -> str:
+    """Hashes of the elements that are not prebuilt."""
+    ffi = model._engine.ffi
+    found = []
+    for (kind, name), element in sorted((model.known or {}).items()):
+        text = element.descriptor.hash
+        found.append(f"{kind} {name} {'' if text == ffi.NULL else ffi.string(text).decode()}")
+    return "\n".join(found)

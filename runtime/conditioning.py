@@ -1,0 +1,180 @@
+"""Numbers that say how well a computation was conditioned: pivots of the sweep, singular angles.
+
+The sweep hands S - S H D^-1 H^T S inwards: the inertia S of what a hinge carries without what the
+hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken off
+(a heavy tip behind light links), digits are lost: about 1e-16 times the ratio of the two, in the
+accelerations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import prebuilt
+from .pack import kernel_type
+
+if TYPE_CHECKING:
+    from .model import Model
+    from .simulate import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Samples of a run at which the pivots are looked at.
+SAMPLES = 12
+
+#: Bodies times samples of that look, at most, but for two samples.
+_WORK = 20_000
+
+_UPPER = np.triu_indices(6)
+
+
+@dataclass(frozen=True)
+class PivotLoss:
+    """The worst ratio of inertia to pivot in a run: at which hinge and time."""
+
+    ratio: float
+    hinge: str
+    time: float
+
+
+@dataclass(frozen=True)
+class SingularDistance:
+    """The smallest measure of a hinge whose coordinates fail where it vanishes (gimbal: |cos|)."""
+
+    measure: float
+    hinge: str
+    time: float
+
+
+# --- pivots ---------------------------------------------------------------------------------------
+
+
+def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
+    """The worst of some samples spread over the run; None where nothing moves freely."""
+    if not len(run.t) or not model.nu:
+        return None
+    worst, pivots = PivotLoss(0.0, "", 0.0), _Pivots(model)
+    count = int(np.clip(_WORK // len(pivots.parents), 2, SAMPLES))
+    for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
+        one = slice(k, k + 1)
+        seen = model._engine.observe(run.t[one], run.q[one], run.u[one], run.memory[one])
+        if seen.failures:
+            continue
+        ratios = pivots.ratios(model._engine.workspace_array(), run.memory[k])
+        place = int(ratios.argmax())
+        if ratios[place] > worst.ratio:
+            hinge = model._engine.hinge_name(place)
+            worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]))
+    return worst if worst.hinge else None
+
+
+class _Pivots:
+    """Where the engine keeps inertias and motion subspaces of all n bodies."""
+
+    def __init__(self, model: Model) -> None:
+        packed, lib = model._engine.packed, model._engine.lib
+        self.parents = np.array([link.parent for link in packed.topology.links])
+        count = len(self.parents)
+        bodies = [packed.model.bodies[i] for i in range(count)]
+        speeds = np.array([body.nu for body in bodies])[:, None]
+        blocks = np.array([body.block for body in bodies])[:, None]
+        self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
+        self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
+        self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
+        column = np.arange(6)
+        self.there = column < speeds  # (n, 6): the columns of H that exist
+        first = blocks + lib.MSTMM_BLOCK_FIXED + 10 * speeds
+        rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
+        self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
+        self.rotor, self.imposed = np.zeros((count, 6)), np.zeros((count, 6), dtype=bool)
+        self.release = np.array([body.release for body in bodies])
+        for i, body in enumerate(bodies):
+            self.rotor[i, : body.nu] = [body.rotor[k] for k in range(body.nu)]
+            if body.n_imposed:
+                self.imposed[i, : body.nu] = [body.imposed_mask[k] for k in range(body.nu)]
+
+    def ratios(self, numbers: Array, memory: Array) -> Array:
+        """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.
+
+        |H|^T (|S| + sum over the carried bodies of |X|^T |S| |X|) |H| / pivot of D, entry by entry,
+        with X the motion of a carried body whose hinge is locked: what D is a small rest of.
+        """
+        S = np.zeros((len(self.parents), 6, 6))
+        S[:, _UPPER[0], _UPPER[1]] = numbers[self.inertia]
+        S = S + np.triu(S, 1).transpose(0, 2, 1)
+        free = self.there & ~(self.imposed & ~self._released(memory)[:, None])
+        H = np.where(free[:, None, :], numbers[self.subspace], 0.0)
+        D = H.transpose(0, 2, 1) @ S @ H + (self.rotor * free)[:, :, None] * np.eye(6)
+        pivots = 1.0 / np.diagonal(
+            np.linalg.inv(D + ~free[:, :, None] * np.eye(6)), axis1=1, axis2=2
+        )
+        carried = np.flatnonzero(self.parents >= 0)
+        inboard = self.parents[carried]
+        turn = numbers[self.turn[carried]].reshape(-1, 3, 3)
+        size = _size(S, H)
+        moved = _carried_motion(turn, numbers[self.shift[carried]], H[inboard])
+        np.add.at(size, inboard, _size(S[carried], moved))
+        ratios = np.where(free, size / np.maximum(np.abs(pivots), 1e-300), 0.0)
+        return np.asarray(ratios.max(axis=1))
+
+    def _released(self, memory: Array) -> NDArray[np.bool_]:
+        known = np.append(memory, 0.0)
+        return np.asarray(known[self.release] != 0.0) & (self.release >= 0)
+
+
+def _size(S: Array, motion: Array) -> Array:
+    """|x|^T |S| |x| (n, k) of every column x of `motion` (n, 6, k)."""
+    x = np.abs(motion)
+    return np.asarray(np.sum(x * (np.abs(S) @ x), axis=1))
+
+
+def _carried_motion(turn: Array, shift: Array, motion: Array) -> Array:
+    """Twists (n, 6, k) of P in its own axes from twists of the parent, v + w x r turned back."""
+    v, w = motion[:, :3], motion[:, 3:]
+    moved = v + np.cross(w, shift[:, :, None], axis=1)
+    back = turn.transpose(0, 2, 1)
+    return np.concatenate([back @ moved, back @ w], axis=1)
+
+
+# --- coordinates that fail ------------------------------------------------------------------------
+
+
+def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
+    """The smallest measure over all samples and hinges that have one; None without such hinges.
+
+    A change of sign between two samples counts as zero: the coordinates failed in between.
+    """
+    found: list[SingularDistance] = []
+    for hinge in model.scene.hinge:
+        measures = _measures(model, run, hinge.name)
+        if measures is None or not len(measures):
+            continue
+        k = int(np.abs(measures).argmin())
+        changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
+        k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
+        found.append(SingularDistance(value, hinge.name, float(run.t[k])))
+    return min(found, key=lambda one: one.measure, default=None)
+
+
+def _measures(model: Model, run: Trajectory, name: str) -> Array | None:
+    """The hinge's own kernel `singularity` at every sample."""
+    packed = model._engine.packed
+    hinge = next(h for h in model.scene.hinge if h.name == name)
+    key = ("hinge", kernel_type(hinge, packed.releases))
+    element = (model.known or {}).get(key) or prebuilt.elements().get(key)
+    function = None if element is None else element.functions.get("singularity")
+    if function is None:
+        return None
+    ffi, slots = packed.ffi, packed.layout.hinges[name]
+    call = ffi.cast("int (*)(const double *, const double *, double *)", function)
+    p = packed.model.bodies[packed.hinge_position[name]].hinge_p
+    coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
+    measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
+    for k, row in enumerate(coordinates):
+        if call(p, ffi.from_buffer("double[]", row), pointer) == 0:
+            measures[k] = pointer[0]
+    return measures[np.isfinite(measures)]

@@ -1,0 +1,160 @@
+"""Error of a run from a second, more accurate one.
+
+The second run has a tenth of the tolerance (or half the fixed step).  The difference of the two is
+the error of the first up to the much smaller one of the second.  What is reported is SAFETY times
+the largest difference so far, so that a moment at which the two happen to cross does not pass for
+accuracy.  It holds until the two runs part for good: past that time (the predictability horizon)
+errors have no meaning, because neither run knows where the system is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .layout import Layout
+from .simulate import Settings, Trajectory
+
+Array = NDArray[np.float64]
+
+#: The estimate is this many times the difference of the two runs.
+SAFETY = 2.0
+
+#: A sample's estimate also covers this many samples after it: at one of them the two runs may cross.
+AHEAD = 3
+
+#: Angles (rad): two runs that differ by more no longer predict the same motion.
+ANGLE = 0.01
+
+#: The same for other coordinates, as part of their largest excursion.
+PART = 0.01
+
+#: No tolerance is tightened below this.
+_TIGHTEST = 1e-14
+
+#: Growth of the error that counts as exponential, and as noise of rounding at its start.
+_GROWTH, _SMALLEST = 1e3, 1e-15
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Estimated error of a run: largest so far, per unit.
+
+    Attributes:
+        t: (n,) s, the samples that both runs reached.
+        q: unit -> (n,) largest error of any coordinate of that unit up to t; the rotation error of
+            a quaternion counts as rad.
+        u: unit -> (n,) the same for speeds.
+        horizon: s; the runs part here, None if they do not.
+        tenfold: s in which errors grow tenfold, None if they do not grow exponentially.
+        reference: how the second run was made.
+    """
+
+    t: Array
+    q: dict[str, Array]
+    u: dict[str, Array]
+    horizon: float | None
+    tenfold: float | None
+    reference: str
+
+    def largest(self, kind: str = "q") -> dict[str, float]:
+        """Unit -> largest error of q or u before the horizon (over the whole run without one)."""
+        within = self.t < np.inf if self.horizon is None else self.t <= self.horizon
+        values: dict[str, Array] = getattr(self, kind)
+        return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
+
+
+def tighter(first: Trajectory) -> tuple[Settings, str]:
+    """Settings of the second run, sampled at the times of the first; and what to call it."""
+    settings, times = first.settings, tuple(np.unique(first.t).tolist())
+    if settings.step is not None:
+        step = settings.step / 2
+        return replace(settings, step=step, output_times=times), f"half the step, {step:.6g} s"
+    factor = 0.1 if settings.rtol >= 10 * _TIGHTEST else 10.0
+    second = replace(
+        settings, rtol=settings.rtol * factor, atol=settings.atol * factor, output_times=times,
+        max_step=settings.max_step / 2, max_steps=3 * settings.max_steps,
+        first_step=0.3 * (first.statistics.smallest_step or 0.0),  # else both begin alike
+    )  # fmt: skip
+    return second, f"rtol {second.rtol:.0e}"
+
+
+def compare(layout: Layout, first: Trajectory, second: Trajectory, reference: str) -> ErrorEstimate:
+    """Estimate from two runs; the second one sampled at the times of the first."""
+    t, ours, theirs = np.intersect1d(first.t, second.t, return_indices=True)
+    q, u = (
+        dict(_groups(layout, getattr(first, kind)[ours], getattr(second, kind)[theirs], kind))
+        for kind in ("q", "u")
+    )
+    excursions = dict(_excursions(layout, first.q))
+    return ErrorEstimate(t, q, u, _horizon(t, q, excursions), _tenfold(t, [*q.values()]), reference)
+
+
+def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
+    """(unit, running maximum of SAFETY times the difference) for each unit."""
+    found: dict[str, Array] = {}
+    for unit, difference in _differences(layout, a, b, kind):
+        ahead = np.concatenate([difference, np.zeros(AHEAD)])
+        near = np.lib.stride_tricks.sliding_window_view(ahead, AHEAD + 1).max(axis=1)
+        error = np.maximum.accumulate(SAFETY * near)
+        found[unit] = np.maximum(found.get(unit, error), error)
+    yield from found.items()
+
+
+def _differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
+    for hinge in layout.hinges.values():
+        first = hinge.q if kind == "q" else hinge.u
+        units = hinge.q_units if kind == "q" else hinge.u_units
+        turn = hinge.quaternion if kind == "q" else None
+        for k, unit in enumerate(units):
+            if turn is not None and turn <= k < turn + 4:
+                continue
+            yield unit, np.abs(a[:, first + k] - b[:, first + k])
+        if turn is not None:
+            place = slice(first + turn, first + turn + 4)
+            yield "rad", rotation_between(a[:, place], b[:, place])
+
+
+def rotation_between(a: Array, b: Array) -> Array:
+    """Angle (n,) in rad between orientations given by unit quaternions (n, 4)."""
+    chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
+
+
+def _excursions(layout: Layout, q: Array) -> Iterator[tuple[str, float]]:
+    """(unit, largest excursion from the start) of the coordinates that are not angles."""
+    found: dict[str, float] = {}
+    for unit, difference in _differences(layout, q, q[:1], "q"):
+        if len(difference):
+            found[unit] = max(found.get(unit, 0.0), float(difference.max()))
+    yield from found.items()
+
+
+def _horizon(t: Array, q: dict[str, Array], excursions: dict[str, float]) -> float | None:
+    """The last sample before the runs differ by more than ANGLE or PART."""
+    limits = {unit: ANGLE if unit == "rad" else PART * excursions.get(unit, 0.0) for unit in q}
+    parted = [
+        int(np.argmax(error > SAFETY * limits[unit]))
+        for unit, error in q.items()
+        if limits[unit] > 0 and (error > SAFETY * limits[unit]).any()
+    ]
+    return float(t[max(0, min(parted) - 1)]) if parted else None
+
+
+def _tenfold(t: Array, errors: list[Array]) -> float | None:
+    """Time for ten times the error, from a straight line through its logarithm over time."""
+    if not errors or len(t) < 8:
+        return None
+    error = np.max(errors, axis=0)
+    late = error >= max(_SMALLEST, 10 * error[len(t) // 10])
+    late &= error < ANGLE
+    if late.sum() < 5 or error[late][-1] < _GROWTH * error[late][0] / 10:
+        return None
+    slope, offset = np.polyfit(t[late], np.log10(error[late]), 1)
+    rest = np.log10(error[late]) - slope * t[late] - offset
+    powers = np.polyfit(np.log(t[late]), np.log10(error[late]), 1)
+    other = np.log10(error[late]) - np.polyval(powers, np.log(t[late]))
+    return float(1 / slope) if slope > 0 and rest.std() < other.std() else None

@@ -1,0 +1,113 @@
+"""Making the runs behind a Result: the run itself, checkpoints, the second run for its error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import MstmmError, SceneError
+
+from . import second_opinion
+from .checkpoint import Checkpoint
+from .error_estimate import ErrorEstimate, compare, tighter
+from .integrate import Run, Samples
+from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
+from .stability import StepCheck, check_step
+from .steppers import get
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+
+#: Seconds of wall time between checkpoints.
+CHECKPOINT_EVERY = 30.0
+
+
+class Watch:
+    """What goes on beside a run: progress, checkpoints, and notes of what went wrong with those.
+
+    With two runs, each counts for half of the time that progress tells.
+    """
+
+    def __init__(self, progress: Progress | None, settings: Settings, runs: int = 1) -> None:
+        self.progress, self.settings, self.runs = progress, settings, runs
+        self.run, self.notes = 0, list[str]()
+        self.checkpoint: Checkpoint | None = None
+        self._saved = time.monotonic()
+
+    def tell(self, t: float) -> None:
+        """The run is at time t.  A callback that raises is not called again; the run goes on."""
+        if self.progress is None:
+            return
+        start, end = self.settings.t_start, self.settings.t_end
+        try:
+            self.progress(start + ((t - start) + self.run * (end - start)) / self.runs, end)
+        except Exception as error:
+            self.progress = None
+            self.notes.append(f"progress was switched off: {type(error).__name__}: {error}")
+
+    def look(self, run: Run, earlier: Samples | None) -> None:
+        """Between slices of a run: progress, and a checkpoint when one is due."""
+        self.tell(run.t)
+        if time.monotonic() - self._saved > CHECKPOINT_EVERY:
+            self.save(run, earlier)
+
+    def save(self, run: Run, earlier: Samples | None) -> None:
+        """A checkpoint now.  If it cannot be written the run goes on and a note says so."""
+        if self.checkpoint is not None and self.run == 0:
+            try:
+                self.checkpoint.save(run.state(), _joined(earlier, run.samples))
+            except MstmmError as error:
+                note = f"no checkpoint: {error}"
+                if note not in self.notes:
+                    self.notes.append(note)
+        self._saved = time.monotonic()
+
+
+def _joined(earlier: Samples | None, samples: Samples) -> Samples:
+    return samples if earlier is None else Samples.joined([earlier, samples])
+
+
+def first_run(
+    model: Model, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
+) -> tuple[Trajectory, StepCheck | None]:
+    """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
+    if settings.method in second_opinion.METHODS:
+        if watch.checkpoint is not None:
+            raise SceneError(f"method {settings.method!r} keeps no checkpoints; use dop853")
+        return second_opinion.integrate(model, settings, q, u, watch.tell), None
+    system = SceneSystem(model._engine)
+    start = system.start(settings.t_start, q, u)
+    step = check_step(model._engine, get(settings.method), settings, start, system.memory)
+    run, earlier = make_run(system, settings, q, u), None
+    if resume and watch.checkpoint is not None and watch.checkpoint.exists():
+        state, earlier = watch.checkpoint.load()
+        run.restore(state)
+    status = advance(run, lambda now: watch.look(now, earlier))
+    if watch.checkpoint is not None:
+        if status is None:
+            watch.save(run, earlier)
+        else:
+            watch.checkpoint.remove()
+    return trajectory(system, run, settings, status, earlier), step
+
+
+def second_run(
+    model: Model, first: Trajectory, q: Array, u: Array, watch: Watch
+) -> ErrorEstimate | None:
+    """Error of `first` by a more accurate run; None, with a note, if that leads nowhere."""
+    settings, reference = tighter(first)
+    watch.run = 1
+    second, _ = first_run(model, settings, q, u, watch)
+    if not second.success:
+        why = "it was interrupted" if second.status is None else second.message
+        watch.notes.append(f"the second run, for the error, did not reach the end: {why}")
+    if len(np.intersect1d(first.t, second.t)) < 2 or second.status is None:
+        return None
+    return compare(model.layout, first, second, reference)

@@ -1,0 +1,270 @@
+"""SciPy's integrators on the very same compiled call-backs: a second opinion on every run.
+
+The classes behind `scipy.integrate.solve_ivp` are driven step by step, so that breaks, events,
+releases, output times and Ctrl-C mean what they mean in the C loop.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import SceneError
+
+from .integrate import Samples, Statistics, Status
+from .simulate import SceneSystem, Settings, Trajectory, interruptible, split, tolerances
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+
+#: Method of `simulate` -> name of SciPy's class.
+METHODS = {f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")}
+
+#: Points inside a step at which events are looked at.
+_LOOKS = np.linspace(0.0, 1.0, 9)[1:]
+
+
+class _Ended(Exception):
+    """The run is over before its end: why, and a sentence."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status, self.message = status, message
+
+
+class _System:
+    """The call-backs of a model, taken from the C structure and called from Python."""
+
+    def __init__(self, model: Model) -> None:
+        self.engine = model._engine
+        self.scene = SceneSystem(self.engine)
+        self.calls = self.scene.system
+        self.ffi = self.engine.ffi
+        self.bounds = (-np.inf, np.inf)
+        self.failure, self.evaluations = "", 0
+
+    def rates(self, t: float, y: Array) -> Array:
+        """dy/dt; nan where it cannot be evaluated, which makes SciPy try a smaller step."""
+        state, rates = np.ascontiguousarray(y, dtype=np.float64), np.empty(len(y))
+        inside = min(max(t, self.bounds[0]), self.bounds[1])  # a break is never seen itself
+        code = self.calls.rhs(self.calls.context, inside, self._c(state), self._c(rates))
+        self.evaluations += 1
+        if code:
+            self.failure = self.engine.failure_text(self.scene.run.failure, t)
+            rates[:] = np.nan
+        return rates
+
+    def _c(self, array: Array) -> Any:
+        return self.ffi.from_buffer("double[]", array)
+
+    def events(self, t: float, y: Array) -> Array:
+        values = np.empty(max(1, self.calls.n_events))
+        state = np.ascontiguousarray(y)
+        if self.calls.n_events and self.calls.events(
+            self.calls.context, t, self._c(state), self._c(values)
+        ):
+            text = self.engine.failure_text(self.scene.run.failure, t)
+            raise _Ended(Status.EVENT_FAILED, text)
+        return values[: self.calls.n_events]
+
+    def remember(self, t: float, y: Array) -> Array:
+        """After a step: memory of turns brought up to date; the settled state."""
+        state = np.array(y)
+        self.calls.accept(self.calls.context, t, self._c(state))
+        return state
+
+    def fire(self, event: int, t: float, y: Array) -> int:
+        return int(self.calls.fire(self.calls.context, event, t, self._c(np.array(y))))
+
+
+def integrate(
+    model: Model, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
+) -> Trajectory:
+    """One run by SciPy.
+
+    Raises SceneError for a fixed step or an unknown method.
+    """
+    if settings.step is not None:
+        raise SceneError(f"method {settings.method!r} chooses its own steps: leave step out")
+    return _Loop(model, settings, tell).run(q, u)
+
+
+class _Loop:
+    """Steps, breaks, events and samples of one run."""
+
+    def __init__(self, model: Model, settings: Settings, tell: Callable[[float], None]) -> None:
+        self.system, self.settings, self.tell = _System(model), settings, tell
+        self.rows: list[tuple[float, Array, Array, int]] = []
+        self.outputs = None if settings.output_times is None else list(settings.output_times)
+        self.steps = self.fired = 0
+        self.sizes: list[float] = []
+        self.t, self.last = settings.t_start, np.zeros(0)
+        self.truth = np.zeros(int(self.system.calls.n_events), dtype=bool)
+
+    def run(self, q: Array, u: Array) -> Trajectory:
+        scene, settings = self.system.scene, self.settings
+        y = scene.start(settings.t_start, q, u)
+        self.last, self.atol = y, tolerances(scene, settings, y)
+        inner = [b for b in self.system.engine.packed.breaks
+                 if settings.t_start < b < settings.t_end]  # fmt: skip
+        status: Status | None
+        try:
+            with interruptible() as flag:
+                self.sample(self.t, y)
+                for stop in [*inner, settings.t_end]:
+                    y = self.piece(y, stop, flag)
+            status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
+        except _Ended as ended:
+            status, message = ended.status, ended.message
+        except KeyboardInterrupt:
+            status, message = None, f"interrupted at t = {self.t:.9g} s"
+        return split(
+            scene, self.samples(), settings, status, message, self.statistics(),
+            (self.t, self.last),
+        )  # fmt: skip
+
+    def piece(self, y: Array, stop: float, flag: list[bool]) -> Array:
+        """From self.t to the next break, with a new integrator after every event."""
+        self.system.bounds = (np.nextafter(self.t, np.inf), np.nextafter(stop, -np.inf))
+        while self.t < stop:
+            if self.fire_here(y):
+                continue
+            y = self.stretch(y, stop, flag)
+        self.fire_here(y)
+        return y
+
+    def stretch(self, y: Array, stop: float, flag: list[bool]) -> Array:
+        """Steps of one integrator, up to `stop` or an event."""
+        solver = self.solver(y, stop)
+        while solver.status == "running":
+            if flag[0]:
+                raise KeyboardInterrupt
+            try:
+                text = solver.step()
+            except (ValueError, np.linalg.LinAlgError) as error:
+                text, solver.status = str(error), "failed"
+            if solver.status == "failed" or not np.isfinite(solver.y).all():
+                raise self.failed(solver, text)
+            self.steps += 1
+            self.sizes.append(solver.t - solver.t_old)
+            event = self.first_event(solver)
+            end = solver.t if event is None else event[1]
+            dense = solver.dense_output()
+            self.outputs_until(dense, end)
+            y = solver.y if event is None else dense(end)
+            self.t, self.last = end, self.system.remember(end, y)
+            self.tell(end)
+            if event is not None:
+                return np.array(self.last)
+            if self.outputs is None:
+                self.sample(end, solver.y)
+            self.truth &= self.system.events(end, solver.y) >= 0
+        return np.array(self.last)
+
+    def solver(self, y: Array, stop: float) -> Any:
+        import scipy.integrate
+
+        kind = getattr(scipy.integrate, METHODS[self.settings.method])
+        first = self.settings.first_step if self.t == self.settings.t_start else 0.0
+        return kind(
+            self.system.rates, self.t, y, stop, rtol=max(self.settings.rtol, 2.3e-14),
+            atol=self.atol, max_step=self.settings.max_step or np.inf,
+            first_step=min(first, stop - self.t) or None,
+        )  # fmt: skip
+
+    def failed(self, solver: Any, text: str | None) -> _Ended:
+        at = f"last good state at t = {self.t:.9g} s"
+        if self.system.failure:
+            return _Ended(Status.RHS_FAILED, f"{self.system.failure}; {at}")
+        if not np.isfinite(solver.y).all():
+            name = self.system.scene.components()[int(np.argmin(np.isfinite(solver.y)))]
+            return _Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
+        return _Ended(Status.STEP_TOO_SMALL, f"{text or 'the integrator failed'}; {at}")
+
+    # --- events ---------------------------------------------------------------------------------
+
+    def fire_here(self, y: Array) -> bool:
+        """Fire what has become true at self.t; True if the integrator must start again."""
+        values = self.system.events(self.t, y)
+        self.truth &= values >= 0
+        self.last = np.array(y)
+        for i in np.flatnonzero((values >= 0) & ~self.truth):
+            return self.fire(int(i), y)
+        return False
+
+    def fire(self, event: int, y: Array) -> bool:
+        lib, t = self.system.engine.lib, self.t
+        before = (t, np.array(y), np.array(self.system.scene.memory), -(event + 1))
+        answer = self.system.fire(event, t, y)
+        self.truth[event], self.fired = True, self.fired + 1
+        if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
+            self.rows.pop()
+        self.rows.append(before)
+        self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
+        if answer == lib.MSTMM_FIRE_STOP:
+            name = self.system.scene.event_names[event]
+            raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s")
+        return True
+
+    def first_event(self, solver: Any) -> tuple[int, float] | None:
+        """(event, time) of the first one that becomes true in the step."""
+        if not len(self.truth):
+            return None
+        dense, left = solver.dense_output(), solver.t_old
+        false = self.system.events(left, dense(left)) < 0
+        for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
+            values = self.system.events(right, dense(right))
+            risen = np.flatnonzero((values >= 0) & false)
+            if len(risen):
+                time, event = min((self.locate(dense, i, left, right), int(i)) for i in risen)
+                return event, time
+            left, false = right, values < 0
+        return None
+
+    def locate(self, dense: Any, event: int, left: float, right: float) -> float:
+        """The first number at which the event holds, by bisection."""
+        while True:
+            middle = left + (right - left) / 2
+            if not left < middle < right:
+                return right
+            if self.system.events(middle, dense(middle))[event] >= 0:
+                right = middle
+            else:
+                left = middle
+
+    # --- samples --------------------------------------------------------------------------------
+
+    def sample(self, t: float, y: Array) -> None:
+        if self.outputs is not None:
+            if not self.outputs or self.outputs[0] > t:
+                return
+            del self.outputs[: bisect_left(self.outputs, np.nextafter(t, np.inf))]
+        self.rows.append((t, np.array(y), np.array(self.system.scene.memory), 0))
+
+    def outputs_until(self, dense: Any, end: float) -> None:
+        while self.outputs and self.outputs[0] <= end:
+            t = self.outputs.pop(0)
+            self.rows.append((t, dense(t), np.array(self.system.scene.memory), 0))
+
+    def samples(self) -> Samples:
+        n_memory = int(self.system.calls.n_memory)
+        rows = self.rows or [(self.t, self.last, np.array(self.system.scene.memory), 0)][:0]
+        return Samples(
+            np.array([t for t, *_ in rows]),
+            np.array([y for _, y, *_ in rows]).reshape(len(rows), -1),
+            np.array([m[:n_memory] for *_, m, _ in rows]).reshape(len(rows), n_memory),
+            np.array([e for *_, e in rows], dtype=np.int64),
+        )
+
+    def statistics(self) -> Statistics:
+        return Statistics(
+            self.steps, 0, self.system.evaluations, self.fired,
+            min(self.sizes, default=None), max(self.sizes, default=None),
+            None, None, 0.0, 0.0, False, 0,
+        )  # fmt: skip

@@ -1,0 +1,144 @@
+"""Is a fixed step short enough for an explicit method?  The fastest motion at a state, and the
+amplification of one step on it.
+
+The fastest motion is the eigenvalue of largest modulus of the Jacobian of the right-hand side,
+taken by central differences.  For a hinge with stiffness k, damping c and effective inertia mu it
+is about c/mu + sqrt(k/mu).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import NumericalFailure
+
+from .engine import Engine
+from .steppers import Tableau
+
+if TYPE_CHECKING:
+    from .simulate import Settings
+
+Array = NDArray[np.float64]
+
+#: h |lambda| above which a fixed step of an explicit method is not trusted.
+LIMIT = 2.5
+
+#: Growth of a decaying motion per step that counts as unstable.
+_GROWTH = 1.01
+
+#: States with more components than this get their fastest motion from a Krylov method.
+_DENSE = 160
+
+
+@dataclass(frozen=True)
+class StepCheck:
+    """A fixed step against the fastest motion at the start of a run.
+
+    Attributes:
+        step: s.
+        rate: |lambda| of the fastest motion, 1/s.
+        product: h |lambda|.
+        amplification: |R(h lambda)|, the factor of that motion in one step.
+        hinge: whose speeds that motion moves most.
+        stable_step: the longest step that is stable for it and keeps h |lambda| <= LIMIT, s.
+    """
+
+    step: float
+    rate: float
+    product: float
+    amplification: float
+    hinge: str
+    stable_step: float
+
+    @property
+    def warning(self) -> str | None:
+        """A sentence if the step is too long."""
+        if self.product <= LIMIT and self.amplification <= _GROWTH:
+            return None
+        return (
+            f'step = {self.step:.4g} s is too long for the fastest motion at the start (hinge "'
+            f'{self.hinge}", {self.rate:.4g} 1/s): h |lambda| = {self.product:.3g}, one step '
+            f"multiplies it by {self.amplification:.3g}; take a step below {self.stable_step:.3g} s "
+            "or leave step out for a method that chooses it"
+        )
+
+
+def check_step(
+    engine: Engine, tableau: Tableau, settings: Settings, y: Array, memory: Array
+) -> StepCheck | None:
+    """Check of a fixed step at the start; None for adaptive runs or where nothing moves."""
+    if settings.step is None or engine.nu == 0:
+        return None
+    n = engine.nq + engine.nu
+    try:
+        value, vector = fastest(engine, settings.t_start, y[:n].copy(), memory)
+    except NumericalFailure:  # the run itself will say what is wrong
+        return None
+    rate = abs(value)
+    if not rate > 0.0 or not np.isfinite(rate):
+        return None
+    value = complex(min(value.real, 0.0), value.imag)  # motion that grows by itself is no matter
+    weights = np.abs(vector[engine.nq :])
+    layout = engine.packed.layout
+    hinge = max(layout.hinges.values(), key=lambda s: float(weights[s.u_slice].sum()))
+    return StepCheck(
+        settings.step, rate, settings.step * rate,
+        float(abs(tableau.amplification(settings.step * value))), hinge.name,
+        _longest(tableau, value),
+    )  # fmt: skip
+
+
+def _longest(tableau: Tableau, value: complex) -> float:
+    """The first step at which the motion grows, at most LIMIT / |lambda|."""
+    products = np.linspace(0.0, LIMIT, 501)[1:]
+    grows = np.abs(tableau.amplification(products * value / abs(value))) > _GROWTH
+    longest = products[grows.argmax() - 1] if grows.any() else LIMIT
+    return float(longest / abs(value))
+
+
+def fastest(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Array]:
+    """(lambda, eigenvector (nq + nu)) of the fastest motion at a state."""
+    n = len(y)
+    sizes = np.maximum(1e-6, 1e-6 * np.abs(y))
+    if n <= _DENSE:
+        values, vectors = np.linalg.eig(_differences(engine, t, y, memory, np.diag(sizes)) / sizes)
+        k = int(np.abs(values).argmax())
+        return complex(values[k]), np.asarray(vectors[:, k])
+    return _krylov(engine, t, y, memory)
+
+
+def _differences(engine: Engine, t: float, y: Array, memory: Array, moves: Array) -> Array:
+    """Central differences (n, k) of the right-hand side along the columns of `moves` (n, k)."""
+    states = np.concatenate([y + moves.T, y - moves.T])
+    q, u = (np.ascontiguousarray(x) for x in np.split(states, [engine.nq], axis=1))
+    rows = np.tile(memory, (len(states), 1))
+    rates = np.hstack(engine.accelerations(t, q, u, rows))
+    half = len(states) // 2
+    return np.asarray((rates[:half] - rates[half:]).T / 2)
+
+
+def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Array]:
+    """The same for large states, from products of the Jacobian with vectors."""
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+    n = len(y)
+
+    def product(vector: Any) -> Array:
+        size = float(np.linalg.norm(vector)) or 1.0
+        move = 1e-6 * np.sqrt(n) * np.asarray(vector, dtype=float).reshape(n, 1) / size
+        change = _differences(engine, t, y, memory, move)[:, 0]
+        return np.asarray(change * size / (1e-6 * np.sqrt(n)))
+
+    operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        values, vectors = eigs(operator, k=1, which="LM", tol=1e-2, maxiter=20, v0=start)
+    except ArpackNoConvergence as error:
+        values, vectors = error.eigenvalues, error.eigenvectors
+    if not len(values):
+        return 0j, start
+    return complex(values[0]), np.asarray(vectors[:, 0])
