@@ -119,6 +119,11 @@ class Law(Table):
     friction: Annotated[tuple[Friction, ...], _TABLES] = ()
     limits: Annotated[tuple[Limits, ...], _TABLES] = ()
 
+    def entries(self) -> tuple[LawEntry, ...]:
+        """The laws of all coordinates; at least one, which does nothing where nothing is said."""
+        count = max(1, *(len(getattr(self, key)) for key in type(self).model_fields))
+        return tuple(self.entry(k) for k in range(count))
+
     def entry(self, k: int) -> LawEntry:
         """The law of coordinate k; a list with one entry is shared by all, none means no effect."""
 

@@ -96,7 +96,9 @@ class Certificate:
         if self.pivot is not None:
             rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
         if self.singular is not None:
-            rows.append(("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"'))
+            rows.append(
+                ("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"')
+            )
         if self.step is not None:
             rows.append(("h |lambda| at the start", f"{self.step.product:.3g}"))
         if self.sum_of_local_errors is not None:
@@ -174,11 +176,10 @@ def _isolated(scene: Scene) -> bool:
 
 
 def _passive(hinge: Hinge) -> bool:
-    entries = [hinge.law.entry(k) for k in range(6)]
     acts = any(
         e.stiffness or e.damping or not e.effort.is_zero or e.inertia
         or e.friction.acts or e.limits.acts
-        for e in entries
+        for e in hinge.law.entries()
     )  # fmt: skip
     return not acts and hinge.drive is None and hinge.release is None
 
