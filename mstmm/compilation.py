@@ -41,7 +41,8 @@ def compile_scene(
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
 
-    Raises SceneError for hinges that do not form a tree and types that nobody defines.
+    Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
+    leave a motion of the start undetermined.
     """
     if engine not in ENGINES:
         raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
@@ -54,7 +55,9 @@ def compile_scene(
     scene.check_types(definitions)
     why = "looped: the only engine of this release"
     product = accuracy if sweep == "product" else None
-    return Model(scene, known=elements, why=why, product_accuracy=product)
+    model = Model(scene, known=elements, why=why, product_accuracy=product)
+    model.refuse_undetermined_start()
+    return model
 
 
 def generate(elements: Iterable[Element]) -> list[Generated]:

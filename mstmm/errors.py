@@ -35,3 +35,7 @@ class NumericalFailure(MstmmError):
     """A computation that has no trustworthy answer; names time, element and cause."""
 
     exit_code = 4
+
+
+class UndeterminedMotion(NumericalFailure):
+    """A hinge whose acceleration nothing determines, because what it carries has no inertia there."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
 
 from .pack import Packed
 
@@ -107,7 +107,8 @@ class Engine:
             self.pointer(qdot), self.pointer(udot), failure, at,
         )  # fmt: skip
         if code:
-            raise NumericalFailure(self.failure_text(failure, float(times[at[0]])))
+            kind = UndeterminedMotion if code == _UNDETERMINED else NumericalFailure
+            raise kind(self.failure_text(failure, float(times[at[0]])))
         self._finite("acceleration", udot, times)
         return qdot, udot
 

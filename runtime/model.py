@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import Scene
 
@@ -72,6 +72,16 @@ class Model:
                 u[slots.u_slice] = hinge.initial.u
         y = SceneSystem(self._engine).start(0.0, q, u)
         return y[: self.nq], y[self.nq : self.nq + self.nu]
+
+    def refuse_undetermined_start(self) -> None:
+        """SceneError naming the hinge if the scene's masses leave a motion of the start undetermined."""
+        q, u = self.initial_state()
+        try:
+            self._engine.accelerations(0.0, q[None].copy(), u[None].copy(), self._memory(1))
+        except UndeterminedMotion as error:
+            raise SceneError(f"scene: {error}") from None
+        except NumericalFailure:
+            pass  # not a matter of masses: reported by whoever computes there
 
     def _memory(self, n: int) -> Array:
         return np.ascontiguousarray(np.tile(self._engine.start_memory(), (n, 1)))
@@ -168,6 +178,7 @@ class Model:
         t_start: float = 0.0,
         initial: tuple[ArrayLike, ArrayLike] | None = None,
         max_step: float = 0.0,
+        max_steps: int = 0,
         certify: bool = False,
         progress: Callable[[float, float], None] | None = None,
         checkpoint: str | None = None,
@@ -176,13 +187,16 @@ class Model:
         """Integrate to `t_end` (s).
 
         Args:
-            method: rk4 (with `step`), dopri5, dop853, or scipy-NAME for solve_ivp on the same kernels.
+            method: rk4 (with `step`), dopri5, dop853, or scipy-DOP853, scipy-RK45, scipy-Radau,
+                scipy-BDF, scipy-LSODA: SciPy's integrators on the same kernels.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
+            max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
             progress: called with (t, t_end) about every 0.1 s.
-            checkpoint: file that keeps the run's state when it is interrupted; `resume` continues it.
+            checkpoint: file that keeps the run when it is interrupted, and every 30 s.
+            resume: continue from that file, if it is there, bit for bit.
 
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for settings that make no sense.
@@ -194,7 +208,9 @@ class Model:
             times = tuple(float(x) for x in np.atleast_1d(np.asarray(output_times, dtype=float)))
         if not np.isfinite(t_end) or t_end < t_start:
             raise SceneError(f"t_end = {t_end!r}: expected a time in s, not before t_start")
-        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step)
+        settings = Settings(
+            t_end, t_start, method, step, rtol, atol, times, max_step, max_steps
+        )
         q, u = self.initial_state() if initial is None else initial
         return simulate(
             self, settings, self._engine.batch("q", q, self.nq)[0],
