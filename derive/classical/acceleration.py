@@ -110,7 +110,7 @@ def _planar_premises(free: tuple[str, ...]) -> Parts:
     rdd_o, wd_o, m_o, q_o = PLANAR.at("O")
     _, _, m_n, q_n = PLANAR.at("N")
     carried = rdd_i + wd_i[0, 0] * Perp(offset) + eta_v
-    turned = alpha[len(shifts), 0] * sp.Identity(1) if turns else wd_i + eta_w
+    turned = Matrix([[alpha[len(shifts), 0]]]) if turns else wd_i + eta_w
     premises = (
         Equation("acceleration behind the hinge", rdd_o, _along(axes, carried, shifts, alpha, 0)),
         Equation("angular acceleration behind the hinge", wd_o, turned),
@@ -119,7 +119,7 @@ def _planar_premises(free: tuple[str, ...]) -> Parts:
     )
     conditions = _efforts("force", next_axes, q_n, shifts, tau, 0)
     if turns:
-        effort = tau[len(shifts), 0] * sp.Identity(1)
+        effort = Matrix([[tau[len(shifts), 0]]])
         next_moment = m_n - Perp(next_offset).T * q_n
         conditions += (Equation("next hinge's moment", next_moment, effort, "(5.67)"),)
     inputs = (

@@ -179,7 +179,6 @@ def guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
         (
             margin[0, 0] > PIVOT_LIMIT,
             VANISHING_PIVOT,
-            f"{hinge.element}: the pivot vanishes, the product of transfer matrices does not exist "
-            "here; use the Riccati sweep",
+            "the pivot vanishes: no transfer matrix here, use the Riccati sweep",
         ),
     )
