@@ -86,7 +86,9 @@ def agree(library: CLibrary, stem: str, kernel: KernelIR, inputs: dict[str, list
 def test_c_tape_and_ir_agree(stem: str, library: CLibrary, rng: np.random.Generator) -> None:
     for kernel in SPECS[stem].kernels:
         passed = 0
-        for special in (True, False, False, False):
-            inputs = {port.name: drawn(port, rng, special) for port in kernel.inputs}
+        for draw in range(60):  # many draws fail a guard, which has to fail alike in all three
+            inputs = {port.name: drawn(port, rng, draw == 0) for port in kernel.inputs}
             passed += agree(library, stem, kernel, inputs)
+            if draw >= 3 and passed:
+                break
         assert passed, f"{kernel.name}: no drawn point passes its guards"
