@@ -29,7 +29,7 @@ def _joints(hinge: Hinge) -> list[tuple[str, Any]]:
     a, kind = hinge.axis, hinge.type
     e1, e2, n = triad(a, hinge.axis2 if kind == "planar" else None).T
     x, y, z = np.eye(3)
-    return {
+    joints: dict[str, list[tuple[str, Any]]] = {
         "fixed": [],
         "pin": [("hinge", a)],
         "prismatic": [("slide", a)],
@@ -40,7 +40,8 @@ def _joints(hinge: Hinge) -> list[tuple[str, Any]]:
         "gimbal": [("hinge", z), ("hinge", y), ("hinge", x)],
         "free": [("free", None)],
         "elastic": [("free", None)],
-    }[kind]
+    }
+    return joints[kind]
 
 
 class MujocoPeer:
@@ -83,8 +84,9 @@ class MujocoPeer:
             fullinertia=_text(entries),
         )
         for i, (kind, axis) in enumerate(_joints(hinge)):
-            extra = {} if axis is None else {"axis": _text(axis)}
-            ElementTree.SubElement(node, "joint", name=f"{hinge.name}:{i}", type=kind, **extra)
+            joint = ElementTree.SubElement(node, "joint", name=f"{hinge.name}:{i}", type=kind)
+            if axis is not None:
+                joint.set("axis", _text(axis))
         return node
 
     def _places(self, hinge: Hinge) -> tuple[int, int]:

@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 import pytest
-from reference import random_scenes
+from reference.compare import drawn, fresh, worst
 
 import mstmm
 from peers.mujoco_peer import TYPES, MujocoPeer
 from peers.pinocchio_peer import PinocchioPeer
 
 
-def worst(a, b):
-    """Largest difference over the largest entry."""
-    a, b = np.asarray(a), np.asarray(b)
-    return float(np.abs(a - b).max() / max(np.abs(b).max(), 1e-300)) if b.size else 0.0
-
-
-def drawn(seed, **options):
-    print(f"random_scenes seed = {seed}")
-    scene = random_scenes.random_scene(seed, **options)
-    return scene, *random_scenes.random_state(scene, seed + 1)
-
-
-def compiled(scene):
+def compiled(scene: dict[str, Any]) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**scene))
 
 
 @pytest.mark.parametrize("draw", range(25))
-def test_pinocchio_on_random_trees(draw, rng):
-    scene, q, u = drawn(draw if draw < 15 else int(rng.integers(2**32)))
+def test_pinocchio_on_random_trees(draw: int, rng: np.random.Generator) -> None:
+    scene, q, u = drawn(draw) if draw < 15 else fresh(rng)
     model, peer = compiled(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-10
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
@@ -40,8 +30,8 @@ def test_pinocchio_on_random_trees(draw, rng):
 
 
 @pytest.mark.parametrize("draw", range(25))
-def test_mujoco_on_random_trees(draw, rng):
-    scene, q, u = drawn(draw if draw < 15 else int(rng.integers(2**32)), types=TYPES)
+def test_mujoco_on_random_trees(draw: int, rng: np.random.Generator) -> None:
+    scene, q, u = drawn(draw, types=TYPES) if draw < 15 else fresh(rng, types=TYPES)
     model, peer = compiled(scene), MujocoPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-9
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
@@ -50,13 +40,13 @@ def test_mujoco_on_random_trees(draw, rng):
 @pytest.mark.parametrize(
     "types", [("pin",), ("ball",), ("universal", "prismatic"), ("cylindrical",)]
 )
-def test_pinocchio_on_long_chains(types):
+def test_pinocchio_on_long_chains(types: tuple[str, ...]) -> None:
     scene, q, u = drawn(77, types=types, chain=True, most=40, laws=False, loads=False)
     model, peer = compiled(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u), peer.accelerations(q, u)) < 1e-9
 
 
-def test_motion_of_a_spatial_arm_against_mujoco():
+def test_motion_of_a_spatial_arm_against_mujoco() -> None:
     """Half a second of a chain of pins, universals and balls; MuJoCo by its own RK4."""
     scene, q, u = drawn(
         9, types=("pin", "ball", "universal"), chain=True, most=4, loads=False, laws=False

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from reference import newton_euler as dense
-from reference import random_scenes
+from reference.compare import drawn, worst
 
 from peers.mujoco_peer import TYPES, MujocoPeer
 from peers.pinocchio_peer import PinocchioPeer
 
 
-def worst(a, b):
-    """Largest difference over the largest entry."""
-    a, b = np.asarray(a), np.asarray(b)
-    return float(np.abs(a - b).max() / max(np.abs(b).max(), 1e-300)) if b.size else 0.0
-
-
-def drawn(seed, **options):
-    scene = random_scenes.random_scene(seed, **options)
-    return scene, *random_scenes.random_state(scene, seed + 1)
-
-
 @pytest.mark.parametrize("seed", range(20))
-def test_pinocchio(seed):
+def test_pinocchio(seed: int) -> None:
     scene, q, u = drawn(seed)
     peer = PinocchioPeer(scene)
     assert worst(peer.accelerations(q, u, 0.3), dense.solve(scene, q, u, 0.3).udot) < 1e-10
@@ -31,7 +19,7 @@ def test_pinocchio(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_mujoco(seed):
+def test_mujoco(seed: int) -> None:
     scene, q, u = drawn(seed, types=TYPES)
     peer = MujocoPeer(scene)
     assert worst(peer.accelerations(q, u, 0.3), dense.solve(scene, q, u, 0.3).udot) < 1e-9
@@ -39,7 +27,7 @@ def test_mujoco(seed):
 
 
 @pytest.mark.parametrize("kind", ["free", "elastic"])
-def test_mujoco_with_a_free_root(kind):
+def test_mujoco_with_a_free_root(kind: str) -> None:
     scene, q, u = drawn(3, types=(kind,), chain=True, most=1)
     peer = MujocoPeer(scene)
     assert worst(peer.accelerations(q, u, 0.3), dense.solve(scene, q, u, 0.3).udot) < 1e-11

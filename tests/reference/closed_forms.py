@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
@@ -157,7 +158,7 @@ def steady_precession(
     return float(slow), float(fast)
 
 
-def pendulum_scene(length: float = 1.0, gravity: float = 9.81) -> dict[str, object]:
+def pendulum_scene(length: float = 1.0, gravity: float = 9.81) -> dict[str, Any]:
     """Point pendulum in the x-y plane, angle from +x; A01 starts at angle pi."""
     return {
         "schema_version": 1,
@@ -179,7 +180,7 @@ def pendulum_scene(length: float = 1.0, gravity: float = 9.81) -> dict[str, obje
 
 def top_scene(
     mass: float, arm: float, transverse: float, axial: float, gravity: float = 9.81
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Symmetric body on a ball hinge at the origin, its mass centre at `arm` along its z axis;
     inertias about the mass centre."""
     return {

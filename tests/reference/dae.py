@@ -119,7 +119,7 @@ class Equations:
             effort = np.where(free, laws.hinge_effort(tree, hinge, q, u, t), 0.0)
             force += spread.T @ (effort - rotor * rows.bias)
             mass += spread.T @ (rotor[:, None] * spread)
-            for i in np.flatnonzero(~free):
+            for i in np.flatnonzero(np.logical_not(free)).tolist():
                 asked = self._asked(hinge, i, q, rows.value[i], t)
                 bound.add(hinge, spread[i : i + 1], np.array([asked - rows.bias[i]]))
         jacobian, m = np.vstack(bound.blocks), sum(len(b) for b in bound.blocks)

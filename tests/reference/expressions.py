@@ -25,8 +25,8 @@ _COMPARE: dict[type, Any] = {
     ast.GtE: operator.ge,
     ast.Eq: operator.eq,
 }
-_NAMES = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp")
-_NAMES += ("log", "sqrt")
+_NAMES = ["sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp"]
+_NAMES += ["log", "sqrt"]
 _OWN: dict[str, Any] = {
     "abs": abs,
     "min": min,

@@ -62,8 +62,8 @@ def rotational_potential(q: Array, hinge: Hinge, k: Array, rest: Array) -> Any:
 
 def rotational_effort(q: Array, hinge: Hinge, k: Array, rest: Array) -> Array:
     """-dV/d(rotation) in outboard axes by complex step."""
-    step = 1e-40j * np.eye(3)
-    moved = q + quaternion_product(np.broadcast_to(q, (3, 4)), pure(step)) / 2
+    step: Any = 1e-40j * np.eye(3)
+    moved: Any = q + quaternion_product(np.broadcast_to(q, (3, 4)), pure(step)) / 2
     return np.asarray(-rotational_potential(moved, hinge, k, rest).imag / 1e-40)
 
 

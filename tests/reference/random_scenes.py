@@ -124,8 +124,10 @@ def random_scene(
     laws: bool = True,
     loads: bool = True,
     chain: bool = False,
+    roots: bool = True,
 ) -> Scene:
-    """Scene dictionary drawn from `seed`; a chain instead of a tree if asked."""
+    """Scene dictionary drawn from `seed`; a chain instead of a tree if asked; several bodies may
+    hang on ground unless `roots` is False."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, most + 1))
     bodies = [random_body(rng, f"body{i}") for i in range(count)]
@@ -133,7 +135,7 @@ def random_scene(
     for i in range(count):
         kind = str(rng.choice(types))
         held = str(rng.choice(["", ".skew"]))
-        if i == 0 or (not chain and rng.random() < 0.1):
+        if i == 0 or (roots and not chain and rng.random() < 0.1):
             inboard = "ground"
         else:
             parent = i - 1 if chain else int(rng.integers(0, i))
@@ -187,3 +189,16 @@ def aligned_chain(seed: int, types: tuple[str, ...], springs: bool = False) -> S
             hinge["law"] = {key: [value] * SIZES[kind][1] for key, value in values.items()}
         hinges.append(hinge)
     return {"schema_version": 1, "gravity": [0, 0, -9.81], "body": bodies, "hinge": hinges}
+
+
+def floating_tree(seed: int, most: int = 6) -> Scene:
+    """Tree of pins, balls, universals and screws with laws but no loads on a free root, no gravity:
+    its momentum is constant."""
+    types = ("pin", "ball", "universal", "screw")
+    scene = random_scene(seed, most, types=types, loads=False, roots=False)
+    scene["gravity"] = [0.0, 0.0, 0.0]
+    root = next(h for h in scene["hinge"] if h["inboard"] == "ground")
+    root["type"] = "free"
+    for key in ("law", "axis", "axis2", "lead"):
+        root.pop(key, None)
+    return scene

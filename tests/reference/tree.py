@@ -160,7 +160,8 @@ def read(scene: Mapping[str, Any] | Tree) -> Tree:
     for data in scene.get("hinge") or ():
         hinges.append(_hinge(data, bare, nq, nu))
         nq, nu = hinges[-1].q.stop, hinges[-1].u.stop
-    order, held = [], {-1}
+    order: list[int] = []
+    held = {-1}
     while len(order) < len(hinges):
         ready = [i for i, h in enumerate(hinges) if h.parent in held and h.child not in held]
         if not ready:
