@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -19,7 +20,7 @@ from mstmm.derive.evaluate import evaluate_floats
 from mstmm.derive.lower import lower
 from mstmm.derive.mass_distribution import POINT, general, of_tensor, point_masses
 from mstmm.derive.notation import Matrix
-from mstmm.derive.printed_formulas import PRINTED_FORMULAS, PrintedFormula, as_markdown
+from mstmm.derive.printed_formulas import PRINTED_FORMULAS, PrintedFormula, as_markdown, as_page
 from mstmm.derive.rigid_body import rigid_body
 
 ZERO = sp.zeros(3, 1)
@@ -150,6 +151,11 @@ def test_printed_formulas_cover_the_chapter_and_render() -> None:
     table = as_markdown()
     assert table.count("\n") == len(PRINTED_FORMULAS) + 2
     assert all(line.count(" | ") == 5 for line in table.splitlines())
+
+
+def test_the_page_of_printed_formulas_is_current() -> None:
+    page = Path(__file__).parents[2] / "docs" / "theory" / "printed-formulas.md"
+    assert page.read_text(encoding="utf-8") == as_page()
 
 
 def test_body_element_is_the_integrated_equation() -> None:
