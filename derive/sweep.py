@@ -35,6 +35,10 @@ def _symbol(name: str, rows: int, columns: int = 1) -> sp.MatrixSymbol:
     return sp.MatrixSymbol(name, rows, columns)
 
 
+def _count(nu: int) -> str:
+    return f"{nu or 'no'} free speed{'' if nu == 1 else 's'}"
+
+
 def _part(array: sp.MatrixSymbol, first: int, count: int = 3) -> sp.ImmutableDenseMatrix:
     """Rows first .. first+count of a column."""
     return sp.ImmutableDenseMatrix([array[i, 0] for i in range(first, first + count)])
@@ -86,22 +90,31 @@ def _bias_equations(
     carrier = _symbol("K", 3, 3)
     seen = _symbol("w_Q", 3)
     local = _symbol("c_s", 6)
+    lever = RO.symbol if _is_zero(position) else RO.symbol + RT.symbol * position
+    own = imposed if imposed is not None and _is_zero(c) else c
+    if own is c and imposed is not None:
+        own = c + imposed
     equations = [
         Equation("rotation to the parent", R.symbol, RT.symbol * rotation),
-        Equation("lever in the parent", SHIFT.symbol, RO.symbol + RT.symbol * position),
+        Equation("lever in the parent", SHIFT.symbol, lever),
         Equation("carrier's K = wd~ + w~ w~", carrier, tilde(wd_i) + tilde(w_i) * tilde(w_i)),
         Equation("carrier's angular velocity in body axes", seen, R.symbol.T * w_i),
-        Equation("hinge's own acceleration", local, c if imposed is None else c + imposed),
+        Equation("hinge's own acceleration", local, own),
     ]
-    angular = R.symbol.T * wd_i + tilde(_part(seen, 0)) * w + _part(local, 3)
-    linear = (
-        R.symbol.T * (a_i + carrier * SHIFT.symbol)
-        + 2 * tilde(_part(seen, 0)) * v
-        + _part(local, 0)
-    )
+    angular = R.symbol.T * wd_i + _part(local, 3)
+    if not _is_zero(w):
+        angular = angular + tilde(_part(seen, 0)) * w
+    linear = R.symbol.T * (a_i + carrier * SHIFT.symbol) + _part(local, 0)
+    if not _is_zero(v):
+        linear = linear + 2 * tilde(_part(seen, 0)) * v
     motion = _stack(seen + w, angular, linear)
     equations.append(Equation("bias motion", MOTION.symbol, motion))
     return tuple(equations)
+
+
+def _is_zero(value: sp.Basic) -> bool:
+    """Whether an explicit matrix is zero throughout."""
+    return isinstance(value, sp.MatrixBase) and value.is_zero_matrix is True
 
 
 def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
@@ -248,7 +261,7 @@ def condense(
     given = inputs if specialised else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
-        f"S and e carried across a hinge with {nu} free speeds",
+        f"S and e carried across a hinge with {_count(nu)}",
         (R, SHIFT, *given, S, E, tau),
         (gain, offset, PARENT_S, PARENT_E),
         tuple(equations),
@@ -305,7 +318,7 @@ def recover(
     given = inputs if subspace is not None else (h_given,)
     return Derivation(
         name or f"generic{nu}",
-        f"accelerations recovered across a hinge with {nu} free speeds",
+        f"accelerations recovered across a hinge with {_count(nu)}",
         (R, SHIFT, *given, gain, offset, PARENT_DELTA),
         (rates, DELTA),
         tuple(equations),

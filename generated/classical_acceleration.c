@@ -1627,7 +1627,7 @@ int mstmm_classical_acceleration_transfer(const real *restrict U, const real *re
     const real t1591 = (t991 < t1590 || isnan(t1590)) ? t1590 : t991;
     const real t1592 = 1.0 / t1591;
     const real t1593 = ((real)1 / (real)100000000) < t1592;
-    if (!(t1593 != 0)) return 2; /* classical_acceleration_spatial: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep */
+    if (!(t1593 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
     U_h[0] = 0.0;
     U_h[1] = 0.0;
     U_h[2] = 0.0;
@@ -2700,7 +2700,7 @@ static const mstmm_guard mstmm_classical_acceleration_transfer_guards[] = {
     {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {2, "classical_acceleration_spatial: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep"},
+    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
 };
 
 static const mstmm_kernel mstmm_classical_acceleration_kernels[] = {
@@ -2712,7 +2712,7 @@ static const mstmm_kernel mstmm_classical_acceleration_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_acceleration_transfer_inputs,
         .outputs = mstmm_classical_acceleration_transfer_outputs,
-        .ir_hash = "c9fa3073dcd2a8efe85c33a83e6f83622c22f377396822bf5a32e7f80c7b2c84",
+        .ir_hash = "bdebf7b9f7fcab9d3a5a33af97af15e5efb061513b29a6843a4f318cc680e24e",
         .n_guards = 7,
         .guards = mstmm_classical_acceleration_transfer_guards,
     },
@@ -2722,7 +2722,7 @@ const mstmm_element mstmm_classical_acceleration = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "acceleration",
-    .hash = "19cde3e00b6f84da68761bb665380d8c8b7b3278d0aa455ac0be8f3234df26e8",
+    .hash = "131f0d2f510ff32bac0d4460f37ec76bad77135957d943b4ab7825d266f759fe",
     .nq = 0,
     .nu = 0,
     .np = 0,

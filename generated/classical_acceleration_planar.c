@@ -247,7 +247,7 @@ int mstmm_classical_acceleration_planar_transfer(const real *restrict U,
     const real t214 = (t148 < t213 || isnan(t213)) ? t213 : t148;
     const real t215 = 1.0 / t214;
     const real t216 = ((real)1 / (real)100000000) < t215;
-    if (!(t216 != 0)) return 2; /* classical_acceleration_planar: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep */
+    if (!(t216 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
     U_h[0] = 0.0;
     U_h[1] = 0.0;
     U_h[2] = 0.0;
@@ -446,7 +446,7 @@ static const mstmm_guard mstmm_classical_acceleration_planar_transfer_guards[] =
     {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {2, "classical_acceleration_planar: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep"},
+    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
 };
 
 static const mstmm_kernel mstmm_classical_acceleration_planar_kernels[] = {
@@ -458,7 +458,7 @@ static const mstmm_kernel mstmm_classical_acceleration_planar_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_acceleration_planar_transfer_inputs,
         .outputs = mstmm_classical_acceleration_planar_transfer_outputs,
-        .ir_hash = "7392298d78a13e58400678425b3277428fce152dc8f7d0d6409393bc44ed117f",
+        .ir_hash = "a26edfcdd9dd8209eb73419f8830a857842be869feb7defdc925f1c697f1e189",
         .n_guards = 4,
         .guards = mstmm_classical_acceleration_planar_transfer_guards,
     },
@@ -468,7 +468,7 @@ const mstmm_element mstmm_classical_acceleration_planar = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "acceleration_planar",
-    .hash = "f0ee4d3309028eedb6dc591fc111b2e85ae2a356c6d0f77fe939decaa774bd8b",
+    .hash = "7ca354c1948345a0926e5dfbcb1b12a9affd1358528deeba3158d207f107eff7",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -217,7 +217,7 @@ int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F
     const real t188 = (t122 < t187 || isnan(t187)) ? t187 : t122;
     const real t189 = 1.0 / t188;
     const real t190 = ((real)1 / (real)100000000) < t189;
-    if (!(t190 != 0)) return 2; /* classical_ball: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep */
+    if (!(t190 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
     U_h[0] = 1.0;
     U_h[1] = 0.0;
     U_h[2] = 0.0;
@@ -652,7 +652,7 @@ static const mstmm_guard mstmm_classical_ball_transfer_guards[] = {
     {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {2, "classical_ball: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep"},
+    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
 };
 
 static const mstmm_kernel mstmm_classical_ball_kernels[] = {
@@ -664,7 +664,7 @@ static const mstmm_kernel mstmm_classical_ball_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_ball_transfer_inputs,
         .outputs = mstmm_classical_ball_transfer_outputs,
-        .ir_hash = "92b625fd2e488356b5230887cf5d167f2998daf9f7d6cb20883b94a47dd4f360",
+        .ir_hash = "1ca0ff9e3d87d12559165bd2d964c789dff80d2e0bb235e32b79993c02898036",
         .n_guards = 4,
         .guards = mstmm_classical_ball_transfer_guards,
     },
@@ -674,7 +674,7 @@ const mstmm_element mstmm_classical_ball = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "ball",
-    .hash = "4462737e755ef81081264f4883071aad7c217cdf20f400cc3779f525164ceb2c",
+    .hash = "8fc8f8f087c9cdf4dfb2ba48319ad9bc76ee2bf68aabbcd6a284febd3c854dfe",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -31,7 +31,7 @@ int mstmm_classical_pin_planar_transfer(const real *restrict U, const real *rest
     const real t4 = F_scale[2] * t3;
     const real t5 = 1.0 / t4;
     const real t6 = ((real)1 / (real)100000000) < t5;
-    if (!(t6 != 0)) return 2; /* classical_pin_planar: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep */
+    if (!(t6 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
     U_h[0] = 1.0;
     U_h[1] = 0.0;
     U_h[2] = 0.0;
@@ -116,7 +116,7 @@ static const mstmm_port mstmm_classical_pin_planar_transfer_outputs[] = {
 
 static const mstmm_guard mstmm_classical_pin_planar_transfer_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {2, "classical_pin_planar: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep"},
+    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
 };
 
 static const mstmm_kernel mstmm_classical_pin_planar_kernels[] = {
@@ -128,7 +128,7 @@ static const mstmm_kernel mstmm_classical_pin_planar_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_pin_planar_transfer_inputs,
         .outputs = mstmm_classical_pin_planar_transfer_outputs,
-        .ir_hash = "b494fc73236919d99db283e829fb6719ee569adf25ddac10d995bb1e030421ef",
+        .ir_hash = "12e3a381ebabf57bf5b025ec7e7fb2f313edad3226e57907c115edae8822b61f",
         .n_guards = 2,
         .guards = mstmm_classical_pin_planar_transfer_guards,
     },
@@ -138,7 +138,7 @@ const mstmm_element mstmm_classical_pin_planar = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "pin_planar",
-    .hash = "679c6db17193b2e90bd88443430d89149a444e6a5716a260a9f847a64ed6b151",
+    .hash = "6d25e95db3741f2231d14b56a9bcdd0a43cf2e678be3afadf04fbc9846df46c2",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -83,7 +83,7 @@ int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *res
     const real t50 = t47 * t49;
     const real t51 = 1.0 / t50;
     const real t52 = ((real)1 / (real)100000000) < t51;
-    if (!(t52 != 0)) return 2; /* classical_pin_spatial: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep */
+    if (!(t52 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
     U_h[0] = 1.0;
     U_h[1] = 0.0;
     U_h[2] = 0.0;
@@ -440,7 +440,7 @@ static const mstmm_port mstmm_classical_pin_spatial_transfer_outputs[] = {
 
 static const mstmm_guard mstmm_classical_pin_spatial_transfer_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {2, "classical_pin_spatial: the pivot vanishes, the product of transfer matrices does not exist here; use the Riccati sweep"},
+    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
 };
 
 static const mstmm_kernel mstmm_classical_pin_spatial_kernels[] = {
@@ -452,7 +452,7 @@ static const mstmm_kernel mstmm_classical_pin_spatial_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_pin_spatial_transfer_inputs,
         .outputs = mstmm_classical_pin_spatial_transfer_outputs,
-        .ir_hash = "5ca5d66f4b21115099c90e26b47d1e9ee920b8e991648b224ddcef19be5e4c53",
+        .ir_hash = "89337273a43818807f7f84024d60b621470ba52180588c03df7a70dcf7431835",
         .n_guards = 2,
         .guards = mstmm_classical_pin_spatial_transfer_guards,
     },
@@ -462,7 +462,7 @@ const mstmm_element mstmm_classical_pin_spatial = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "pin_spatial",
-    .hash = "efb41078aea8d872dbf105e631633a59b58c2f4abf7e0a73e35807df83a633a1",
+    .hash = "132923f29edfbcbc2e01380f436e90debc07147dcd1d499da705dd48a77ee024",
     .nq = 0,
     .nu = 0,
     .np = 0,

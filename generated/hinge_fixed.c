@@ -243,7 +243,7 @@ static const mstmm_port mstmm_hinge_fixed_forward_outputs[] = {
     {"qdot", 0, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 0 free speeds
+/* S and e carried across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -735,7 +735,7 @@ static const mstmm_port mstmm_hinge_fixed_condense_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations recovered across a hinge with 0 free speeds
+/* accelerations recovered across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -862,7 +862,7 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_fixed_condense_inputs,
         .outputs = mstmm_hinge_fixed_condense_outputs,
-        .ir_hash = "a6248313a5cd0042b26366dd48d895c4057906f56f1dd0b4f079c216c71544c4",
+        .ir_hash = "9ae49cf5d6160d0c8a76e62c5d6454430c4d1a5923b40b6a90b95c769dbf9397",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -874,7 +874,7 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_fixed_recover_inputs,
         .outputs = mstmm_hinge_fixed_recover_outputs,
-        .ir_hash = "c24812ce51e68cf32808396dd51b60277a82fd2bb35c55f02ff2fb23d8d4b125",
+        .ir_hash = "9932a8b4ae55c097533bd20e92c58888352cbf8d3acaf717735f854bd6ae0a7f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -884,7 +884,7 @@ const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "13bb251955fdcf55a1086ec1b1301042d6b9f360bd48989822bb112c7769fbc6",
+    .hash = "89e52a3c43ba2f8cee06299a4cc011b17941f2f89e92c73b5e4e2dbe8f652d3f",
     .nq = 0,
     .nu = 0,
     .np = 0,

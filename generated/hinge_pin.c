@@ -274,7 +274,7 @@ static const mstmm_port mstmm_hinge_pin_forward_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 1 free speeds
+/* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -771,7 +771,7 @@ static const mstmm_guard mstmm_hinge_pin_condense_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* accelerations recovered across a hinge with 1 free speeds
+/* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -925,7 +925,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_pin_condense_inputs,
         .outputs = mstmm_hinge_pin_condense_outputs,
-        .ir_hash = "69228066f65bc787714ebe22b244f4e3219a8f16d74ece566c30b578456dd72e",
+        .ir_hash = "b5d9b27e929dd0d5310a16d96febf2ecbee5018a32f3c6ab633348537e8bee63",
         .n_guards = 3,
         .guards = mstmm_hinge_pin_condense_guards,
     },
@@ -937,7 +937,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_pin_recover_inputs,
         .outputs = mstmm_hinge_pin_recover_outputs,
-        .ir_hash = "b999d5079d04b4f2e49fcdc7579c2975d0a113fef67860edb05a792701478b93",
+        .ir_hash = "852a66043c4eef6743aafbabfa0c7a80eeb8b96ed02e27d9407139b9b69cd755",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -947,7 +947,7 @@ const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "54c5166c55d03f66190299389099b9857c1a1ce9935679c26b4de9a168cb1e04",
+    .hash = "fe9aeece20a2aaf7780571f9ad1bdf0ceaaebaf901d4447808ba4c10dc8220ad",
     .nq = 1,
     .nu = 1,
     .np = 0,

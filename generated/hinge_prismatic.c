@@ -255,7 +255,7 @@ static const mstmm_port mstmm_hinge_prismatic_forward_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 1 free speeds
+/* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -761,7 +761,7 @@ static const mstmm_guard mstmm_hinge_prismatic_condense_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* accelerations recovered across a hinge with 1 free speeds
+/* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -915,7 +915,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_prismatic_condense_inputs,
         .outputs = mstmm_hinge_prismatic_condense_outputs,
-        .ir_hash = "a0d8feec16b0ea19b4c57911c30037b8bebb13d46ce2cfecb3d61cd4208a6f2a",
+        .ir_hash = "5d46f5f8bdec7d54357740e6bc106847d351dcac22266b4752b6fbe450571148",
         .n_guards = 3,
         .guards = mstmm_hinge_prismatic_condense_guards,
     },
@@ -927,7 +927,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_prismatic_recover_inputs,
         .outputs = mstmm_hinge_prismatic_recover_outputs,
-        .ir_hash = "0daa7e14330b64d513a0a87950476724415a1389b71c16c087ccff38114f2e80",
+        .ir_hash = "94310bf6f066758cfcbc6c2391541ffd989ed05db35c839a401160f2d05af017",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -937,7 +937,7 @@ const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "f59af32cc6bcbdda9c00deff5762d7632c6ce36d07912c7fcda748b61d5d927a",
+    .hash = "0a8cc8eb99174d8673066ff738496d9098463ea6aa3b291ab287163f2b2d67e3",
     .nq = 1,
     .nu = 1,
     .np = 0,

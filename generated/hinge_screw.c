@@ -298,7 +298,7 @@ static const mstmm_port mstmm_hinge_screw_forward_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 1 free speeds
+/* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -915,7 +915,7 @@ static const mstmm_guard mstmm_hinge_screw_condense_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* accelerations recovered across a hinge with 1 free speeds
+/* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1081,7 +1081,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_screw_condense_inputs,
         .outputs = mstmm_hinge_screw_condense_outputs,
-        .ir_hash = "dc48d70b77c03b8eb06fccf5a2be70a94df88fceee9d3e1997e22ab5ac647888",
+        .ir_hash = "a043bb72cc7deda664c87eaca73ac0c35ad9050ac743d1850bbf00fb7694d0ff",
         .n_guards = 3,
         .guards = mstmm_hinge_screw_condense_guards,
     },
@@ -1093,7 +1093,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_screw_recover_inputs,
         .outputs = mstmm_hinge_screw_recover_outputs,
-        .ir_hash = "284e2e233915804e0d2adc58dd7c67de93b1012df727903ca810e063257a632f",
+        .ir_hash = "f2a92872b5b928c7f560038d1a2868a35ecb108259ccbce72a3e7af6bbf2d619",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1103,7 +1103,7 @@ const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "8f5a1c0afe77414212e48dca42be98651c8cebd0bc859792ead7ad731aed4414",
+    .hash = "7f50f06abddb54ff415a423bf80b8ff00ab8b1c781d922bb935316cbf57fc1e3",
     .nq = 1,
     .nu = 1,
     .np = 1,

@@ -276,7 +276,7 @@ static const mstmm_port mstmm_sweep_generic0_forward_outputs[] = {
     {"motion", 9, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 0 free speeds
+/* S and e carried across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -768,7 +768,7 @@ static const mstmm_port mstmm_sweep_generic0_condense_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations recovered across a hinge with 0 free speeds
+/* accelerations recovered across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -947,7 +947,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic0_condense_inputs,
         .outputs = mstmm_sweep_generic0_condense_outputs,
-        .ir_hash = "2cfaa2db3d20f426a2b8c8534476ad4db2a14728f89a2ede5dcae982b12b4af8",
+        .ir_hash = "f2f2a7da02eb33d8df5b1b74ec9255529ec35f9be65cac77e7852ed3d4969cf5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -959,7 +959,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic0_recover_inputs,
         .outputs = mstmm_sweep_generic0_recover_outputs,
-        .ir_hash = "c50ec95f3890572a29cdeee41528a79099c2fdb0ec4dd042546d1c6b894420f6",
+        .ir_hash = "a9fd78b3dce46d20e8d8b082813724fb0a51fcd7b41fbbcb92b28fbfc7330c7b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -993,7 +993,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "6d93a1ac0aa45ac8c7467efadcad1c2b96d82ae67c33a05219eb1c99bf6c4eb2",
+    .hash = "dbf50c84cd6c245cabee2f0702a2a7f0e7e1e45535066513d44260f48c67bbfb",
     .nq = 0,
     .nu = 0,
     .np = 0,

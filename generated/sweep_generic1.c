@@ -286,7 +286,7 @@ static const mstmm_port mstmm_sweep_generic1_forward_outputs[] = {
     {"motion", 9, "", 0, 0},
 };
 
-/* S and e carried across a hinge with 1 free speeds
+/* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -980,7 +980,7 @@ static const mstmm_guard mstmm_sweep_generic1_condense_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* accelerations recovered across a hinge with 1 free speeds
+/* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1262,7 +1262,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic1_condense_inputs,
         .outputs = mstmm_sweep_generic1_condense_outputs,
-        .ir_hash = "d337b5d5cce84c79f73a38556399c54fda8fdb93526fbc7d03c976a0867d613b",
+        .ir_hash = "ed980183d18d6b3846b26ce54596d1710c3978e8d577c4d311b1b53886bfbf16",
         .n_guards = 3,
         .guards = mstmm_sweep_generic1_condense_guards,
     },
@@ -1274,7 +1274,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_recover_inputs,
         .outputs = mstmm_sweep_generic1_recover_outputs,
-        .ir_hash = "226ed05f575506e7e327941b714600ec87f52aa1f8d690d97800ea262e69c741",
+        .ir_hash = "84b420c92e58f8b002fed602d27f4edb6f7c6e17832bb6447284ae424ff4d4d7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1308,7 +1308,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "1c7e53de9c181bdc25e3075323097dded1e2c135ddca70be5d36ab3896344604",
+    .hash = "035dc081fa822e5edda94ea5c70f2be479155b9f51b977c19730b395616e8156",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -90,7 +90,7 @@ class Engine:
             array = np.ascontiguousarray(np.broadcast_to(array, (*lead, width)))
         if not np.isfinite(array).all():
             raise SceneError(f"{name} holds a number that is not finite")
-        return array.reshape(-1, width)
+        return array.reshape(int(np.prod(array.shape[:-1], dtype=int)), width)
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
