@@ -42,7 +42,9 @@ def _fits(line: Node) -> bool:
 
 
 def _stated_matrix(shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-    if recognise(matrix) is None and any(extent in PARTITIONS for extent in matrix.shape):
+    small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
+    partitioned = any(extent in PARTITIONS for extent in matrix.shape)
+    if partitioned and not small and recognise(matrix) is None:
         return _blocks(shown, matrix)
     return _spelled(shown, matrix)
 

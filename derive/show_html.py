@@ -42,8 +42,8 @@ mtable.matrix { border-left: 1.3px solid; border-right: 1.3px solid;
     linear-gradient(currentColor, currentColor) 0 100% / .4em 1.3px no-repeat,
     linear-gradient(currentColor, currentColor) 100% 100% / .4em 1.3px no-repeat; }
 mtable.cases { border-left: 1.3px solid; }
-mtable.matrix mtd { padding: .16em .55em; }
-mtable.cases mtd { padding: .16em .7em; text-align: left; }
+mtable.matrix mtd { padding: .26em .55em; }
+mtable.cases mtd { padding: .26em .7em; text-align: left; }
 pre { background: var(--block); border-radius: 6px; padding: .9rem 1rem; overflow-x: auto;
   font: 13px/1.5 "JetBrains Mono", "DejaVu Sans Mono", Menlo, Consolas, monospace; }
 @media print { main { max-width: none; } figure { break-inside: avoid; } }

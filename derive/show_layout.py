@@ -231,7 +231,7 @@ class _Layout:
     def cross(self, e: Tilde | Perp) -> tuple[Node, int]:
         accent = "tilde" if isinstance(e, Tilde) else "perp"
         inner = self.node(e.args[0])
-        if isinstance(inner, Name) and not inner.accent:
+        if isinstance(inner, Name) and not inner.accent and not inner.name.upright:
             return Name(inner.name, accent, inner.index), _ATOM
         mark = Word("∼" if accent == "tilde" else "⊥")
         return Raised(Fence("(", inner, ")"), mark), _POWER
