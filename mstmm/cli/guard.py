@@ -43,6 +43,9 @@ def run(arguments: Sequence[str]) -> int:
         output.discard()
         return DONE
     except BaseException as error:
+        if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
+            output.discard()  # typer met the closed pipe first
+            return DONE
         try:
             return _report(error, "--json" in arguments)
         except OSError:  # not even the message could be written
