@@ -1,4 +1,4 @@
-"""Every kernel by its derivation: what `specs` lowers, `views` shows and the cross-check evaluates."""
+"""Every kernel by its derivation: what is lowered, shown, and evaluated by the cross-check."""
 
 from __future__ import annotations
 

@@ -28,6 +28,7 @@ __all__ = [
     "all_specs",
     "generic_spec",
     "shared_specs",
+    "spec_from",
     "spec_of",
 ]
 
@@ -37,8 +38,12 @@ def _lowered(kernels: tuple[Kernel, ...]) -> tuple[KernelIR, ...]:
 
 
 def spec_of(element: Element) -> ElementSpec:
-    """Kernels of any element, built in or the user's."""
-    kernels = _lowered(kernels_of(element))
+    """Derive and lower the kernels of any element, built in or the user's."""
+    return spec_from(element, kernels_of(element))
+
+
+def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
+    """The element with its kernels, once they are derived."""
     hinge = element if isinstance(element, Hinge) else None
     return ElementSpec(
         kind_of(element),
@@ -47,7 +52,7 @@ def spec_of(element: Element) -> ElementSpec:
         hinge.coordinates if hinge else (),
         speeds_of(hinge) if hinge else (),
         element.parameters,
-        kernels,
+        _lowered(kernels),
         element.sources,
     )
 

@@ -1,0 +1,485 @@
+"""Every kernel of an element three ways, and what mechanics asks of it.
+
+The stated equations at 50 digits (`derive.direct`), the IR at 50 digits, the compiled C in doubles
+within the bound that running error analysis gives for its rounding; at random points and at those
+where a formula could break.  Beside that the statements of `derive.properties`.
+
+    report = mstmm.crosscheck.crosscheck("hinge", "pin")
+    print(report); report.passed
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from .errors import ElementError
+from .ir import KernelIR
+from .spec import ElementSpec
+
+if TYPE_CHECKING:
+    from .derive.kernels import Kernel
+    from .derive.points import Source
+    from .derive.properties import Property
+    from .derive.registry import Element as Definition
+    from .runtime.prebuilt import Element as Compiled
+
+#: Largest relative difference between the equations and the IR, both at 50 digits.
+EQUATIONS = 1e-30
+#: Largest relative difference between specialised and generic kernels in doubles.
+SPECIALISED = 1e-13
+
+
+@dataclass(frozen=True)
+class KernelCheck:
+    """One kernel: largest errors over its points.
+
+    `equations`: relative, IR against the stated equations at 50 digits; None if the definition is
+    not at hand.  `compiled`: error of the C as a share of its rounding bound; None if not compiled.
+    `stopped` counts points at which a guard stopped all ways alike.
+    """
+
+    kernel: str
+    points: int
+    stopped: int
+    equations: float | None
+    compiled: float | None
+    worst_point: str
+    problems: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        exact = self.equations is None or self.equations <= EQUATIONS
+        rounded = self.compiled is None or self.compiled <= 1.0
+        return exact and rounded and not self.problems and self.stopped < self.points
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of mechanics about an element, its largest error, and the largest allowed."""
+
+    name: str
+    error: float
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        return self.error <= self.limit
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found for one element.  `str(report)` is a table."""
+
+    kind: str
+    name: str
+    kernels: tuple[KernelCheck, ...]
+    statements: tuple[Statement, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        return all(k.passed for k in self.kernels) and all(s.passed for s in self.statements)
+
+    @property
+    def problems(self) -> list[str]:
+        """One line for everything that failed; empty if all is well."""
+        found = [f"{s.name}: error {s.error:.1e} above {s.limit:.0e}" for s in self.statements
+                 if not s.passed]  # fmt: skip
+        for kernel in self.kernels:
+            found += [f"{kernel.kernel}: {problem}" for problem in kernel.problems]
+            if not (kernel.passed or kernel.problems):
+                found.append(f"{kernel.kernel}: {_errors(kernel)}, worst at {kernel.worst_point!r}")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "kind": self.kind, "name": self.name, "passed": self.passed,
+            "kernels": [{**vars(k), "problems": list(k.problems), "passed": k.passed}
+                        for k in self.kernels],
+            "statements": [{**vars(s), "passed": s.passed} for s in self.statements],
+            "remarks": list(self.remarks), "problems": self.problems,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        lines = [f"{self.kind} {self.name}: {'agrees' if self.passed else 'DOES NOT AGREE'}"]
+        for k in self.kernels:
+            said = f"{k.points} points" + (f", {k.stopped} stopped by a guard" if k.stopped else "")
+            lines.append(f"  {k.kernel:12} {_errors(k)}; {said}")
+        width = max((len(s.name) for s in self.statements), default=0)
+        lines += [
+            f"  {s.name:{width}}  {s.error:.1e} (allowed {s.limit:.0e})" for s in self.statements
+        ]
+        lines += [f"  problem: {text}" for text in self.problems]
+        return "\n".join([*lines, *(f"  note: {text}" for text in self.remarks)])
+
+
+def _errors(kernel: KernelCheck) -> str:
+    parts = []
+    if kernel.equations is not None:
+        parts.append(f"equations - IR {kernel.equations:.1e}")
+    if kernel.compiled is not None:
+        parts.append(f"C {kernel.compiled:.2f} of its rounding bound")
+    return ", ".join(parts) or "not compared"
+
+
+# --- what is checked ------------------------------------------------------------------------------
+
+
+def crosscheck(kind: str, name: str, points: int = 2) -> Report:
+    """Check a built-in element, or one of the kernel store (its IR and C; its file is not run).
+
+    `points` random points per kernel besides the special ones.  Raises ElementError for a name
+    that nobody knows.
+    """
+    from .derive.kernels import built_in
+    from .derive.registry import builtin_elements, kind_of
+    from .runtime import prebuilt, store
+
+    make = built_in().get((kind, name))
+    if make is not None:
+        kernels = make()
+        element = next(
+            (e for e in builtin_elements() if (kind_of(e), e.name) == (kind, name)), None
+        )
+        return crosscheck_kernels(
+            kind, name, element, kernels, prebuilt.element(kind, name), points
+        )
+    stored = store.spec((kind, name))
+    if stored is None:
+        raise ElementError(f"there is no {kind} called {name!r}; mstmm list shows what there is")
+    compiled = store.opened((kind, name), stored.hash())
+    subject = _Subject.stored(stored, compiled)
+    return subject.report(points, ("its definition is not kept; name its file to check it too",))
+
+
+def crosscheck_definition(element: Definition, points: int = 2) -> Report:
+    """Check an element of the user's, with its equations; the C if the store has this very one."""
+    from .derive.kernels import kernels_of
+    from .derive.registry import kind_of
+    from .derive.specs import spec_from
+    from .runtime import store
+
+    kernels, key = kernels_of(element), (kind_of(element), element.name)
+    stored = store.spec(key)
+    current = stored is not None and stored.hash() == spec_from(element, kernels).hash()
+    compiled = store.opened(key, stored.hash()) if stored is not None and current else None
+    return crosscheck_kernels(*key, element, kernels, compiled, points)
+
+
+def mechanics(
+    kind: str, name: str, kernels: Sequence[Kernel], element: Definition | None = None
+) -> tuple[Statement, ...]:
+    """The statements of mechanics alone, for kernels whose derivations are given."""
+    subject = _subject(kind, name, element, kernels, None)
+    return tuple(Statement(*found) for found in subject.statements())
+
+
+def crosscheck_kernels(
+    kind: str,
+    name: str,
+    element: Definition | None,
+    kernels: Sequence[Kernel],
+    compiled: Compiled | None,
+    points: int,
+) -> Report:
+    """Check kernels whose derivations are given, with the compiled element if there is one."""
+    remarks = () if compiled is not None else ("not generated yet, so there is no C to compare",)
+    return _subject(kind, name, element, kernels, compiled).report(points, remarks)
+
+
+def _subject(
+    kind: str,
+    name: str,
+    element: Definition | None,
+    kernels: Sequence[Kernel],
+    compiled: Compiled | None,
+) -> _Subject:
+    from .derive.element import Hinge
+    from .derive.hinge import speeds_of
+    from .derive.points import Source
+
+    hinge = element if isinstance(element, Hinge) else None
+    nu = len(speeds_of(hinge)) if hinge else 0
+    if kind == "sweep" and name.startswith("generic"):
+        nu = int(name.removeprefix("generic"))
+    coordinates = hinge.coordinates if hinge else ()
+    source = Source(kind, coordinates, element.parameters if element else ())
+    irs = {kernel.name: kernel.ir() for kernel in kernels}
+    derivations = {kernel.name: kernel for kernel in kernels}
+    return _Subject(kind, name, nu, source, irs, derivations, compiled)
+
+
+@dataclass(frozen=True)
+class _Subject:
+    """An element's kernels in their three forms; `stated` is empty for a stored element."""
+
+    kind: str
+    name: str
+    nu: int
+    source: Source
+    irs: Mapping[str, KernelIR]
+    stated: Mapping[str, Kernel]
+    compiled: Compiled | None
+
+    @classmethod
+    def stored(cls, spec: ElementSpec, compiled: Compiled) -> _Subject:
+        from .derive.points import Source
+
+        source = Source(spec.kind, spec.coordinates, spec.parameters)
+        irs = {kernel.name: kernel for kernel in spec.kernels}
+        return cls(spec.kind, spec.name, len(spec.speeds), source, irs, {}, compiled)
+
+    def report(self, points: int, remarks: tuple[str, ...]) -> Report:
+        checks = tuple(self._kernel(kernel, points) for kernel in self.irs.values())
+        statements = tuple(Statement(*found) for found in self.statements())
+        return Report(self.kind, self.name, checks, statements, remarks)
+
+    # --- one kernel -----------------------------------------------------------------------------
+
+    def _kernel(self, kernel: KernelIR, points: int) -> KernelCheck:
+        worst, where, stopped, count = [0.0, 0.0], "", 0, 0
+        problems: list[str] = []
+        c_seen = self._function(kernel) is not None
+        for point in self.source.points(kernel, points):
+            count += 1
+            compared = self._compare(kernel, point.inputs)
+            if isinstance(compared, str):
+                problems.append(f"at {point.label!r}: {compared}")
+            elif compared is None:
+                stopped += 1
+            else:
+                if compared[0] > worst[0] or compared[1] > worst[1]:
+                    where = point.label
+                worst = [max(a, b) for a, b in zip(worst, compared, strict=True)]
+        return KernelCheck(
+            kernel.name, count, stopped, worst[0] if self.stated else None,
+            worst[1] if c_seen else None, where, tuple(problems),
+        )  # fmt: skip
+
+    def _compare(
+        self, kernel: KernelIR, inputs: dict[str, list[float]]
+    ) -> tuple[float, float] | str | None:
+        """(equations, compiled) errors; None where all are stopped alike; text where not."""
+        from .derive.direct import Undefined, evaluate_equations
+        from .derive.evaluate import GuardFailure, evaluate
+
+        code, exact = 0, None
+        try:
+            exact = evaluate(kernel, inputs)
+        except GuardFailure as failure:
+            code = failure.code
+        stated = None
+        if self.stated:
+            form = self.stated[kernel.name]
+            try:
+                stated = evaluate_equations(form.derivation, inputs, form.guards)
+            except Undefined as undefined:
+                if exact is not None and _finite(exact):
+                    return f"the equations have no value ({undefined}), the IR has one"
+                return None
+        found = self._c_values(kernel, inputs)
+        if found is not None and found[0] != code:
+            return f"C returns {found[0]}, the IR {code}"
+        if exact is None or not _finite(exact):
+            return None
+        first = 0.0 if stated is None else _difference(exact, stated.outputs, inputs)
+        if stated is not None and stated.asymmetry > 1e-30 * _size(inputs):
+            return "a quantity called symmetric is not"
+        second = 0.0 if found is None else self._share(kernel, inputs, found[1])
+        return first, second
+
+    def _share(
+        self, kernel: KernelIR, inputs: dict[str, list[float]], got: Mapping[str, Sequence[float]]
+    ) -> float:
+        """Largest error of C as a share of its bound."""
+        from .derive.rounding import rounding_bounds
+
+        worst = 0.0
+        for name, limits in rounding_bounds(kernel, inputs).items():
+            for value, (exact, bound) in zip(got[name], limits, strict=True):
+                worst = max(
+                    worst, float(abs(value - exact)) / bound if value == value else math.inf
+                )
+        return worst
+
+    # --- the compiled kernels -------------------------------------------------------------------
+
+    def _function(self, kernel: KernelIR) -> Callable[..., Any] | None:
+        if self.compiled is None:
+            return None
+        if self.compiled.tape is not None:
+            return partial(_interpret, self.compiled.tape) if kernel.name == "hinge" else None
+        return partial(_call, self.compiled)
+
+    def _c_values(
+        self, kernel: KernelIR, inputs: dict[str, list[float]]
+    ) -> tuple[int, dict[str, list[float]]] | None:
+        function = self._function(kernel)
+        return None if function is None else function(kernel, inputs)
+
+    # --- statements of mechanics ------------------------------------------------------------------
+
+    def _precisely(self, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]:
+        """One kernel at high precision: by its equations if they are at hand, else by its IR."""
+        from .derive.direct import evaluate_equations
+        from .derive.evaluate import evaluate
+        from .derive.properties import DIGITS
+
+        if self.stated:
+            return evaluate_equations(self.stated[name].derivation, inputs, (), DIGITS).outputs
+        return evaluate(self.irs[name], inputs, DIGITS)
+
+    def statements(self) -> Iterator[tuple[str, float, float]]:
+        from .derive import law_properties, properties
+
+        found: tuple[Property, ...] = ()
+        p = next((port.length() for kernel in self.irs.values() for port in kernel.inputs
+                  if port.name == "p"), 0)  # fmt: skip
+        if self.kind == "hinge":
+            generic = partial(_generic, self.nu)
+            found = properties.hinge_properties(self._precisely, generic, self.source, self.nu)
+            yield from self._in_doubles()
+        elif self.kind == "body":
+            found = properties.body_properties(self._precisely, self.source, p)
+        elif self.kind == "force":
+            found = properties.force_properties(self._precisely, self.source, p)
+        elif self.name.startswith("generic"):
+            found = properties.sweep_properties(self._precisely, self.nu)
+        elif (self.kind, self.name) == ("sweep", "laws"):
+            for kernel, each in law_properties.law_properties(
+                self._precisely, self.source, self.irs
+            ):
+                yield f"{kernel}: {each.name}", each.error, each.limit
+        for each in found:
+            yield each.name, each.error, each.limit
+
+    def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
+        """The compiled specialised condense against the compiled generic one."""
+        from .derive.kernels import generic_kernels
+        from .runtime import prebuilt
+
+        if self.compiled is None or self.compiled.tape is not None:
+            return
+        generic = prebuilt.element("sweep", f"generic{self.nu}")
+        across = next(k for k in generic_kernels(self.nu) if k.name == "condense").ir()
+        worst = 0.0
+        for point in self.source.points(self.irs["condense"], 4):
+            own = dict(point.inputs)
+            relative = _call(self.compiled, self.irs["hinge"], own | {"u": [0.0] * self.nu})
+            code, one = _call(self.compiled, self.irs["condense"], own)
+            shared = own | {"H": relative[1]["H"], "J": [0.0] * self.nu}
+            other, two = _call(generic, across, shared)
+            if code or other:
+                continue
+            for name, row in one.items():
+                scale = max([abs(v) for v in two[name]] + _entering(name, own))
+                gaps = (abs(a - b) for a, b in zip(row, two[name], strict=True))
+                worst = max(worst, max(gaps, default=0.0) / scale)
+        yield "condense in C: specialised = generic", worst, SPECIALISED
+
+
+# --- calls ----------------------------------------------------------------------------------------
+
+
+def _generic(nu: int, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]:
+    from .derive.direct import evaluate_equations
+    from .derive.kernels import generic_kernels
+    from .derive.properties import DIGITS
+
+    kernel = next(k for k in generic_kernels(nu) if k.name == name)
+    return evaluate_equations(kernel.derivation, inputs, (), DIGITS).outputs
+
+
+def _call(
+    compiled: Compiled, kernel: KernelIR, inputs: Mapping[str, Sequence[float]]
+) -> tuple[int, dict[str, list[float]]]:
+    """A compiled kernel through its descriptor: (code, outputs)."""
+    from .runtime import prebuilt
+
+    ffi, _ = prebuilt.module()
+    descriptor = compiled.descriptor
+    found = next(
+        descriptor.kernels[i]
+        for i in range(descriptor.n_kernels)
+        if prebuilt.text(ffi, descriptor.kernels[i].name) == kernel.name
+    )
+    given = [ffi.new("real[]", list(inputs[port.name]) or 1) for port in kernel.inputs]
+    taken = [ffi.new("real[]", max(1, port.length())) for port in kernel.outputs]
+    code = found.call(0, ffi.new("real *[]", given or 1), ffi.new("real *[]", taken or 1))
+    return int(code), _named(kernel, taken)
+
+
+def _named(kernel: KernelIR, arrays: Sequence[Any]) -> dict[str, list[float]]:
+    return {
+        port.name: list(array)[: port.length()]
+        for port, array in zip(kernel.outputs, arrays, strict=True)
+    }
+
+
+def _interpret(
+    tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]]
+) -> tuple[int, dict[str, list[float]]]:
+    """The hinge kernel of an element without a library, as the engine interprets it."""
+    from .runtime import prebuilt
+    from .runtime.values import c_tape
+
+    ffi, lib = prebuilt.module()
+    kept: list[Any] = []
+    given = [ffi.new("real[]", list(inputs[port.name]) or 1) for port in kernel.inputs]
+    taken = [ffi.new("real[]", max(1, port.length())) for port in kernel.outputs]
+    slots, packed = ffi.new("real[]", tape.slots), c_tape(ffi, tape, kept)
+    code = lib.mstmm_tape_run(
+        packed, ffi.new("real *[]", given or 1), slots, ffi.new("real *[]", taken or 1)
+    )
+    return int(code), _named(kernel, taken)
+
+
+# --- numbers --------------------------------------------------------------------------------------
+
+
+def _size(inputs: Mapping[str, Sequence[float]]) -> float:
+    return max((abs(v) for row in inputs.values() for v in row if abs(v) < 1e200), default=1.0)
+
+
+def _entering(name: str, inputs: Mapping[str, Sequence[float]]) -> list[float]:
+    """What an output is a remainder of: S_I of S, e_I of e and tau."""
+    names = {"S_I": ("S",), "e_I": ("e", "tau")}.get(name, ())
+    return [1e-300, *(abs(v) for each in names for v in inputs[each])]
+
+
+def _finite(values: Mapping[str, Sequence[Any]]) -> bool:
+    import mpmath
+
+    return all(mpmath.isfinite(v) for row in values.values() for v in row)
+
+
+def _difference(
+    exact: Mapping[str, Sequence[Any]],
+    stated: Mapping[str, Sequence[Any]],
+    inputs: Mapping[str, Sequence[float]],
+) -> float:
+    """Largest difference relative to the largest entry of its array (and to the inputs)."""
+    floor, worst = 1e-8 * _size(inputs), 0.0
+    for name, row in exact.items():
+        scale = max([abs(v) for v in row] + [floor])
+        if scale == 0:
+            continue
+        for a, b in zip(row, stated[name], strict=True):
+            worst = max(worst, float(abs(a - b) / scale))
+    return worst
+
+
+__all__ = [
+    "KernelCheck",
+    "Report",
+    "Statement",
+    "crosscheck",
+    "crosscheck_definition",
+    "crosscheck_kernels",
+    "mechanics",
+]
