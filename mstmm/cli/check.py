@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.errors import MstmmError
+from mstmm.errors import ElementError, MstmmError
 
 from .options import Json, quoted
 
 if TYPE_CHECKING:
+    from mstmm.crosscheck import Report as Crosscheck
     from mstmm.scene import Scene
 
 SCENE_ENDINGS = (".toml", ".json")
@@ -24,8 +25,9 @@ def check(
     what: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...",
-            help="Scene files (.toml, .json), Python files with elements of your own.",
+            metavar="FILE_OR_ELEMENT...",
+            help="Scene files (.toml, .json), Python files with elements of your own, or names of "
+            "elements (mstmm list).",
         ),
     ],
     echo: Annotated[
@@ -37,7 +39,7 @@ def check(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Check scenes and definitions of elements; nothing is simulated or written."""
+    """Check scenes, definitions of elements, and kernels against the equations they come from."""
     from .guard import explain
     from .output import complain, emit_json, say
 
@@ -73,9 +75,12 @@ def _checker(what: str) -> Callable[[str], Report]:
         return _scene
     if ending == ".py":
         return _file
-    raise MstmmError(
-        f"{quoted(what)}: expected a scene (.toml or .json) or a Python file (.py) with elements"
-    )
+    if not what or ending or "/" in what or "\0" in what or os.path.exists(what):
+        raise MstmmError(
+            f"{quoted(what)}: expected a scene (.toml or .json), a Python file (.py) with elements,"
+            " or the name of an element; mstmm list shows the names"
+        )
+    return _element
 
 
 # --- scenes ---------------------------------------------------------------------------------------
@@ -141,14 +146,31 @@ def _tree_lines(scene: Scene) -> list[str]:
 # --- elements -------------------------------------------------------------------------------------
 
 
-def _file(path: str) -> Report:
-    """Check every element that a Python file defines.  The file is executed."""
-    from mstmm.derive.checks import check as check_element
-    from mstmm.derive.registry import kind_of, load_file
+def _element(name: str) -> Report:
+    """Kernels of a built-in or stored element: equations, intermediate form and C agree."""
+    from mstmm.crosscheck import crosscheck
 
-    found = []
+    from .names import found
+
+    return _report([crosscheck(*found(name))])
+
+
+def _file(path: str) -> Report:
+    """Every element that a Python file defines.  The file is executed."""
+    from mstmm.crosscheck import crosscheck_definition
+    from mstmm.derive.checks import check as check_element
+    from mstmm.derive.registry import load_file
+
+    reports = []
     for element in load_file(path):
         check_element(element)
-        found.append({"kind": kind_of(element), "name": element.name})
-    named = ", ".join(f"{e['kind']} {e['name']}" for e in found)
-    return {"ok": True, "kind": "definitions", "elements": found, "text": f"{path}: ok; {named}"}
+        reports.append(crosscheck_definition(element))
+    return _report(reports)
+
+
+def _report(reports: list[Crosscheck]) -> Report:
+    wrong = [report for report in reports if not report.passed]
+    if wrong:
+        raise ElementError("\n".join(str(report) for report in wrong))
+    text = "\n".join(str(report) for report in reports)
+    return {"ok": True, "elements": [report.to_json() for report in reports], "text": text}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from .extras import install, missing, result_ending
 from .options import Json, output_file
 from .progress import bar
+from .simulate import certified
 
 if TYPE_CHECKING:
     from mstmm.runtime.result import Result
@@ -52,7 +53,7 @@ def demo(json: Json = False) -> None:
     result, seconds = _simulate(scene_text())
     text = "\n".join([
         ABOUT, "", f"{report.sizes(result)}", report.effort(result, seconds), "",
-        result.table(*TABLE, rows=11),
+        result.table(*TABLE, rows=11), "", *report.certificate_lines(result, 80),
     ])  # fmt: skip
     result.save(result_file)
     table_file.write_text(text + "\n", encoding="utf-8")
@@ -102,8 +103,9 @@ def _simulate(text: str) -> tuple[Result, float]:
     times = [T_END * i / (SAMPLES - 1) for i in range(SAMPLES)]
     with bar() as progress:
         begin = time.perf_counter()
-        result = model.simulate(T_END, output_times=times, certify=True, progress=progress)
+        result = model.simulate(T_END, output_times=times, progress=progress)
         seconds = time.perf_counter() - begin
+        result = certified(result, progress)
     return result, seconds
 
 

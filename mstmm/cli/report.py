@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import textwrap
+from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -30,8 +31,7 @@ def effort(result: Result, seconds: float) -> str:
     parts = [f"{s.method}, {how}"]
     counted = result.statistics
     if counted is not None:
-        rejected = f" ({counted.rejected} rejected)" if counted.rejected else ""
-        parts.append(f"{count(counted.steps, 'step')}{rejected}")
+        parts.append(count(counted.steps, "step"))
         parts.append(count(counted.evaluations, "evaluation"))
     parts.append(f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s")
     return ": ".join([parts[0], ", ".join(parts[1:])])
@@ -68,4 +68,42 @@ def to_json(result: Result, seconds: float) -> dict[str, Any]:
         "seconds": seconds,
         "statistics": None if counted is None else asdict(counted),
         "warnings": list(result.warnings),
+        "certificate": _certificate(result),
     }
+
+
+def _certificate(result: Result) -> dict[str, Any]:
+    """The certificate as plain numbers; the estimated error per unit."""
+    certificate = result.certificate
+    data = {key: value for key, value in vars(certificate).items() if key != "error"}
+    plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
+    plain["momentum"] = [vars(drift) for drift in certificate.momentum]
+    error = certificate.error
+    if error is None:
+        return {**plain, "error": None}
+    return {
+        **plain,
+        "error": {
+            "q": error.largest("q"), "u": error.largest("u"), "until": error.horizon,
+            "tenfold_every": error.tenfold, "reference": error.reference,
+        },
+    }  # fmt: skip
+
+
+def certificate_lines(result: Result, width: int) -> list[str]:
+    """What vouches for a result, and every warning, folded to the width of the terminal."""
+    certificate = result.certificate
+    lines = str(certificate).splitlines()
+    found = [w for w in result.warnings if w not in certificate.warnings]
+    lines += [f"note: {warning}" for warning in found]
+    return [part for line in lines for part in _folded(line, width)]
+
+
+def _folded(line: str, width: int) -> list[str]:
+    """The line; what does not fit goes below the text, behind the name of the row."""
+    name = line.split("  ", 1)[0]
+    indent = len(line) - len(line[len(name) :].lstrip())
+    return textwrap.wrap(
+        line, max(width, 40), subsequent_indent=" " * min(indent, 30),
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip

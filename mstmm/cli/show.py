@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -34,6 +33,7 @@ def show(
     element: Annotated[
         str,
         typer.Argument(
+            metavar="ELEMENT",
             help="Name of an element (mstmm list), or the Python file that defines your own."
         ),
     ],
@@ -83,53 +83,41 @@ def _views(element: str, at: str) -> list[ElementView]:
     """Views of a built-in element, of one in the kernel store, or of all in a file."""
     from mstmm.derive import views
 
+    from . import stored
+    from .names import found
+
     if element.endswith(".py"):
         from mstmm.derive.checks import check
         from mstmm.derive.registry import load_file
 
-        found = load_file(element)
-        for each in found:
+        defined = load_file(element)
+        for each in defined:
             check(each)
-        return [views.of_element(each) for each in found]
-    return [_generated(element, at) or _kept(element, at) or views.view(element)]
+        return [views.of_element(each) for each in defined]
+    kind, name = found(element)
+    full = f"{kind}_{name}"
+    source = stored.text(full, ".c")
+    if source is None:
+        return [_kept(kind, name, at)]
+    if at in ("ir", "c"):  # the committed kernels: no need to derive them again
+        from mstmm.stored import element_from_json
+
+        return [_of_spec(element_from_json(str(stored.text(full, ".json"))), source)]
+    return [views.view(full)]
 
 
-def _generated(element: str, at: str) -> ElementView | None:
-    """The committed kernels and C: no need to derive them again."""
-    if at not in ("ir", "c"):
-        return None
-    from mstmm.derive import views
-    from mstmm.stored import element_from_json
-
-    from . import stored
-
-    full = views.full_name(element, views.names())
-    text = None if full is None else stored.text(full, ".json")
-    source = None if full is None else stored.text(full, ".c")
-    if text is None or source is None:
-        return None
-    return _of_spec(element_from_json(text), source)
-
-
-def _kept(element: str, at: str) -> ElementView | None:
+def _kept(kind: str, name: str, at: str) -> ElementView:
     """An element of the user's kernel store: its kernels, as its equations are in its file."""
-    from mstmm.derive import views
     from mstmm.runtime import store
 
-    if views.full_name(element, views.names()) is not None:
-        return None
-    kept = store.specs()
-    full = views.full_name(element, [f"{kind}_{name}" for kind, name in kept])
-    if full is None:
-        return None
-    spec = next(s for (kind, name), s in kept.items() if f"{kind}_{name}" == full)
+    full = f"{kind}_{name}"
     if at not in ("ir", "c"):
         raise ElementError(
             f"{full}: the kernel store keeps kernels, not equations; "
             f"show its file: mstmm show MY_FILE.py --at {at}"
         )
-    path = Path(store.folder()) / full / f"{full}.c"
-    return _of_spec(spec, path.read_text(encoding="utf-8"))
+    path = store.folder() / full / f"{full}.c"
+    return _of_spec(store.specs()[kind, name], path.read_text(encoding="utf-8"))
 
 
 def _of_spec(spec: ElementSpec, source: str) -> ElementView:

@@ -28,6 +28,8 @@ PICTURES = (".png", ".svg", ".pdf")
 
 #: A run shorter than this (s) is followed by the second one that estimates its error.
 SHORT = 2.0
+#: Most fixed steps of a run.
+MAX_STEPS = 1e11
 #: Rows of the table on the terminal.
 _ROWS = 9
 
@@ -116,6 +118,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume,
     )  # fmt: skip
+    _refuse_endless(plan)
     need_for(plan.output, "--output")
     if plan.plot is not None:
         need_for(plan.plot, "--plot")
@@ -126,6 +129,9 @@ def simulate(
         result = _run(plan, model, progress)
         seconds = time.perf_counter() - begin
         result.save(plan.output)
+        if result.success and (seconds < SHORT if plan.certify is None else plan.certify):
+            result = certified(result, progress)
+            result.save(plan.output)
     if plan.plot is not None:
         result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
     _report(plan, result, seconds, json)
@@ -133,6 +139,15 @@ def simulate(
         raise typer.Exit(130)
     if not result.success:
         raise typer.Exit(NumericalFailure.exit_code)
+
+
+def _refuse_endless(plan: Plan) -> None:
+    """A step so small that no machine would ever reach the end."""
+    if plan.step is not None and plan.t_end / plan.step > MAX_STEPS:
+        raise MstmmError(
+            f"--step {plan.step:g}: {plan.t_end / plan.step:.1e} steps would never end; "
+            f"take {plan.t_end / MAX_STEPS:.1e} s or more"
+        )
 
 
 def _default_output(scene: str) -> str:
@@ -183,9 +198,25 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     return model.simulate(
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
-        certify=bool(plan.certify), progress=progress,
-        checkpoint=str(plan.checkpoint), resume=plan.resume,
+        progress=progress, resume=plan.resume,
+        checkpoint=None if plan.method.startswith("scipy-") else str(plan.checkpoint),
     )  # fmt: skip
+
+
+def certified(result: Result, progress: Bar) -> Result:
+    """The same result with its error estimated by a second, more accurate run from the start."""
+    from dataclasses import replace
+
+    from mstmm.runtime.execution import Watch, second_run
+    from mstmm.runtime.result import Result
+
+    progress.label("estimating the error")
+    watch = Watch(progress, result.settings, runs=2)
+    run = result.trajectory
+    error = second_run(result.model, run, *result.model.initial_state(), watch)
+    return Result(
+        result.model, replace(run, notes=(*run.notes, *watch.notes)), error, result.certificate.step
+    )
 
 
 def interrupted(result: Result) -> bool:
@@ -238,6 +269,7 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
         output.say()
         output.say(report.fitting_table(result, plan.quantities, _ROWS, console.width))
     output.say()
-    for warning in result.warnings:
-        output.say(f"note: {warning}")
+    for line in report.certificate_lines(result, console.width):
+        output.say(line)
+    output.say()
     output.say(f"wrote {' and '.join(made)} ({len(result.t)} samples)")

@@ -1,0 +1,35 @@
+"""From what a user calls an element to its kind and name."""
+
+from __future__ import annotations
+
+from mstmm.errors import ElementError
+
+KINDS = ("hinge", "body", "force", "classical", "sweep")
+
+
+def known() -> dict[str, tuple[str, str]]:
+    """Full name (hinge_pin) -> (kind, name), of built-in elements and of the kernel store."""
+    from mstmm.runtime import store
+
+    from . import stored
+
+    built_in = [(e.kind, e.name) for kind in KINDS for e in stored.builtin(kind)]
+    names = {f"{kind}_{name}": (kind, name) for kind, name in [*built_in, *sorted(store.specs())]}
+    return names | {"hinge_elastic": ("hinge", "free")}  # the same motion; its law is in sweep_laws
+
+
+def found(name: str) -> tuple[str, str]:
+    """(kind, name) of "hinge_pin", or of "pin", which means the first kind that has it.
+
+    Raises ElementError, with the nearest name, if there is none.
+    """
+    from mstmm.scene_errors import near
+
+    names = known()
+    for full in (name, *(f"{kind}_{name}" for kind in KINDS)):
+        if full in names:
+            return names[full]
+    short = [own for _, own in names.values()]
+    raise ElementError(
+        f'element "{name:.60}": there is no such element{near(name, [*names, *short])}'
+    )

@@ -1,0 +1,79 @@
+"""`mstmm check` of scenes, and what cannot be checked."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import mstmm as package
+from cli.commands import Command
+
+
+def test_scene_is_summed_up(mstmm: Command) -> None:
+    done = mstmm("check", "pendulum.toml")
+    assert done.code == 0 and done.err == ""
+    assert "pendulum.toml: ok; 1 body, 1 hinge, 1 coordinate, 1 speed" in done.out
+    assert "rod  (pivot: pin)" in done.out
+
+
+def test_echo_loads_back_to_the_same_scene(mstmm: Command, folder: Path) -> None:
+    done = mstmm("check", "pendulum.toml", "--echo")
+    (folder / "echo.toml").write_text(done.out)
+    echoed = package.load_scene(folder / "echo.toml")
+    assert echoed == package.load_scene(folder / "pendulum.toml")
+
+
+def test_every_file_is_looked_at(mstmm: Command, folder: Path) -> None:
+    (folder / "bad.toml").write_text("gravity = 3\n")
+    done = mstmm("check", "bad.toml", "pendulum.toml", "none.toml", "--json")
+    data = json.loads(done.out)
+    assert done.code == 2 and not data["ok"]
+    assert [report["ok"] for report in data["checked"]] == [False, True, False]
+    assert "gravity" in data["checked"][0]["message"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("empty.toml", b""),
+        ("binary.toml", bytes(range(256))),
+        ("latin.toml", "gravity = [0, 0, 0] # é".encode("latin-1")),
+        ("list.json", b"[1, 2]"),
+        ("deep.json", b"[" * 100000),
+        ("code.toml", b"gravity = __import__('os').system('touch hacked')"),
+    ],
+)
+def test_file_that_is_no_scene(mstmm: Command, folder: Path, name: str, content: bytes) -> None:
+    (folder / name).write_bytes(content)
+    for command in ("check", "simulate"):
+        done = mstmm(command, name)
+        assert done.code == 2 and name in done.err and done.out == ""
+    assert not (folder / "hacked").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["", " ", ".", "..", "/", "a/b", "x.yaml", "-", "\0", "\udcff.toml"]
+)
+def test_name_that_is_nothing(mstmm: Command, name: str) -> None:
+    done = mstmm("check", "--", name)
+    assert done.code == 2 and done.err.startswith("mstmm: ")
+
+
+def test_folder_is_no_scene(mstmm: Command, folder: Path) -> None:
+    (folder / "scene.toml").mkdir()
+    done = mstmm("check", "scene.toml")
+    assert done.code == 2 and "folder" in done.err
+
+
+def test_names_with_control_characters_are_shown_harmlessly(mstmm: Command) -> None:
+    done = mstmm("check", "\x1b[31mred\x07.toml")
+    assert done.code == 2 and "\x1b" not in done.err and "\x07" not in done.err
+
+
+def test_names_beyond_ascii_work(mstmm: Command, folder: Path) -> None:
+    (folder / "Päpendel 振り子.toml").write_text((folder / "pendulum.toml").read_text())
+    assert mstmm("check", "Päpendel 振り子.toml").code == 0
+    done = mstmm("simulate", "Päpendel 振り子.toml", "--t-end", "0.1")
+    assert done.code == 0 and (folder / "Päpendel 振り子.nc").is_file()

@@ -1,0 +1,141 @@
+"""What reaches the user of an exception; closed pipes, full disks, Ctrl-C; start-up time."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli.commands import Command
+from mstmm import errors
+from mstmm.cli.guard import explain
+
+PROGRAM = [sys.executable, "-m", "mstmm"]
+
+
+def program(folder: Path, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.run(
+        [*PROGRAM, *arguments], check=False, text=True, timeout=60, cwd=folder, **streams
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (errors.SceneError("x"), 2),
+        (errors.ElementError("x"), 2),
+        (errors.EnvironmentFailure("x"), 3),
+        (errors.NumericalFailure("x"), 4),
+        (MemoryError(), 3),
+        (PermissionError(13, "Permission denied", "x"), 3),
+        (ModuleNotFoundError("x", name="xarray"), 3),
+        (KeyboardInterrupt(), 130),
+        (SystemExit(7), 2),
+        (ZeroDivisionError("x"), 1),
+    ],
+)
+def test_exit_codes(error: BaseException, code: int) -> None:
+    message, found = explain(error)
+    assert found == code and message
+
+
+def test_defect_is_owned_up_to(mstmm: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("seven by zero")
+
+    monkeypatch.setattr("mstmm.load_scene", broken, raising=False)
+    done = mstmm("simulate", "pendulum.toml")
+    assert done.code == 1 and "Traceback" not in done.err
+    assert "ZeroDivisionError: seven by zero" in done.err and "MSTMM_DEBUG=1" in done.err
+    monkeypatch.setenv("MSTMM_DEBUG", "1")
+    assert "Traceback" in mstmm("simulate", "pendulum.toml").err
+
+
+def test_errors_as_json(mstmm: Command) -> None:
+    done = mstmm("simulate", "none.toml", "--json")
+    problem = json.loads(done.out)["error"]
+    assert problem["exit_code"] == done.code == 2 and "none.toml" in problem["message"]
+    assert json.loads(mstmm("simulate", "--json").out)["error"]["exit_code"] == 2
+
+
+def test_help_is_quick_and_light(folder: Path) -> None:
+    script = (
+        "import sys; from mstmm.cli.guard import run; code = run(['--help']);"
+        "print([m for m in ('numpy', 'scipy', 'sympy', 'pydantic', 'cffi') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=folder
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+    for command in ("demo", "simulate", "check", "list", "show", "generate"):
+        assert command in done.stdout
+
+
+def test_no_arguments_show_the_help(mstmm: Command) -> None:
+    assert mstmm() == mstmm("--help") and mstmm().code == 0
+
+
+def test_version(mstmm: Command) -> None:
+    assert mstmm("--version").out.startswith("mstmm 0.")
+
+
+@pytest.mark.parametrize("command", ["", "demo", "simulate", "check", "list", "show", "generate"])
+def test_every_command_has_help(mstmm: Command, command: str) -> None:
+    done = mstmm(*command.split(), "-h")
+    assert done.code == 0 and "Usage: mstmm" in done.out
+    assert max(map(len, done.out.splitlines())) <= 80
+
+
+def test_reader_that_stops_reading_is_no_error(folder: Path) -> None:
+    shell = (
+        f"{sys.executable} -m mstmm show sweep_generic6 --at c | head -n 1; echo ${{PIPESTATUS[0]}}"
+    )
+    done = subprocess.run(
+        ["bash", "-c", shell], capture_output=True, text=True, check=True, cwd=folder, timeout=60
+    )
+    assert done.stdout.splitlines()[-1] == "0" and done.stderr == ""
+
+
+def test_full_disk_is_said(folder: Path) -> None:
+    with open("/dev/full", "w") as full:
+        done = program(folder, "list", stdout=full)
+    assert done.returncode == 3 and "No space left" in done.stderr
+    assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&-"])
+def test_closed_streams(folder: Path, closed: str) -> None:
+    for command, code in (("list hinges", 0), ("check none.toml", 2)):
+        shell = f"{sys.executable} -m mstmm {command} {closed}"
+        done = subprocess.run(
+            ["bash", "-c", shell], capture_output=True, text=True, check=False, cwd=folder
+        )
+        assert done.returncode == code and "Traceback" not in done.stderr + done.stdout
+
+
+def test_ascii_terminal(folder: Path) -> None:
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0", "LC_ALL": "C"}
+    done = program(folder, "show", "pin", env=environment)
+    assert done.returncode == 0 and done.stderr == ""
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_keeps_its_result(folder: Path, which: signal.Signals) -> None:
+    run = subprocess.Popen(
+        [*PROGRAM, "simulate", "pendulum.toml", "--t-end", "1e7", "--times", "1e4", "-o", "a.csv"],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    time.sleep(3.0)
+    run.send_signal(which)
+    out, err = run.communicate(timeout=30)
+    assert run.returncode == 130, err
+    assert "Traceback" not in err + out and "--resume" in err
+    assert len((folder / "a.csv").read_text().splitlines()) > 1

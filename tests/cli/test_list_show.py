@@ -1,0 +1,86 @@
+"""`mstmm list` and `mstmm show`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from cli.commands import Command
+from mstmm.hinge_types import HINGE_TYPES
+
+
+def test_list_has_everything(mstmm: Command) -> None:
+    done = mstmm("list")
+    assert done.code == 0
+    for name in (*HINGE_TYPES, "rigid", "spring", "classical_ball", "rk4", "dop853", "friction"):
+        assert re.search(rf"\b{name}\b", done.out), name
+    assert max(map(len, done.out.splitlines())) <= 80
+
+
+def test_list_as_json_has_coordinates_with_units(mstmm: Command) -> None:
+    data = json.loads(mstmm("list", "hinges", "methods", "--json").out)
+    assert set(data) == {"hinges", "methods"}
+    pin = next(hinge for hinge in data["hinges"] if hinge["name"] == "pin")
+    assert pin["coordinates"] == ["angle [rad]"] and pin["speeds"] == ["angle_rate [rad/s]"]
+    assert [hinge["name"] for hinge in data["hinges"]] == list(HINGE_TYPES)
+
+
+def test_list_of_something_unknown(mstmm: Command) -> None:
+    done = mstmm("list", "doors")
+    assert done.code == 2 and "hinges" in done.err
+
+
+@pytest.mark.parametrize("at", ["equations", "matrix", "ir", "c"])
+def test_pin_at_every_stage(mstmm: Command, at: str) -> None:
+    done = mstmm("show", "pin", "--at", at)
+    assert done.code == 0 and "Rui, Wang, Zhang" in done.out
+    assert "rad/s" in done.out
+
+
+def test_stage_c_is_the_generated_file(mstmm: Command) -> None:
+    shown = mstmm("show", "pin", "--at", "c").out
+    source = Path(__file__).parents[2] / "generated" / "hinge_pin.c"
+    assert source.read_text().strip() in shown
+
+
+def test_html_is_well_formed_and_complete(mstmm: Command, folder: Path) -> None:
+    done = mstmm("show", "pin", "--format", "html", "--output", "pin.html")
+    assert done.code == 0 and done.out == ""
+    page = (folder / "pin.html").read_text(encoding="utf-8")
+    tree = ElementTree.fromstring(page.split("\n", 1)[1] if page.startswith("<!") else page)
+    assert tree.tag == "html" and "<script" not in page
+
+
+def test_short_and_full_names_mean_the_same(mstmm: Command) -> None:
+    assert mstmm("show", "spring").out == mstmm("show", "force_spring").out
+    hinge, matrix = (mstmm("show", name, "--at", "ir").out for name in ("ball", "classical_ball"))
+    assert hinge != matrix
+
+
+def test_every_listed_matrix_can_be_shown(mstmm: Command) -> None:
+    for entry in json.loads(mstmm("list", "matrices", "--json").out)["matrices"]:
+        page = json.loads(mstmm("show", entry["name"], "--at", "ir", "--json").out)
+        assert page["pages"][entry["name"]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("pni",), "did you mean"),
+        (("",), "no such element"),
+        (("x" * 5000,), "no such element"),
+        (("../../etc/passwd",), "no such element"),
+        (("none.py",), "none.py"),
+        (("pin", "--at", "home"), "equations"),
+        (("pin", "--format", "doc"), "latex"),
+        (("pin", "-o", "away/x.txt"), "away"),
+        ((), "ELEMENT"),
+    ],
+)
+def test_refused(mstmm: Command, arguments: tuple[str, ...], said: str) -> None:
+    done = mstmm("show", *arguments)
+    assert done.code == 2 and said in done.err

@@ -1,0 +1,155 @@
+"""`mstmm simulate`: files, tables, JSON, settings that are refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mstmm as package
+from cli.commands import PENDULUM, Command
+
+
+def columns(path: Path) -> dict[str, list[float]]:
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file)
+    return {name: [float(row[k]) for row in rows] for k, name in enumerate(head)}
+
+
+def test_result_is_that_of_the_library(mstmm: Command, folder: Path) -> None:
+    done = mstmm("simulate", "pendulum.toml", "--t-end", "2", "--times", "0.5", "-o", "run.csv")
+    assert done.code == 0 and done.err == ""
+    model = package.compile(package.load_scene(folder / "pendulum.toml"))
+    expected = model.simulate(2.0, output_times=[0, 0.5, 1, 1.5, 2])
+    found = columns(folder / "run.csv")
+    assert found["time [s]"] == [0, 0.5, 1, 1.5, 2]
+    np.testing.assert_array_equal(found["pivot.angle [rad]"], expected.q[:, 0])
+
+
+def test_text_names_scene_steps_and_files(mstmm: Command) -> None:
+    done = mstmm("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv")
+    assert "1 body on 1 hinge, 1 degree of freedom" in done.out
+    assert "pivot.angle" in done.out and "energy" in done.out
+    assert "run.csv" in done.out
+    assert max(map(len, done.out.splitlines())) <= 80
+
+
+def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> None:
+    assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
+    assert package.load_result(folder / "pendulum.nc").t[-1] == 0.1
+
+
+def test_without_the_extra_the_result_is_csv(
+    mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mstmm.cli.extras.missing", lambda extra: ["h5netcdf"])
+    assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
+    assert (folder / "pendulum.csv").is_file()
+    refused = mstmm("simulate", "pendulum.toml", "-o", "x.nc")
+    assert refused.code == 3 and "pip install 'mstmm[io]'" in refused.err
+    refused = mstmm("simulate", "pendulum.toml", "--plot", "x.png")
+    assert refused.code == 3 and "pip install 'mstmm[plot]'" in refused.err
+
+
+def test_json_is_one_document(mstmm: Command) -> None:
+    done = mstmm("simulate", "pendulum.toml", "--t-end", "0.5", "--times", "3", "--json")
+    data = json.loads(done.out)
+    assert data["success"] and data["t"] == 0.5 and data["samples"] == 3
+    assert set(data["q"]) == {"pivot.angle"} and data["files"] == ["pendulum.nc"]
+
+
+def test_plot_of_quantities(mstmm: Command, folder: Path) -> None:
+    options = ("--t-end", "0.5", "--plot", "a.png", "-q", "rod.tip.position", "-q", "energy")
+    done = mstmm("simulate", "pendulum.toml", *options)
+    assert done.code == 0 and "rod.tip.position.x" in done.out
+    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_unknown_quantity_is_refused_before_the_run(mstmm: Command, folder: Path) -> None:
+    done = mstmm("simulate", "pendulum.toml", "-q", "rod.tp.position")
+    assert done.code == 2 and "did you mean" in done.err
+    assert not (folder / "pendulum.nc").exists()
+
+
+def test_event_that_stops_is_a_success(mstmm: Command, folder: Path) -> None:
+    stop = '[[event]]\nname = "low"\nwhen = "pivot.q < 0"\ndo = "stop"\n'
+    (folder / "stop.toml").write_text(PENDULUM + stop)
+    done = mstmm("simulate", "stop.toml")
+    assert done.code == 0 and "low" in done.out
+
+
+def test_numerical_failure_keeps_what_was_computed(mstmm: Command, folder: Path) -> None:
+    push = PENDULUM + 'law = { effort = "1/(1 - t)" }\n'
+    (folder / "push.toml").write_text(push)
+    done = mstmm("simulate", "push.toml", "--t-end", "3", "-o", "push.csv", "--json")
+    data = json.loads(done.out)
+    assert done.code == 4 and not data["success"]
+    assert "push.csv" in done.err and "push.toml" in done.err
+    last = columns(folder / "push.csv")["time [s]"][-1]
+    assert 0.9 < last <= 1.0
+
+
+def test_mass_that_leaves_a_motion_undetermined_is_bad_input(mstmm: Command, folder: Path) -> None:
+    light = PENDULUM.replace("mass = 1.0", "mass = 0.0").replace(
+        "[0.001, 0.084, 0.084]", "[0, 0, 0]"
+    )
+    (folder / "light.toml").write_text(light)
+    for command in ("simulate", "check"):
+        done = mstmm(command, "light.toml")
+        assert done.code == 2
+        assert "pivot" in done.err and "light.toml" in done.err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--t-end", "nan"), "--t-end"),
+        (("--t-end", "inf"), "finite"),
+        (("--t-end", "1e999"), "finite"),
+        (("--t-end", "-1"), "above 0"),
+        (("--t-end", "soon"), "not a number"),
+        (("--t-end", ""), "not a number"),
+        (("--t-end",), "--t-end"),
+        (("--rtol", "0"), "above 0"),
+        (("--atol", "-1e-9"), "0 or more"),
+        (("--step", "-0.1"), "above 0"),
+        (("--times", "1"), "2 samples"),
+        (("--times", "0.0"), "--times"),
+        (("--times", "99999999999999999999"), "at most"),
+        (("--times", "1e-300"), "at most"),
+        (("--times", "-5"), "--times"),
+        (("--method", "magic"), "dop853"),
+        (("--method", "rk4"), "step"),
+        (("--method", "rk4", "--step", "1e-320", "--times", "2"), "step"),
+        (("--output", ""), "file name"),
+        (("--output", "x.xls"), ".nc or .csv"),
+        (("--output", "away/x.nc"), "no folder away"),
+        (("--output", "x" * 300 + ".nc"), "long"),
+        (("--output", "folder.nc"), "folder"),
+        (("--plot", "x.bmp"), ".png"),
+        (("--plot", "x.png", "-q", "nothing"), "nothing"),
+        (("--resume",), "checkpoint"),
+        (("--hinge", "none.py"), "none.py"),
+        (("--nonsense",), "--nonsense"),
+        (("another.toml",), "another.toml"),
+    ],
+)
+def test_refused(mstmm: Command, folder: Path, options: tuple[str, ...], said: str) -> None:
+    (folder / "folder.nc").mkdir()
+    done = mstmm("simulate", "pendulum.toml", *options)
+    assert done.code == 2
+    assert said in done.err and "Traceback" not in done.err
+    assert len(done.err) < 400
+
+
+def test_folder_that_cannot_be_written(mstmm: Command) -> None:
+    done = mstmm("simulate", "pendulum.toml", "-o", "/proc/run.nc")
+    assert done.code == 3 and "/proc/run.nc" in done.err
+
+
+def test_device_is_no_result_file(mstmm: Command, folder: Path) -> None:
+    (folder / "null.nc").symlink_to("/dev/null")
+    assert mstmm("simulate", "pendulum.toml", "-o", "null.nc").code == 2
