@@ -90,11 +90,10 @@ def _scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
 
-    from .simulate import at_start
+    from .simulate import compiled
 
     scene = mstmm.load_scene(path)
-    model = mstmm.compile(scene)
-    at_start(path, model)
+    model = compiled(path, scene)
     sizes = {
         "bodies": len(scene.body), "hinges": len(scene.hinge), "coordinates": model.nq,
         "speeds": model.nu, "springs": len(scene.spring), "loads": len(scene.load),

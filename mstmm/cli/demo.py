@@ -34,7 +34,7 @@ mstmm was installed.  One sweep along the chain gives all accelerations."""
 
 NEXT = """\
 Next:
-    mstmm simulate demo.toml --t-end 2     your own run; change numbers in it first
+    mstmm simulate demo.toml --t-end 2     your own run; edit it first
     mstmm show ball                        the equations of a hinge
     mstmm list                             everything a scene can name"""
 

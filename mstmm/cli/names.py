@@ -29,7 +29,7 @@ def found(name: str) -> tuple[str, str]:
     for full in (name, *(f"{kind}_{name}" for kind in KINDS)):
         if full in names:
             return names[full]
-    short = [own for _, own in names.values()]
-    raise ElementError(
-        f'element "{name:.60}": there is no such element{near(name, [*names, *short])}'
-    )
+    hint = near(name, [*names, *(own for _, own in names.values())])
+    if "did you mean" not in hint:
+        hint = "; mstmm list shows what there is"
+    raise ElementError(f'element "{name:.60}": there is no such element{hint}')

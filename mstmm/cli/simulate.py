@@ -22,6 +22,7 @@ from .progress import Bar, bar
 if TYPE_CHECKING:
     from mstmm.runtime.model import Model
     from mstmm.runtime.result import Result
+    from mstmm.scene import Scene
 
 RESULTS = (".nc", ".csv")
 PICTURES = (".png", ".svg", ".pdf")
@@ -165,11 +166,10 @@ def use_files(paths: list[str]) -> None:
 
 
 def _model(plan: Plan) -> Model:
-    """The compiled scene; a first look at its start finds what cannot move at all."""
+    """The compiled scene, with every quantity that was asked for in it."""
     import mstmm
 
-    model = mstmm.compile(mstmm.load_scene(plan.scene))
-    at_start(plan.scene, model)
+    model = compiled(plan.scene, mstmm.load_scene(plan.scene))
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         for name in plan.quantities:
@@ -177,16 +177,24 @@ def _model(plan: Plan) -> Model:
     return model
 
 
-def at_start(path: str, model: Model) -> None:
-    """SceneError if the accelerations of the start cannot be computed: the scene is at fault."""
+def compiled(path: str, scene: Scene) -> Model:
+    """The model of a scene file.
+
+    SceneError, with the file named, also where the accelerations of the start cannot be computed:
+    then the scene is at fault.
+    """
     import numpy as np
 
+    import mstmm
+
     try:
+        model = mstmm.compile(scene)
         udot = model.accelerations(*model.initial_state())
-    except NumericalFailure as failure:
-        raise SceneError(f"{path}: at the start, {failure}") from None
+    except (SceneError, NumericalFailure) as error:
+        raise SceneError(f"{path}: {error}") from None
     if not np.isfinite(udot).all():
         raise SceneError(f"{path}: the accelerations at the start are not finite")
+    return model
 
 
 def _run(plan: Plan, model: Model, progress: Bar) -> Result:
