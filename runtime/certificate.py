@@ -219,8 +219,8 @@ def _warnings(c: Certificate) -> list[str]:
         )
     if c.singular is not None and c.singular.measure < SINGULAR:
         found.append(
-            f'hinge "{c.singular.hinge}" comes within {c.singular.measure:.0e} of the angle at which '
-            f"its coordinates fail, at t = {c.singular.time:.6g} s; use a ball hinge"
+            f'hinge "{c.singular.hinge}" comes within {c.singular.measure:.0e} of the angle '
+            f"at which its coordinates fail, at t = {c.singular.time:.6g} s; use a ball hinge"
         )
     if c.step is not None and c.step.warning:
         found.append(c.step.warning)

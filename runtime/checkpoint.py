@@ -56,8 +56,9 @@ class Checkpoint:
         """Write everything; the old file stays until the new one is whole."""
         rows = {name: getattr(samples, name) for name in _ROWS}
         with replacing(self.path) as temporary, temporary.open("wb") as file:
-            np.savez(file, format=_FORMAT, real=state["real"], integer=state["integer"],
-                     **self.asked, **rows)  # fmt: skip
+            words = {key: np.array(text) for key, text in self.asked.items()}
+            arrays: dict[str, Any] = {"format": np.array(_FORMAT), **state, **rows, **words}
+            np.savez(file, **arrays)
 
     def load(self) -> tuple[State, Samples]:
         """State and samples.  SceneError if the file is no checkpoint, or one of another run."""

@@ -1,9 +1,9 @@
 """Numbers that say how well a computation was conditioned: pivots of the sweep, singular angles.
 
 The sweep hands S - S H D^-1 H^T S inwards: the inertia S of what a hinge carries without what the
-hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken off
-(a heavy tip behind light links), digits are lost: about 1e-16 times the ratio of the two, in the
-accelerations.
+hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken
+off (a heavy tip behind light links), digits are lost: about 1e-16 times the ratio of the two, in
+the accelerations.
 """
 
 from __future__ import annotations

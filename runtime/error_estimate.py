@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 #: The estimate is this many times the difference of the two runs.
 SAFETY = 2.0
 
-#: A sample's estimate also covers this many samples after it: at one of them the two runs may cross.
+#: A sample's estimate also covers this many samples after it: the two runs may cross at one.
 AHEAD = 3
 
 #: Angles (rad): two runs that differ by more no longer predict the same motion.

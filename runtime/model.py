@@ -1,4 +1,4 @@
-"""Model: a compiled scene.  Accelerations, mass matrix, inverse dynamics, equilibrium, simulation."""
+"""Model: a compiled scene, and everything that can be asked of it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,9 @@ class Model:
         q, u = np.zeros(self.nq), np.zeros(self.nu)
         for hinge in self.scene.hinge:
             slots = self.layout.hinges[hinge.name]
-            kind = HINGE_TYPES.get("free" if slots.quaternion is not None and hinge.type == "fixed" else hinge.type)
+            kind = HINGE_TYPES.get(
+                "free" if slots.quaternion is not None and hinge.type == "fixed" else hinge.type
+            )
             if kind is not None and slots.nq:
                 q[slots.q_slice] = kind.start
             if hinge.initial is not None and hinge.initial.q:
@@ -74,7 +76,7 @@ class Model:
         return y[: self.nq], y[self.nq : self.nq + self.nu]
 
     def refuse_undetermined_start(self) -> None:
-        """SceneError naming the hinge if the scene's masses leave a motion of the start undetermined."""
+        """SceneError naming the hinge if the masses leave a motion of the start undetermined."""
         q, u = self.initial_state()
         try:
             self._engine.accelerations(0.0, q[None].copy(), u[None].copy(), self._memory(1))
@@ -96,7 +98,10 @@ class Model:
         """
         lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
         engine = self._engine
-        coordinates, speeds = engine.batch("q", q, self.nq, lead), engine.batch("u", u, self.nu, lead)
+        coordinates, speeds = (
+            engine.batch("q", q, self.nq, lead),
+            engine.batch("u", u, self.nu, lead),
+        )
         extra = None if efforts is None else engine.batch("efforts", efforts, self.nu, lead)
         times = np.broadcast_to(np.asarray(t, dtype=np.float64), lead).reshape(-1)
         _, udot = engine.accelerations(times, coordinates, speeds, self._memory(len(speeds)), extra)
@@ -112,7 +117,11 @@ class Model:
         engine = self._engine
         one = [
             engine.batch(name, value, width)[0].copy()
-            for name, value, width in (("q", q, self.nq), ("u", u, self.nu), ("udot", udot, self.nu))
+            for name, value, width in (
+                ("q", q, self.nq),
+                ("u", u, self.nu),
+                ("udot", udot, self.nu),
+            )
         ]
         return engine.inverse_dynamics(t, one[0], one[1], one[2], engine.start_memory())
 
@@ -208,9 +217,7 @@ class Model:
             times = tuple(float(x) for x in np.atleast_1d(np.asarray(output_times, dtype=float)))
         if not np.isfinite(t_end) or t_end < t_start:
             raise SceneError(f"t_end = {t_end!r}: expected a time in s, not before t_start")
-        settings = Settings(
-            t_end, t_start, method, step, rtol, atol, times, max_step, max_steps
-        )
+        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step, max_steps)
         q, u = self.initial_state() if initial is None else initial
         return simulate(
             self, settings, self._engine.batch("q", q, self.nq)[0],

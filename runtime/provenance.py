@@ -11,9 +11,11 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import mstmm
 
+from .error_estimate import ErrorEstimate
 from .integrate import Statistics, Status
 from .simulate import Settings, Trajectory
 
@@ -22,6 +24,11 @@ if TYPE_CHECKING:
 
 #: Version of the layout of a saved result.
 FORMAT = 1
+
+_ERROR = ("horizon", "tenfold", "reference")
+
+Array = NDArray[np.float64]
+Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 @cache
@@ -66,25 +73,62 @@ def attributes(result: Result) -> dict[str, Any]:
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
         "notes": json.dumps(list(run.notes)),
         "norm_residual": run.norm_residual,
+        "certificate": str(result.certificate),
     }
 
 
-def variables(result: Result) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+def variables(result: Result) -> dict[str, Variable]:
     """What is too long for an attribute, or has a dimension of its own."""
     run = result.trajectory
     scene = {"long_name": "scene as TOML, defaults filled in"}
     event = {"long_name": "-(i + 1) just before, i + 1 just after event i"}
     memory = {"long_name": "memory: releases, turns of ball and free hinges"}
-    found: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+    found: dict[str, Variable] = {
         "scene": ((), result.model.scene.to_toml(), scene),
         "event": (("time",), run.event, event),
         "memory": (("time", "memory_place"), run.memory, memory),
     }
+    if run.last is not None:
+        about = {"units": "s", "long_name": "time of the last good state"}
+        found["last_t"] = ((), run.last[0], about)
+        found["last_q"] = (("coordinate",), run.last[1], {"long_name": "q of the last good state"})
+        found["last_u"] = (("speed",), run.last[2], {"long_name": "u of the last good state"})
+    found |= _error(result.certificate.error)
     if run.settings.output_times is not None:
         times = np.array(run.settings.output_times)
         about = {"units": "s", "long_name": "output times asked for"}
         found["output_times"] = (("output_time",), times, about)
     return found
+
+
+def _error(error: ErrorEstimate | None) -> dict[str, Variable]:
+    """The estimated error over time, one column per unit."""
+    if error is None:
+        return {}
+    long_name = "times that both runs reached"
+    found: dict[str, Variable] = {
+        "error_t": (("error_time",), error.t, {"units": "s", "long_name": long_name})
+    }
+    for kind in ("q", "u"):
+        for k, (unit, values) in enumerate(getattr(error, kind).items()):
+            long_name = f"estimated error of {kind}, largest so far"
+            about = {"units": unit or "1", "long_name": long_name}
+            about |= {name: json.dumps(getattr(error, name)) for name in _ERROR}
+            found[f"error_{kind}_{k}"] = (("error_time",), values, about)
+    return found
+
+
+def error(data: Any) -> ErrorEstimate | None:
+    """The estimate again; None if there was none."""
+    columns = [name for name in data if str(name).startswith(("error_q_", "error_u_"))]
+    if not columns:
+        return None
+    values: dict[str, dict[str, Array]] = {"q": {}, "u": {}}
+    for name in columns:
+        unit = data[name].attrs["units"]
+        values[str(name)[6]]["" if unit == "1" else unit] = data[name].values
+    rest = {name: json.loads(data[columns[0]].attrs[name]) for name in _ERROR}
+    return ErrorEstimate(data["error_t"].values, values["q"], values["u"], **rest)
 
 
 def trajectory(data: Any) -> Trajectory:
@@ -101,7 +145,10 @@ def trajectory(data: Any) -> Trajectory:
         np.ascontiguousarray(data[name].values)
         for name in ("time", "q", "u", "memory", "work", "event")
     )
+    last = None
+    if "last_t" in data:
+        last = (float(data["last_t"]), data["last_q"].values, data["last_u"].values)
     return Trajectory(
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
-        statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]),
+        statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
     )  # fmt: skip

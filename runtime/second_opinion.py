@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mstmm.errors import SceneError
 
 from .integrate import Samples, Statistics, Status
-from .simulate import SceneSystem, Settings, Trajectory, interruptible, split, tolerances
+from .simulate import SceneSystem, Settings, Trajectory, busiest, interruptible, split, tolerances
 
 if TYPE_CHECKING:
     from .model import Model
@@ -28,6 +28,10 @@ METHODS = {f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau",
 
 #: Points inside a step at which events are looked at.
 _LOOKS = np.linspace(0.0, 1.0, 9)[1:]
+
+
+#: Steps in a row that do not move the time: the integrator has given up without saying so.
+_STUCK = 20
 
 
 class _Ended(Exception):
@@ -141,7 +145,7 @@ class _Loop:
 
     def stretch(self, y: Array, stop: float, flag: list[bool]) -> Array:
         """Steps of one integrator, up to `stop` or an event."""
-        solver = self.solver(y, stop)
+        solver, stuck = self.solver(y, stop), 0
         while solver.status == "running":
             if flag[0]:
                 raise KeyboardInterrupt
@@ -151,6 +155,9 @@ class _Loop:
                 text, solver.status = str(error), "failed"
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise self.failed(solver, text)
+            stuck = stuck + 1 if solver.t == solver.t_old else 0
+            if stuck > _STUCK:
+                raise self.failed(solver, "the steps have become too small")
             self.steps += 1
             self.sizes.append(solver.t - solver.t_old)
             event = self.first_event(solver)
@@ -158,7 +165,7 @@ class _Loop:
             dense = solver.dense_output()
             self.outputs_until(dense, end)
             y = solver.y if event is None else dense(end)
-            self.t, self.last = end, self.system.remember(end, y)
+            self.t, self.last = float(end), self.system.remember(end, y)
             self.tell(end)
             if event is not None:
                 return np.array(self.last)
@@ -185,7 +192,9 @@ class _Loop:
         if not np.isfinite(solver.y).all():
             name = self.system.scene.components()[int(np.argmin(np.isfinite(solver.y)))]
             return _Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
-        return _Ended(Status.STEP_TOO_SMALL, f"{text or 'the integrator failed'}; {at}")
+        text = (text or "the integrator failed").strip(". ")
+        where = busiest(self.system.scene, self.t, self.last)
+        return _Ended(Status.STEP_TOO_SMALL, f"{text}; {at}{where}")
 
     # --- events ---------------------------------------------------------------------------------
 
@@ -220,9 +229,9 @@ class _Loop:
         false = self.system.events(left, dense(left)) < 0
         for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
             values = self.system.events(right, dense(right))
-            risen = np.flatnonzero((values >= 0) & false)
-            if len(risen):
-                time, event = min((self.locate(dense, i, left, right), int(i)) for i in risen)
+            risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]
+            if risen:
+                time, event = min((self.locate(dense, i, left, right), i) for i in risen)
                 return event, time
             left, false = right, values < 0
         return None

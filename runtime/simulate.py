@@ -71,7 +71,7 @@ class Trajectory:
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or an event stopped it, with finite numbers throughout."""
+        """True if the run reached its end or an event stopped it, with finite numbers."""
         done = self.status in (Status.FINISHED, Status.STOPPED)
         return done and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())
 
@@ -81,13 +81,15 @@ class SceneSystem:
 
     def __init__(self, engine: Engine) -> None:
         packed, ffi = engine.packed, engine.ffi
-        self.engine, self.kept = engine, []  # type: ignore[var-annotated]
+        self.engine, self.kept = engine, list[Any]()
         conditions, actions, self.event_names = _conditions(engine)
         self.memory = engine.start_memory()
         model = packed.model
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
-        run.with_power = int(bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces))
+        run.with_power = int(
+            bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
+        )
         run.memory = engine.pointer(self.memory)
         quaternions = ffi.new("int[]", packed.layout.quaternions or [0])
         run.quaternions, run.n_quaternions = quaternions, len(packed.layout.quaternions)
@@ -122,7 +124,9 @@ class SceneSystem:
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
         """State vector at t with driven coordinates, quaternions and memory in order."""
-        y = np.concatenate([np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))])
+        y = np.concatenate(
+            [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
+        )
         y = np.ascontiguousarray(y)
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
         return y
@@ -159,12 +163,10 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     tableau = get(settings.method)
     if settings.step is None and not tableau.adaptive:
         raise SceneError(
-            f"method {settings.method!r} takes fixed steps: give step in s, or choose dopri5 or dop853"
+            f"method {settings.method!r} takes fixed steps: give step in s, or take dopri5 or dop853"
         )
     start = system.start(settings.t_start, q, u)
-    breaks = [
-        b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end
-    ]
+    breaks = [b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end]
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau,
         t_start=settings.t_start, t_end=settings.t_end,
@@ -205,9 +207,7 @@ def interruptible() -> Iterator[list[bool]]:
         signal.signal(signal.SIGINT, previous)
 
 
-def advance(
-    run: Run, observe: Callable[[Run], None] | None = None
-) -> Status | None:
+def advance(run: Run, observe: Callable[[Run], None] | None = None) -> Status | None:
     """Run to the end; None if Ctrl-C came first.  `observe` is called between slices."""
     with interruptible() as interrupted:
         while True:
@@ -291,4 +291,17 @@ def _message(system: SceneSystem, run: Run) -> str:
             system.engine.failure_text(system.run.failure, failure.time)
             + f"; last good state at t = {run.t:.9g} s"
         )
-    return run.message(system.components(), system.event_names)
+    message = run.message(system.components(), system.event_names)
+    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
+    return message + (busiest(system, run.t, run.y) if work else "")
+
+
+def busiest(system: SceneSystem, t: float, y: Array) -> str:
+    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
+    engine = system.engine
+    q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
+    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
+    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
+    if not rates.any():
+        return ""
+    return f"; the fastest change is that of {engine.packed.layout.u_names[int(rates.argmax())]}"

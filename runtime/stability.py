@@ -62,8 +62,8 @@ class StepCheck:
         return (
             f'step = {self.step:.4g} s is too long for the fastest motion at the start (hinge "'
             f'{self.hinge}", {self.rate:.4g} 1/s): h |lambda| = {self.product:.3g}, one step '
-            f"multiplies it by {self.amplification:.3g}; take a step below {self.stable_step:.3g} s "
-            "or leave step out for a method that chooses it"
+            f"multiplies it by {self.amplification:.3g}; take a step below {self.stable_step:.3g} "
+            "s or leave step out for a method that chooses it"
         )
 
 
@@ -78,10 +78,10 @@ def check_step(
         value, vector = fastest(engine, settings.t_start, y[:n].copy(), memory)
     except NumericalFailure:  # the run itself will say what is wrong
         return None
+    value = complex(min(value.real, 0.0), value.imag)
     rate = abs(value)
     if not rate > 0.0 or not np.isfinite(rate):
         return None
-    value = complex(min(value.real, 0.0), value.imag)  # motion that grows by itself is no matter
     weights = np.abs(vector[engine.nq :])
     layout = engine.packed.layout
     hinge = max(layout.hinges.values(), key=lambda s: float(weights[s.u_slice].sum()))
@@ -101,12 +101,13 @@ def _longest(tableau: Tableau, value: complex) -> float:
 
 
 def fastest(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Array]:
-    """(lambda, eigenvector (nq + nu)) of the fastest motion at a state."""
+    """(lambda, eigenvector (nq + nu)) of the fastest motion at a state that does not just grow."""
     n = len(y)
     sizes = np.maximum(1e-6, 1e-6 * np.abs(y))
     if n <= _DENSE:
         values, vectors = np.linalg.eig(_differences(engine, t, y, memory, np.diag(sizes)) / sizes)
-        k = int(np.abs(values).argmax())
+        grows = values.real > np.abs(values.imag)  # by itself, not by the method
+        k = int(np.where(grows, 0.0, np.abs(values)).argmax())
         return complex(values[k]), np.asarray(vectors[:, k])
     return _krylov(engine, t, y, memory)
 

@@ -81,4 +81,4 @@ def _rebuilt(data: Any, path: Path) -> Result:
     model = Model(scene)
     if run.q.shape[1] != model.nq or run.u.shape[1] != model.nu:
         raise SceneError(f'result file "{path}": its states do not fit its scene')
-    return Result(model, run)
+    return Result(model, run, provenance.error(data))
