@@ -10,7 +10,7 @@ import typer
 
 from mstmm.errors import ElementError, MstmmError
 
-from .options import Json, quoted
+from .options import Json, python_file, quoted
 
 if TYPE_CHECKING:
     from mstmm.crosscheck import Report as Crosscheck
@@ -161,7 +161,7 @@ def _file(path: str) -> Report:
     from mstmm.derive.registry import load_file
 
     reports = []
-    for element in load_file(path):
+    for element in load_file(python_file(path)):
         check_element(element)
         reports.append(crosscheck_definition(element))
     return _report(reports)

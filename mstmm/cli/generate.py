@@ -10,7 +10,7 @@ import typer
 
 from mstmm.errors import EnvironmentFailure, MstmmError
 
-from .options import Json
+from .options import Json, python_file
 
 OUT_OF_DATE = 2
 
@@ -53,7 +53,7 @@ def _own(files: list[str], json: bool) -> None:
     made: list[dict[str, Any]] = []
     for file in files:
         begin = time.perf_counter()
-        elements = mstmm.generate_file(file)
+        elements = mstmm.generate_file(python_file(file))
         seconds = time.perf_counter() - begin
         for each in elements:
             spec = each.spec

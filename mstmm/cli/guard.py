@@ -92,8 +92,11 @@ def explain(error: BaseException) -> tuple[str, int]:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("mstmm"):
         return f"the package {error.name} is missing; install it: pip install {error.name}", 3
     if isinstance(error, OSError):
-        place = f"{error.filename}: " if error.filename is not None else ""
-        return f"{place}{error.strerror or error}", ENVIRONMENT
+        name = f"{error.filename}: " if error.filename is not None else ""
+        return f"{name}{error.strerror or error}", ENVIRONMENT
+    place = _in_a_users_file(error)
+    if place is not None:
+        return f"{place}: {type(error).__name__}: {error}", BAD_INPUT
     if isinstance(error, SystemExit):
         return f"a file that was run asked to stop ({error}); take the exit out of it", BAD_INPUT
     return (
@@ -102,6 +105,15 @@ def explain(error: BaseException) -> tuple[str, int]:
         "The same command with MSTMM_DEBUG=1 in the environment shows where it happened.",
         DEFECT,
     )
+
+
+def _in_a_users_file(error: BaseException) -> str | None:
+    """File and line of a definition of the user's from which the exception came."""
+    place = None
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        if str(frame.f_globals.get("__name__")).startswith("mstmm_user_"):
+            place = f"{frame.f_code.co_filename}: line {line}"
+    return place
 
 
 def _usage(error: BaseException) -> str:

@@ -133,3 +133,12 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
         raise EnvironmentFailure(
             f"{option} {text}: nothing can be written there ({error.strerror}); take another place"
         ) from None
+
+
+def python_file(path: str) -> str:
+    """A Python file that is there.  MstmmError for anything else."""
+    if not path.endswith(".py"):
+        raise MstmmError(f"{quoted(path)}: expected a Python file (.py) that defines elements")
+    if "\0" in path or not os.path.isfile(path):
+        raise MstmmError(f"{quoted(path)}: there is no such Python file; check the path")
+    return path

@@ -43,12 +43,18 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
         return result.table(*names, rows=rows)
     from mstmm.runtime.table import default_names
 
-    chosen = [*default_names(result), "energy"]
+    chosen = [*(default_names(result) or _tip(result)), "energy"]
     text = result.table(*chosen, rows=rows)
     while len(chosen) > 1 and max(map(len, text.splitlines())) > width:
         del chosen[-2]
         text = result.table(*chosen, rows=rows)
     return text
+
+
+def _tip(result: Result) -> list[str]:
+    """Where the last body's last end is, for scenes whose coordinates are all quaternions."""
+    body = result.model.scene.body[-1:]
+    return [f"{'.'.join([b.name, *list(b.ends)[-1:]])}.{axis}" for b in body for axis in "xyz"]
 
 
 def to_json(result: Result, seconds: float) -> dict[str, Any]:
@@ -93,7 +99,7 @@ def _certificate(result: Result) -> dict[str, Any]:
 def certificate_lines(result: Result, width: int) -> list[str]:
     """What vouches for a result, and every warning, folded to the width of the terminal."""
     certificate = result.certificate
-    lines = str(certificate).splitlines()
+    lines = str(certificate).replace("certify=True", "--certify").splitlines()
     found = [w for w in result.warnings if w not in certificate.warnings]
     lines += [f"note: {warning}" for warning in found]
     return [part for line in lines for part in _folded(line, width)]

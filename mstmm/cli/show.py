@@ -8,7 +8,7 @@ import typer
 
 from mstmm.errors import ElementError
 
-from .options import Json, output_file, quoted
+from .options import Json, output_file, python_file, quoted
 
 if TYPE_CHECKING:
     from mstmm.derive.show_document import ElementView
@@ -90,7 +90,7 @@ def _views(element: str, at: str) -> list[ElementView]:
         from mstmm.derive.checks import check
         from mstmm.derive.registry import load_file
 
-        defined = load_file(element)
+        defined = load_file(python_file(element))
         for each in defined:
             check(each)
         return [views.of_element(each) for each in defined]

@@ -16,7 +16,7 @@ import typer
 from mstmm.errors import MstmmError, NumericalFailure, SceneError
 
 from .extras import need_for, result_ending
-from .options import Json, Times, not_negative, output_file, positive, times
+from .options import Json, Times, not_negative, output_file, positive, python_file, times
 from .progress import Bar, bar
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def use_files(paths: list[str]) -> None:
         import mstmm
 
         for path in paths:
-            mstmm.generate_file(path)
+            mstmm.generate_file(python_file(path))
 
 
 def _model(plan: Plan) -> Model:
@@ -191,7 +191,7 @@ def compiled(path: str, scene: Scene) -> Model:
         model = mstmm.compile(scene)
         udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
-        raise SceneError(f"{path}: {error}") from None
+        raise SceneError(f"{path}: " + str(error).removeprefix("scene: ")) from None
     if not np.isfinite(udot).all():
         raise SceneError(f"{path}: the accelerations at the start are not finite")
     return model

@@ -127,15 +127,31 @@ def test_ascii_terminal(folder: Path) -> None:
     assert done.returncode == 0 and done.stderr == ""
 
 
-@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_run_keeps_its_result(folder: Path, which: signal.Signals) -> None:
+def interrupted(folder: Path, which: signal.Signals, *more: str) -> str:
+    """What a run says on stderr that is interrupted after a while; its result is a.csv."""
+    options = ["--t-end", "1e7", "--times", "1e3", "-o", "a.csv", *more]
     run = subprocess.Popen(
-        [*PROGRAM, "simulate", "pendulum.toml", "--t-end", "1e7", "--times", "1e4", "-o", "a.csv"],
+        [*PROGRAM, "simulate", "pendulum.toml", *options],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     time.sleep(3.0)
     run.send_signal(which)
-    out, err = run.communicate(timeout=30)
+    out, err = run.communicate(timeout=60)
     assert run.returncode == 130, err
-    assert "Traceback" not in err + out and "--resume" in err
-    assert len((folder / "a.csv").read_text().splitlines()) > 1
+    assert "Traceback" not in err + out
+    return err
+
+
+def test_interrupted_run_keeps_its_result_and_goes_on(folder: Path) -> None:
+    assert "--resume" in interrupted(folder, signal.SIGINT)
+    first = (folder / "a.csv").read_text().splitlines()
+    interrupted(folder, signal.SIGTERM, "--resume")
+    second = (folder / "a.csv").read_text().splitlines()
+    assert 2 < len(first) < len(second)
+    assert second[: len(first)] == first
+
+
+def test_checkpoint_of_another_run_is_refused(folder: Path) -> None:
+    interrupted(folder, signal.SIGINT)
+    done = program(folder, "simulate", "pendulum.toml", "-o", "a.csv", "--resume")
+    assert done.returncode == 2 and "checkpoint" in done.stderr
