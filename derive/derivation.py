@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -116,7 +117,8 @@ def vector(name: str, length: int) -> sp.MatrixSymbol:
 
 def tilde(a: sp.MatrixBase | sp.MatrixExpr | Iterable[sp.Expr]) -> sp.ImmutableDenseMatrix:
     """Cross-product matrix: tilde(a) b = a x b."""
-    x, y, z = a if not hasattr(a, "shape") else (a[0, 0], a[1, 0], a[2, 0])
+    matrix: Any = a
+    x, y, z = (matrix[i, 0] for i in range(3)) if hasattr(a, "shape") else a
     return sp.ImmutableDenseMatrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 

@@ -76,7 +76,7 @@ def _friction(p: dict[str, sp.Expr], u: sp.Expr) -> sp.Expr:
 
 # --- rotations by quaternion: a potential of swing and unwrapped twist ------------------------
 
-#: Law parameters: stiffness about x', y' (swing) and z' (twist), rest twist, damping about x', y', z'.
+#: Stiffness about x', y' (swing) and z' (twist), rest twist, damping about x', y', z'.
 ROTATIONAL = ("kx", "ky", "kz", "rest_twist", "cx", "cy", "cz")
 
 

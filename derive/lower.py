@@ -44,7 +44,7 @@ def lower(
         lowering.define(equation)
     for condition, code, message in guards:
         lowering.graph.guard(lowering.scalar(condition), code, message)
-    values = {q.name: lowering.stored(q) for q in derivation.outputs}
+    values: dict[str, object] = {q.name: lowering.stored(q) for q in derivation.outputs}
     return lowering.graph.kernel(
         name,
         [port(q) for q in derivation.inputs],

@@ -81,13 +81,11 @@ def dimension_of(expression: sp.Expr, known: Mapping[sp.Basic, Dimension]) -> Di
     for argument in expression.args:
         found = dimension_of(argument, known)
         if found not in (None, _NONE):
-            raise Misfit(f"{expression.func}({argument}) takes a pure number, found {text(found)}")  # type: ignore[arg-type]
+            raise Misfit(f"{expression.func}({argument}) takes a pure number, found {text(found)}")
     return _NONE
 
 
-def _common(
-    terms: object, known: Mapping[sp.Basic, Dimension], where: str
-) -> Dimension | None:
+def _common(terms: object, known: Mapping[sp.Basic, Dimension], where: str) -> Dimension | None:
     found: Dimension | None = None
     for term in terms:  # type: ignore[attr-defined]
         here = dimension_of(term, known)

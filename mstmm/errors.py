@@ -38,4 +38,4 @@ class NumericalFailure(MstmmError):
 
 
 class UndeterminedMotion(NumericalFailure):
-    """A hinge whose acceleration nothing determines, because what it carries has no inertia there."""
+    """A hinge whose acceleration nothing determines: what it carries has no inertia there."""

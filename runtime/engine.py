@@ -1,4 +1,4 @@
-"""Calls into the looped engine: numpy in, numpy out, failures as sentences that name the element."""
+"""Calls into the looped engine: numpy in, numpy out, failures as sentences naming the element."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT = 1, 2, 3, 4, 5, 6
 
 @dataclass(frozen=True)
 class Probe:
-    """A point with axes: body position in the topology (-1 ground), axes (9), offset (3), internal."""
+    """A point with axes: body in the topology (-1 ground), axes (9), offset (3), internal axes."""
 
     body: int
     axes: tuple[float, ...]
@@ -81,7 +81,9 @@ class Engine:
         """Memory at the start: nothing released, no turns counted."""
         return np.zeros(max(1, self.packed.n_memory))
 
-    def batch(self, name: str, value: ArrayLike, width: int, lead: tuple[int, ...] | None = None) -> Array:
+    def batch(
+        self, name: str, value: ArrayLike, width: int, lead: tuple[int, ...] | None = None
+    ) -> Array:
         """(n, width) contiguous copy of the last axis; SceneError for a misfit or a non-number."""
         array = np.ascontiguousarray(np.asarray(value, dtype=np.float64))
         if array.ndim == 0 or array.shape[-1] != width:
@@ -95,7 +97,7 @@ class Engine:
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
     ) -> tuple[Array, Array]:
-        """(qdot, udot) of n states; q (n, nq), u (n, nu), memory (n, m), efforts (n, nu) or None."""
+        """(qdot, udot) of n states: q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
         n = len(q)
         times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=np.float64), (n,)))
         qdot, udot = np.empty((n, self.nq)), np.empty((n, self.nu))
@@ -207,13 +209,13 @@ class Engine:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
         if reason == _PIVOT:
             return (
-                f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical transfer matrix '
+                f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '
                 'vanishes, so the product does not exist in this state; use sweep = "riccati"'
             )
         if reason == _PRODUCT:
             return (
-                f"the product of transfer matrices {at}: its deviation from the Riccati sweep exceeds "
-                'the accuracy asked for (errors grow geometrically along the chain); '
+                f"the product of transfer matrices {at}: its deviation from the Riccati sweep "
+                "exceeds the accuracy asked for (errors grow geometrically along the chain); "
                 'use sweep = "riccati"'
             )
         return f"an expression of the scene cannot be evaluated {at}"

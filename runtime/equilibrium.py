@@ -24,9 +24,7 @@ _MAX_ITERATIONS = 100
 def moved(model: Model, q: Array, increment: Array) -> Array:
     """q after a small motion `increment` (nu) along the speeds; quaternions stay unit."""
     engine = model._engine
-    rates, _ = engine.accelerations(
-        0.0, q[None].copy(), increment[None].copy(), model._memory(1)
-    )
+    rates, _ = engine.accelerations(0.0, q[None].copy(), increment[None].copy(), model._memory(1))
     result = q + rates[0]
     for first in model.layout.quaternions:
         unit = result[first : first + 4]
@@ -129,6 +127,7 @@ def _refuse_undetermined(model: Model, slope: Array, free: list[int]) -> None:
     share = np.abs(np.array(loose)).max(axis=0)
     names = [model.layout.u_names[free[j]] for j in np.nonzero(share > 0.1)[0]]
     raise NumericalFailure(
-        "the equilibrium is undetermined along " + ", ".join(names)
+        "the equilibrium is undetermined along "
+        + ", ".join(names)
         + ": nothing pushes these coordinates back; fix them, drive them or add a stiffness"
     )

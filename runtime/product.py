@@ -50,16 +50,16 @@ def _refuse(packed: Packed) -> None:
             )
         if _KINDS[kind] != _KINDS[types[0]]:
             raise SceneError(
-                f'hinge "{name}": a {kind} behind a {types[0]} has no classical matrix, because its '
-                f"condition does not determine the free accelerations before it; {way_out}"
+                f'hinge "{name}": a {kind} behind a {types[0]} has no classical matrix, because '
+                f"its condition does not determine the free accelerations before it; {way_out}"
             )
     for body in scene.body:
         if body.type != "rigid" or body.mass == 0:
             raise SceneError(
-                f'body "{body.name}": the classical matrix is that of a rigid body with mass; {way_out}'
+                f'body "{body.name}": the classical matrix needs a rigid body with mass; {way_out}'
             )
-    for hinge in scene.hinge:
-        if hinge.drive is not None or any(hinge.law.inertia):
+    for joint in scene.hinge:
+        if joint.drive is not None or any(joint.law.inertia):
             raise SceneError(
-                f'hinge "{hinge.name}": drives and rotor inertia have no classical matrix; {way_out}'
+                f'hinge "{joint.name}": drives and rotor inertia have no matrix; {way_out}'
             )

@@ -35,7 +35,7 @@ def library_suffix() -> str:
 def build(sources: list[Path], target: Path) -> None:
     """Compile `sources` into the shared library `target`; nothing is left behind on failure.
 
-    The library is built beside the target and renamed into place, so that no reader sees half a file.
+    The library is built beside the target and renamed, so that no reader sees half a file.
     Raises EnvironmentFailure with the compiler's first lines if it fails, hangs or is missing.
     """
     program = compiler()
@@ -50,10 +50,17 @@ def build(sources: list[Path], target: Path) -> None:
     command = [program, *flags, "-fPIC", "-shared", *map(str, sources), "-lm", "-o", temporary]
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, timeout=TIMEOUT, check=False, stdin=subprocess.DEVNULL
+            command,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            check=False,
+            stdin=subprocess.DEVNULL,
         )
         if done.returncode != 0:
-            first = "\n".join(done.stderr.strip().splitlines()[:5]) or f"exit code {done.returncode}"
+            first = (
+                "\n".join(done.stderr.strip().splitlines()[:5]) or f"exit code {done.returncode}"
+            )
             raise EnvironmentFailure(f"{program} could not compile {sources[0].name}: {first}")
         os.replace(temporary, target)
     except subprocess.TimeoutExpired:

@@ -58,7 +58,7 @@ def resolver(
     length: bool = False,
     probes: dict[tuple[str, str], int] | None = None,
 ) -> Resolver:
-    """Nodes of names: t, own and other hinges' q and u, parameters, a spring's length, positions."""
+    """Nodes of names: t, q and u of hinges, parameters, a spring's length, positions."""
 
     def resolve(name: Name) -> Node:
         quantity, index = name.quantity, name.index or 0
@@ -103,7 +103,7 @@ def effort_tape(effort: Expression, layout: Layout) -> Tape:
 def event_tape(
     conditions: Sequence[tuple[Expression, Hinge | None]], layout: Layout
 ) -> tuple[Tape, list[tuple[str, str]]]:
-    """t, q, u, positions -> g per condition, g >= 0 where it holds; and the (body, end) it reads."""
+    """t, q, u, positions -> g per condition, g >= 0 where it holds; and the ends it reads."""
     graph = Graph()
     probes: dict[tuple[str, str], int] = {}
     nodes = []
