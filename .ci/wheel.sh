@@ -21,3 +21,11 @@ mkdir "$scratch/elsewhere"
 cd "$scratch/elsewhere"
 PATH="$scratch/venv/bin:$PATH"
 python "$ROOT/.ci/check_installed.py" "$ROOT"
+
+echo "--- the demo with the core alone"
+mstmm demo | tee demo.out
+test -s demo.csv
+grep -q 'mstmm\[' demo.out || grep -q "'\.\[" demo.out      # names the extra that it misses
+mstmm show pin --at c >pin.c
+test -s pin.c
+mstmm list
