@@ -2,6 +2,13 @@
 
 The residual (force and moment at the input end that a motion needs) is linear in the
 accelerations; its derivative is the mass matrix, its value at the bias motion the load f_bias.
+
+A body states its equations in axes and about an origin of its own, and may be held anywhere: the
+motion of the internal frame (point P, hinge axes) is carried to the body's own frame and the load
+carried back.  R_u (internal to own axes) and r_u (P from the own origin, own axes) are twelve
+numbers behind the parameters:
+
+    a_O = X a_P + [w x (w x -r_u); 0],   X = [R_u  r_u~ R_u; 0  R_u],   f_P = X^T f_O
 """
 
 from __future__ import annotations
@@ -10,15 +17,30 @@ import sympy as sp
 
 from mstmm.errors import ElementError
 
-from .derivation import Derivation, Equation, Quantity, vector
+from .derivation import Derivation, Equation, Quantity, tilde, vector
 from .element import Body, Symbols
 from .sweep import E, MOTION, S
 
 
+#: Numbers of R_u and r_u.
+FRAME = 12
+
+
 def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
     p = Symbols("p", tuple(x.name for x in body.parameters))
-    array = vector("p", len(p))
-    return p, array, Quantity(array, "", "parameters of the body, body axes, about its input end")
+    array = vector("p", len(p) + (0 if body.in_hinge_axes else FRAME))
+    meaning = "parameters of the body"
+    meaning += ", body axes, about its input end" if body.in_hinge_axes else ", then R_u and r_u"
+    return p, array, Quantity(array, "", meaning)
+
+
+def _frame(body: Body, array: sp.MatrixSymbol) -> tuple[sp.Matrix, sp.Matrix, sp.BlockMatrix]:
+    """(R_u, r_u~, X): from the internal frame to the body's own."""
+    first = len(body.parameters)
+    turn = sp.ImmutableDenseMatrix(3, 3, lambda i, j: array[first + 3 * i + j, 0])
+    lever = tilde(_triple(array, first + 9))
+    x = sp.BlockMatrix([[turn, lever * turn], [sp.zeros(3, 3), turn]])
+    return turn, lever, x
 
 
 def _evaluated(matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
@@ -58,7 +80,7 @@ def inertia(body: Body) -> Derivation:
         f"mass matrix of the {body.title}",
         (parameters,),
         (S,),
-        (Equation("S = d residual / d acceleration", S.symbol, _evaluated(mass, p, array)),),
+        _mass_equations(body, array, _evaluated(mass, p, array)),
         sources=body.sources,
     )
 
@@ -66,14 +88,15 @@ def inertia(body: Body) -> Derivation:
 def bias_load(body: Body) -> Derivation:
     """e of the body alone: residual at the bias motion."""
     p, array, parameters = _columns(body)
-    motion = MOTION.symbol
+    carried = () if body.in_hinge_axes else _motion_equations(body, array)
+    motion = carried[-1].left if carried else MOTION.symbol
     residual = body.residual(_triple(motion, 6), _triple(motion, 3), _triple(motion, 0), p)
     return Derivation(
         body.name,
         f"load that the bias motion of the {body.title} needs",
         (parameters, MOTION),
         (E,),
-        (Equation("e = residual at the bias motion", E.symbol, _evaluated(residual, p, array)),),
+        (*carried, *_load_equations(body, array, _evaluated(residual, p, array))),
         sources=body.sources,
     )
 
@@ -83,12 +106,72 @@ def kinetic_energy(body: Body) -> Derivation:
     p, array, parameters = _columns(body)
     v, w = vector("v", 3), vector("w", 3)
     energy = sp.MatrixSymbol("T", 1, 1)
-    value = sp.Matrix([[body.kinetic_energy(_triple(v, 0), _triple(w, 0), p)]])
+    carried = () if body.in_hinge_axes else _velocity_equations(body, array, v, w)
+    v_own, w_own = (carried[1].left, carried[0].left) if carried else (v, w)
+    value = sp.Matrix([[body.kinetic_energy(_triple(v_own, 0), _triple(w_own, 0), p)]])
     return Derivation(
         body.name,
         f"kinetic energy of the {body.title}",
         (parameters, Quantity(v, "m/s", "velocity of P"), Quantity(w, "rad/s", "angular velocity")),
         (Quantity(energy, "J", "kinetic energy"),),
-        (Equation("kinetic energy", energy, _evaluated(value, p, array)),),
+        (*carried, Equation("kinetic energy", energy, _evaluated(value, p, array))),
         sources=body.sources,
+    )
+
+
+# --- between the internal frame and the body's own ----------------------------------------------
+
+
+def _mass_equations(
+    body: Body, array: sp.MatrixSymbol, mass: sp.ImmutableDenseMatrix
+) -> tuple[Equation, ...]:
+    if body.in_hinge_axes:
+        return (Equation("S = d residual / d acceleration", S.symbol, mass),)
+    own, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
+    carry = sp.MatrixSymbol("X", 6, 6)
+    return (
+        Equation("d residual / d acceleration, own frame", own, mass),
+        Equation("X", carry, x),
+        Equation("S = X^T S_O X", S.symbol, carry.T * own * carry),
+    )
+
+
+def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    motion, (turn, lever, _) = MOTION.symbol, _frame(body, array)
+    w, wd, own = vector("w_O", 3), vector("wd_O", 3), vector("motion_O", 9)
+    spin = tilde(_triple(w, 0))
+    minus_r = -sp.ImmutableDenseMatrix(_triple(array, len(body.parameters) + 9))
+    a = turn * sp.ImmutableDenseMatrix(_triple(motion, 6)) + lever * wd + spin * (spin * minus_r)
+    return (
+        Equation(
+            "angular velocity, own axes", w, turn * sp.ImmutableDenseMatrix(_triple(motion, 0))
+        ),
+        Equation(
+            "angular acceleration, own axes", wd, turn * sp.ImmutableDenseMatrix(_triple(motion, 3))
+        ),
+        Equation("bias motion of the own origin", own, sp.BlockMatrix([[w], [wd], [a]])),
+    )
+
+
+def _load_equations(
+    body: Body, array: sp.MatrixSymbol, residual: sp.ImmutableDenseMatrix
+) -> tuple[Equation, ...]:
+    if body.in_hinge_axes:
+        return (Equation("e = residual at the bias motion", E.symbol, residual),)
+    own, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
+    return (
+        Equation("residual at the bias motion, own frame", own, residual),
+        Equation("X", carry, x),
+        Equation("e = X^T e_O", E.symbol, carry.T * own),
+    )
+
+
+def _velocity_equations(
+    body: Body, array: sp.MatrixSymbol, v: sp.MatrixSymbol, w: sp.MatrixSymbol
+) -> tuple[Equation, ...]:
+    turn, lever, _ = _frame(body, array)
+    spin, velocity = vector("w_O", 3), vector("v_O", 3)
+    return (
+        Equation("angular velocity, own axes", spin, turn * w),
+        Equation("velocity of the own origin", velocity, turn * v + lever * spin),
     )

@@ -70,7 +70,7 @@ class Hinge:
         return None
 
     def subspace(self, q: Symbols, p: Symbols) -> sp.Matrix | None:
-        """H (6 x nu, rows v then w, P axes) if the author wants to state it; checked, not trusted."""
+        """H (6 x nu, rows v then w, P axes) if the author states it; checked, not trusted."""
         return None
 
     def bias(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
@@ -87,13 +87,19 @@ class Body:
 
     `residual` gives [force; moment about the input end] (6 x 1, body axes) that produces linear
     acceleration a of the input end, angular acceleration alpha, at angular velocity w, without
-    external loads.  It is linear in a and alpha; its mass matrix is its derivative.
+    external loads.  It is linear in a and alpha; its mass matrix is its derivative.  Axes and origin
+    are those of the body's table in the scene, by whichever end it is held.
+
+    `kinetic_energy` is the energy that the residual's power feeds.  What something inside the body
+    spends (a motor that keeps a wheel at its rate) is neither in the one nor in the other.
     """
 
     name: ClassVar[str]
     title: ClassVar[str] = ""
     parameters: ClassVar[tuple[Param, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
+    #: True if whoever packs the scene gives the parameters in hinge axes about the input end.
+    in_hinge_axes: ClassVar[bool] = False
 
     def residual(self, a: sp.Matrix, alpha: sp.Matrix, w: sp.Matrix, p: Symbols) -> sp.Matrix:
         """Needed [force; moment] at the input end, 6 x 1, body axes."""
@@ -110,7 +116,8 @@ class ForceElement:
     `wrench` gives force (3 x 1) and moment (3 x 1) on the T end at its point, in F axes, from the
     relative motion in F axes: position x of T from F, its rate v as seen from F, rotation R (T to
     F axes), relative angular velocity w.  The F end receives the opposite, shifted by x.
-    `potential`, if there is one, is a function of x and R alone; what the wrench does beyond it counts as work.
+    `potential`, if there is one, is a function of x alone; what the wrench does beyond it counts as
+    work.
     """
 
     name: ClassVar[str]

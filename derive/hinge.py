@@ -12,6 +12,7 @@ these relations hinge by hinge (ch. 5, sections 5.6 to 5.8); here they are one d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 
@@ -64,8 +65,9 @@ def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
     )
 
 
+@lru_cache(maxsize=32)
 def motion_of(hinge: Hinge) -> HingeMotion:
-    """Derive H and c.  Raises ElementError naming the equation that a definition contradicts."""
+    """Derive H and c, once for each definition.  Raises ElementError naming the equation that a definition contradicts."""
     speeds = speeds_of(hinge)
     q = Symbols("q", tuple(c.name for c in hinge.coordinates))
     u = Symbols("u", tuple(s.name for s in speeds))
@@ -134,6 +136,8 @@ def simplify_entry(entry: sp.Expr) -> sp.Expr:
         candidates = [entry, sp.factor_terms(sp.cancel(sp.together(entry)))]
     elif entry.count_ops() > SIMPLIFY_LIMIT:
         return entry
+    elif any(not power.exp.is_integer for power in entry.atoms(sp.Pow)):
+        candidates = [entry, sp.factor_terms(entry)]  # under roots angles are collected too slowly
     else:
         candidates = [entry, sp.trigsimp(sp.expand(entry)), sp.factor_terms(entry)]
     return min(candidates, key=lambda e: (e.count_ops(), str(e)))

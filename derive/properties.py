@@ -167,6 +167,8 @@ def some(count: int, numbers: random.Random) -> list[Any]:
 
 def _relative_motion(hinge: _Hinge, nu: int, worst: Worst) -> None:
     found = hinge.kernel(hinge.q, hinge.u)
+    if any(abs(x) > SINGULAR for x in found["qdot"]):
+        raise ArithmeticError("the coordinates fail here")
     turn, turn_rate, turn_second = derivatives(hinge.rotation)
     _, rate, second = derivatives(hinge.position)
     worst.see("R^T R = I", turn.T * turn, mp.eye(3), ALGEBRA)
@@ -300,11 +302,13 @@ def body_properties(call: Call, source: Source, count: int) -> tuple[Property, .
     worst, numbers = Worst(), random.Random(13)
     with mp.workdps(DIGITS):
         for _ in range(3):
-            _body_power(call, source.parameter_values(count, numbers), numbers, worst)
+            own = source.parameter_values(len(source.parameters), numbers)
+            frame = [*rotation(numbers), *some(3, numbers)] if count > len(own) else []
+            _body_power(call, [*own, *frame], numbers, worst)
     return worst.properties()
 
 
-def _body_power(call: Call, p: Numbers, numbers: random.Random, worst: Worst) -> None:
+def _body_power(call: Call, p: list[Any], numbers: random.Random, worst: Worst) -> None:
     v, w, a, alpha = (column(some(3, numbers)) for _ in range(4))
     inertia = full(call("inertia", {"p": p})["S"], 6)
     gyroscopic = call("bias_load", {"p": p, "motion": [*w, 0, 0, 0, 0, 0, 0]})["e"]

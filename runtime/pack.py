@@ -188,7 +188,7 @@ class _Packing:
     ) -> tuple[float, ...]:
         if hinge.type in HINGE_TYPES:
             return builtin
-        return tuple(hinge.parameters[name] for name in kernel.parameters)
+        return user_parameters(kernel, hinge.parameters, f'hinge "{hinge.name}"')
 
     def _hinge_functions(self, record: Any, kernel: Element) -> None:
         for name in ("hinge", "forward", "condense", "recover"):
@@ -207,12 +207,10 @@ class _Packing:
             record.body_p = self.reals(self._user_body(body, element, place))
 
     def _user_body(self, body: Any, element: Element, place: Placement) -> tuple[float, ...]:
-        if place != GROUND:
-            raise SceneError(
-                f'scene: body "{body.name}": a body of type "{body.type}" states its equations in '
-                "its own axes: hold it at its origin by a hinge whose axis is z"
-            )
-        return tuple(body.parameters[name] for name in element.parameters)
+        """Parameters, then the internal frame in the body's own: rotation (9) and origin (3)."""
+        numbers = user_parameters(element, body.parameters, f'body "{body.name}"')
+        turn = place.rotation
+        return (*numbers, *turn[0], *turn[1], *turn[2], *place.origin)
 
     def _imposed(self, record: Any, hinge: Hinge, slots: HingeSlots) -> None:
         held = hinge.type == "fixed" and slots.nu > 0
@@ -287,7 +285,8 @@ class _Packing:
                     record.effort = self._c_tape(values.effort_tape(law.effort, self.layout))
                     self.values.breaks.update(law.effort.time_breaks())
             else:
-                record.p = self.reals(tuple(spring.parameters[n] for n in element.parameters))
+                given = user_parameters(element, spring.parameters, f'spring "{spring.name}"')
+                record.p = self.reals(given)
         packed.model.forces, packed.model.n_forces = records, len(self.scene.spring)
         packed.model.needs_pose = int(bool(self.scene.spring or self.scene.load))
 
@@ -318,6 +317,29 @@ class _Packing:
         for event in self.scene.event:
             breaks.update(event.when.time_breaks())
         return breaks
+
+
+def user_parameters(
+    element: Element, given: Mapping[str, float], where: str
+) -> tuple[float, ...]:
+    """Numbers of a user's element in its order, defaults filled in.
+
+    Raises SceneError naming the element of the scene (`where`) for what is missing or out of bounds.
+    """
+    numbers = []
+    for p in element.declared:
+        value = given.get(p.name, p.default)
+        problem = ""
+        if value is None:
+            problem = "missing; expected a number"
+        elif p.minimum is not None and value < p.minimum:
+            problem = f"expected {p.minimum:g} {p.unit} or more, found {value:g}"
+        elif p.maximum is not None and value > p.maximum:
+            problem = f"expected {p.maximum:g} {p.unit} or less, found {value:g}"
+        if value is None or problem:
+            raise SceneError(f"scene: {where}: parameters.{p.name}: {problem}")
+        numbers.append(float(value))
+    return tuple(numbers)
 
 
 def resize(packed: Packed, slots: int) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from mstmm import abi
 from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.spec import Param
 from mstmm.tape import Tape
 
 
@@ -24,6 +25,7 @@ class Element:
     guards: dict[str, dict[int, str]]
     descriptor: Any
     tape: Tape | None = None  # hinge kernel of an element without a library
+    declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
     owner: Any = None  # keeps the library or the arrays of the descriptor alive
 
 

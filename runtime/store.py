@@ -137,7 +137,7 @@ def _from_library(stored: ElementSpec, library: Path) -> Element:
         ) from error
     ffi, _ = prebuilt.module()
     element = prebuilt.describe(ffi, ffi.cast("mstmm_element *", address))
-    return replace(element, owner=(separate, lib))
+    return replace(element, declared=stored.parameters, owner=(separate, lib))
 
 
 def _interpreted(stored: ElementSpec) -> Element:
@@ -161,7 +161,7 @@ def _interpreted(stored: ElementSpec) -> Element:
     return Element(
         stored.kind, stored.name, arrays["nq"], arrays["nu"],
         tuple(p.name for p in stored.parameters), {}, {}, descriptor,
-        tape=compile_tape(kernel), owner=kept,
+        tape=compile_tape(kernel), declared=stored.parameters, owner=kept,
     )  # fmt: skip
 
 
