@@ -51,6 +51,7 @@ class Plan:
     quantities: tuple[str, ...]
     certify: bool | None
     resume: bool
+    sweep: str = "riccati"
 
     @property
     def checkpoint(self) -> Path:
@@ -110,6 +111,11 @@ def simulate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted run, with the same options.")
     ] = False,
+    sweep: Annotated[
+        str,
+        typer.Option("--sweep", metavar="NAME", help="riccati, or product: the plain product of "
+                     "transfer matrices, for chains, guarded."),
+    ] = "riccati",
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -117,7 +123,7 @@ def simulate(
         scene, t_end, method, step, rtol, atol, times,
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
-        tuple(quantity or ()), certify, resume,
+        tuple(quantity or ()), certify, resume, sweep,
     )  # fmt: skip
     _refuse_endless(plan)
     need_for(plan.output, "--output")
@@ -169,7 +175,7 @@ def _model(plan: Plan) -> Model:
     """The compiled scene, with every quantity that was asked for in it."""
     import mstmm
 
-    model = compiled(plan.scene, mstmm.load_scene(plan.scene))
+    model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         for name in plan.quantities:
@@ -177,7 +183,7 @@ def _model(plan: Plan) -> Model:
     return model
 
 
-def compiled(path: str, scene: Scene) -> Model:
+def compiled(path: str, scene: Scene, sweep: str = "riccati") -> Model:
     """The model of a scene file.
 
     SceneError, with the file named, also where the accelerations of the start cannot be computed:
@@ -188,7 +194,7 @@ def compiled(path: str, scene: Scene) -> Model:
     import mstmm
 
     try:
-        model = mstmm.compile(scene)
+        model = mstmm.compile(scene, sweep=sweep)
         udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
         raise SceneError(f"{path}: " + str(error).removeprefix("scene: ")) from None

@@ -72,7 +72,7 @@ def test_hinge_option_replaces_generate(mstmm: Command, knee: Path) -> None:
         ('name = "knee"', 'name = "pin"', "built in"),
         ('name = "knee"', 'name = "not a name"', "name"),
         ("import sympy as sp", "import sympy as sp\n1 / 0", "ZeroDivisionError"),
-        ("import sympy as sp", "import sympy as sp\nraise SystemExit(0)", "stop"),
+        ("import sympy as sp", "import sympy as sp\nraise SystemExit(0)", "SystemExit"),
         ("import sympy as sp", "import no_such_package", "no_such_package"),
         ("class Knee(Hinge):", "class Knee(Hinge:", "SyntaxError"),
     ],
