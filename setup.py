@@ -1,4 +1,4 @@
-"""Builds the compiled kernels, one binary for every Python from 3.11; the rest is pyproject.toml."""
+"""Builds the compiled kernels, one binary for every Python from 3.11; see pyproject.toml."""
 
 from setuptools import setup
 
