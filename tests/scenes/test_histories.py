@@ -51,3 +51,18 @@ def test_history(name: str) -> None:
     for number, body in enumerate(read(scene).bodies):
         place = found.position(body.name)
         assert np.abs(place - other.position[:, number]).max() < 1e-7 * size
+
+
+def test_history_through_stops_with_friction() -> None:
+    """The arm starts in its upper stops, moving into them."""
+    scene = load("arm_with_limits")
+    q, u, times = np.array([0.79, 2.19]), np.array([1.0, 1.5]), np.linspace(0.0, 0.1, 5)
+    other = dae.simulate(scene, times, q, u, rtol=1e-9, atol=1e-10)
+    found = mstmm.compile(mstmm.Scene(**scene)).simulate(
+        0.1, rtol=1e-11, atol=1e-13, output_times=times, initial=(q, u)
+    )
+    assert found.success, found.message
+    assert found.q.max(axis=0) == pytest.approx(other.q.max(axis=0), abs=1e-8)
+    assert np.all(found.q.max(axis=0) > [0.8, 2.2])
+    assert np.abs(found.q - other.q).max() < 1e-7
+    assert np.abs(found.u - other.u).max() < 1e-6
