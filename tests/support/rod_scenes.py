@@ -49,9 +49,12 @@ def chain(
             }
         )
         inboard = f"rod{i - 1}.tip" if i else "ground"
-        hinge = {"name": f"hinge{i}", "type": kind, "inboard": inboard, "outboard": f"rod{i}"}
+        hinge: Scene = {
+            "name": f"hinge{i}", "type": kind, "inboard": inboard, "outboard": f"rod{i}",
+        }  # fmt: skip
+        if i == 0:
+            hinge["orientation"] = list(start)
         hinges.append(hinge)
-    hinges[0]["orientation"] = list(start)
     return {"schema_version": 1, "gravity": list(gravity), "body": bodies, "hinge": hinges}
 
 
@@ -78,8 +81,8 @@ def precise_accelerations(scene: Scene, q: Array, u: Array) -> Array:
     """udot of a chain of pins or of balls by a Riccati sweep of its own, in long double.
 
     Body axes, input ends: a = [acceleration; angular acceleration], f = S a + e with f = [force;
-    moment]; what hinge H passes inwards is S - S H D^-1 H^T S, D = H^T S H.  Gravity enters as
-    the acceleration of the ground.
+    moment]; what hinge H passes inwards is S - Y^T Y, Y = L^-1 H^T S, L L^T = H^T S H.  Gravity
+    enters as the acceleration of the ground.
     """
     count, ball = len(scene["body"]), scene["hinge"][0]["type"] == "ball"
     turns = [_turn(scene, q, i, ball) for i in range(count)]
@@ -95,15 +98,14 @@ def precise_accelerations(scene: Scene, q: Array, u: Array) -> Array:
     ]
     tip = _long([1, 0, 0])
     S, e = np.zeros((6, 6), np.longdouble), np.zeros(6, np.longdouble)
-    gains: list[tuple[Long, Long]] = []
+    pivots: list[tuple[Long, Long, Long]] = []
     for i in reversed(range(count)):
         mass, load = _body(scene["body"][i], omega[i + 1])
         S, e = mass + S, load + e
-        inverse = _inverse(subspace.T @ S @ subspace)
-        G = inverse @ subspace.T @ S
-        g = -inverse @ (subspace.T @ (S @ bias[i] + e))
-        gains.append((G, g))
-        S, e = S - S @ subspace @ G, e + S @ (bias[i] + subspace @ g)
+        L = _factor(subspace.T @ S @ subspace)
+        Y, y = _forward(L, subspace.T @ S), -_forward(L, subspace.T @ (S @ bias[i] + e))
+        pivots.append((L, Y, y))
+        S, e = S - Y.T @ Y, e + S @ bias[i] + Y.T @ y
         if i:
             X = np.eye(6, dtype=np.longdouble)
             X[:3, 3:] = -_tilde(tip)
@@ -111,11 +113,11 @@ def precise_accelerations(scene: Scene, q: Array, u: Array) -> Array:
             S, e = X.T @ S @ X, X.T @ (S @ _carried(turns[i], omega[i]) + e)
     a = np.concatenate([-_long(scene["gravity"]), np.zeros(3, np.longdouble)])
     udot = []
-    for i, (G, g) in enumerate(reversed(gains)):
+    for i, (L, Y, y) in enumerate(reversed(pivots)):
         if i:
             a = np.concatenate([a[:3] + np.cross(a[3:], tip), a[3:]])
         a = _both(turns[i].T) @ a + (_carried(turns[i], omega[i]) if i else 0)
-        udot.append(g - G @ a)
+        udot.append(_backward(L, y - Y @ a))
         a = a + subspace @ udot[-1] + bias[i]
     return np.concatenate(udot).astype(float)
 
@@ -181,9 +183,28 @@ def _both(turn: Long) -> Long:
     return out
 
 
-def _inverse(matrix: Long) -> Long:
-    """Inverse of 1 x 1 or 3 x 3 by cofactors."""
-    if len(matrix) == 1:
-        return np.asarray(1 / matrix)
-    rows = np.array([np.cross(matrix[(i + 1) % 3], matrix[(i + 2) % 3]) for i in range(3)])
-    return np.asarray(rows.T / (matrix[0] @ rows[0]))
+def _factor(matrix: Long) -> Long:
+    """Lower triangle L of a symmetric positive definite matrix, L L^T (Cholesky)."""
+    size = len(matrix)
+    L = np.zeros((size, size), np.longdouble)
+    for j in range(size):
+        L[j, j] = np.sqrt(matrix[j, j] - L[j, :j] @ L[j, :j])
+        for i in range(j + 1, size):
+            L[i, j] = (matrix[i, j] - L[i, :j] @ L[j, :j]) / L[j, j]
+    return L
+
+
+def _forward(L: Long, right: Long) -> Long:
+    """L^-1 times columns."""
+    out = np.array(right)
+    for i in range(len(L)):
+        out[i] = (out[i] - L[i, :i] @ out[:i]) / L[i, i]
+    return out
+
+
+def _backward(L: Long, right: Long) -> Long:
+    """L^-T times a column."""
+    out = np.array(right)
+    for i in reversed(range(len(L))):
+        out[i] = (out[i] - L[i + 1 :, i] @ out[i + 1 :]) / L[i, i]
+    return out

@@ -1,0 +1,67 @@
+"""Fixed steps beside a stiff spring or a strong damper: stable below the limit, not above it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.rod_scenes import ROD, chain
+
+import mstmm
+
+#: RK4 is stable for h w below 2 sqrt 2 on the imaginary axis, for h |lambda| below 2.785 on the
+#: real one: |1 + z + z^2/2 + z^3/6 + z^4/24| = 1.
+IMAGINARY, REAL = 2 * np.sqrt(2), 2.785293563405282
+
+#: Inertia of the rod about the pin.
+MU = ROD + 0.25
+
+
+def rod(stiffness: float, damping: float) -> mstmm.Model:
+    scene = chain(["pin"], gravity=(0, 0, 0))
+    scene["hinge"][0]["law"] = {"stiffness": stiffness, "damping": damping}
+    scene["hinge"][0]["initial"] = {"q": [1e-3], "u": [0.0]}
+    return mstmm.compile(mstmm.Scene(**scene))
+
+
+def growth(model: mstmm.Model, step: float, steps: int = 400) -> float:
+    """Size of the last 20 samples over the first 20, each component against its own largest."""
+    times = np.arange(steps + 1) * step
+    result = model.simulate(times[-1], "rk4", step=step, output_times=times)
+    size = np.abs(result.q[:, 0])
+    return float(size[-20:].max() / size[:20].max())
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e8])
+def test_limit_of_an_undamped_spring(stiffness: float) -> None:
+    limit = IMAGINARY / np.sqrt(stiffness / MU)
+    model = rod(stiffness, 0.0)
+    assert growth(model, 0.95 * limit) < 1.0
+    assert growth(model, 1.05 * limit) > 1e6
+
+
+@pytest.mark.parametrize("ratio", [1.0, 5.0])
+@pytest.mark.parametrize("stiffness", [1e2, 1e6])
+def test_limit_of_a_damped_spring(stiffness: float, ratio: float) -> None:
+    rate = np.sqrt(stiffness / MU)
+    fastest = rate * (ratio + np.sqrt(ratio**2 - 1))
+    model = rod(stiffness, 2 * ratio * rate * MU)
+    assert growth(model, 0.95 * REAL / fastest) < 1.0
+    assert growth(model, 1.05 * REAL / fastest) > 1e3
+
+
+@pytest.mark.parametrize(("part", "warns"), [(0.5, False), (0.95, True), (1.05, True)])
+def test_a_step_near_the_limit_brings_a_warning(part: float, warns: bool) -> None:
+    model = rod(1e6, 0.0)
+    step = part * IMAGINARY / np.sqrt(1e6 / MU)
+    result = model.simulate(20 * step, "rk4", step=step)
+    named = [text for text in result.warnings if "hinge0" in text and "too long" in text]
+    assert bool(named) == warns
+
+
+def test_an_adaptive_run_takes_the_stiff_spring() -> None:
+    model = rod(1e6, 0.0)
+    times = np.linspace(0, 0.05, 30)
+    result = model.simulate(times[-1], rtol=1e-10, atol=1e-14, output_times=times)
+    expected = 1e-3 * np.cos(np.sqrt(1e6 / MU) * times)
+    assert np.abs(result.q[:, 0] - expected).max() < 1e-11
+    assert not result.warnings
