@@ -151,5 +151,7 @@ class PinocchioPeer:
         """Joint-space inertia in the scene's speeds, reflected inertias included."""
         upper = np.triu(pin.crba(self.model, self.data, self.coordinates(q)))
         full = upper + np.triu(upper, 1).T
-        columns = np.array([self.back(column) for column in full]).reshape(-1, self.tree.nu)
+        columns = np.array([self.back(column) for column in full]).reshape(
+            self.model.nv, self.tree.nu
+        )
         return np.array([self.back(row) for row in columns.T]).reshape(self.tree.nu, self.tree.nu)
