@@ -19,8 +19,7 @@ from mstmm.errors import ElementError
 
 from .derivation import Derivation, Equation, Quantity, tilde, vector
 from .element import Body, Symbols
-from .sweep import E, MOTION, S
-
+from .sweep import MOTION, E, S
 
 #: Numbers of R_u and r_u.
 FRAME = 12

@@ -87,8 +87,8 @@ class Body:
 
     `residual` gives [force; moment about the input end] (6 x 1, body axes) that produces linear
     acceleration a of the input end, angular acceleration alpha, at angular velocity w, without
-    external loads.  It is linear in a and alpha; its mass matrix is its derivative.  Axes and origin
-    are those of the body's table in the scene, by whichever end it is held.
+    external loads.  It is linear in a and alpha; its mass matrix is its derivative.  Axes and
+    origin are those of the body's table in the scene, by whichever end it is held.
 
     `kinetic_energy` is the energy that the residual's power feeds.  What something inside the body
     spends (a motor that keeps a wheel at its rate) is neither in the one nor in the other.

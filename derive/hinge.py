@@ -67,7 +67,10 @@ def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
 
 @lru_cache(maxsize=32)
 def motion_of(hinge: Hinge) -> HingeMotion:
-    """Derive H and c, once for each definition.  Raises ElementError naming the equation that a definition contradicts."""
+    """Derive H and c, once for each definition.
+
+    Raises ElementError naming the equation that a definition contradicts.
+    """
     speeds = speeds_of(hinge)
     q = Symbols("q", tuple(c.name for c in hinge.coordinates))
     u = Symbols("u", tuple(s.name for s in speeds))

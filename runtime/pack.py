@@ -324,7 +324,7 @@ def user_parameters(
 ) -> tuple[float, ...]:
     """Numbers of a user's element in its order, defaults filled in.
 
-    Raises SceneError naming the element of the scene (`where`) for what is missing or out of bounds.
+    Raises SceneError naming the scene's element (`where`) for what is missing or out of bounds.
     """
     numbers = []
     for p in element.declared:
@@ -350,7 +350,10 @@ def resize(packed: Packed, slots: int) -> None:
     model.workspace = model.scratch + tail
 
 
-def _names(ffi: Any, descriptor: Any) -> tuple[tuple[str, ...], ...]:
+Texts = tuple[str, ...]
+
+
+def _names(ffi: Any, descriptor: Any) -> tuple[Texts, Texts, Texts, Texts]:
     """(q names, q units, u names, u units) of a descriptor."""
     d = descriptor
 

@@ -103,7 +103,8 @@ def spec(key: Key) -> ElementSpec | None:
         return element_from_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ElementError(
-            f"{path}: the stored element is damaged ({error}); generate it again: mstmm generate FILE"
+            f"{path}: the stored element is damaged ({error}); "
+            "generate it again: mstmm generate FILE"
         ) from error
 
 
@@ -130,7 +131,8 @@ def _from_library(stored: ElementSpec, library: Path) -> Element:
     separate.cdef(f"extern mstmm_element {symbol};")  # cffi reads no constant this way
     try:
         lib = separate.dlopen(str(library))
-        address = int(separate.cast("uintptr_t", separate.addressof(lib, symbol)))
+        pointer: Any = separate.addressof(lib, symbol)  # type: ignore[arg-type]
+        address = int(separate.cast("uintptr_t", pointer))
     except (OSError, AttributeError) as error:
         raise EnvironmentFailure(
             f"{library} cannot be opened ({error}); delete it and run: mstmm generate FILE"
