@@ -39,7 +39,7 @@ def check(element: Element) -> None:
 def _check_names(element: Element) -> None:
     if not element.name.isidentifier() or not element.name.isascii():
         raise ElementError(
-            f"{element.name!r} is not a name: letters, digits and underscores, starting with a letter"
+            f"{element.name!r} is not a name: letters, digits, underscores, a letter first"
         )
     groups = [element.parameters]
     if isinstance(element, Hinge):
@@ -68,7 +68,9 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
         _is_rotation(where, motion, point)
         _has_full_rank(where, motion, point)
         _agrees(where, "subspace(q, p)", hinge.subspace(motion.q, motion.p), motion.subspace, point)
-        _agrees(where, "bias(q, u, p)", hinge.bias(motion.q, motion.u, motion.p), motion.bias, point)
+        _agrees(
+            where, "bias(q, u, p)", hinge.bias(motion.q, motion.u, motion.p), motion.bias, point
+        )
     return motion
 
 
@@ -132,8 +134,8 @@ def _is_rotation(where: str, motion: HingeMotion, point: Numbers) -> None:
         defect = mpmath.mnorm(r.T * r - mpmath.eye(3), "f")
         if defect > _TOLERANCE or mpmath.det(r) < 0:
             raise ElementError(
-                f"{where}: rotation(q, p) is not a rotation: |R^T R - I| = {mpmath.nstr(defect, 3)}, "
-                f"det R = {mpmath.nstr(mpmath.det(r), 5)} at "
+                f"{where}: rotation(q, p) is not a rotation: "
+                f"|R^T R - I| = {mpmath.nstr(defect, 3)}, det R = {mpmath.nstr(mpmath.det(r), 5)} at "
                 + ", ".join(f"{k} = {float(v):.3g}" for k, v in point.items())
             )
 
@@ -143,10 +145,11 @@ def _has_full_rank(where: str, motion: HingeMotion, point: Numbers) -> None:
         return
     with mpmath.workdps(_DIGITS):
         singular = mpmath.svd_r(_numeric(motion.subspace, point), compute_uv=False)
-        if singular[motion.nu - 1] < singular[0] * mpmath.mpf(10) ** -12:
+        rank = sum(1 for s in singular if s > singular[0] * mpmath.mpf(10) ** -12)
+        if rank < motion.nu:
             raise ElementError(
                 f"{where}: the {motion.nu} speeds give only "
-                f"{sum(1 for s in singular if s > singular[0] * mpmath.mpf(10) ** -12)} independent "
+                f"{rank} independent "
                 "motions (the motion subspace H loses rank); remove a coordinate, or let rotation "
                 "and position depend on every one of them"
             )
@@ -160,7 +163,8 @@ def _agrees(
     stated = sp.Matrix(stated)
     if stated.shape != derived.shape:
         raise ElementError(
-            f"{where}: {what} is {stated.rows} x {stated.cols}, expected {derived.rows} x {derived.cols}"
+            f"{where}: {what} is {stated.rows} x {stated.cols}, "
+            f"expected {derived.rows} x {derived.cols}"
         )
     with mpmath.workdps(_DIGITS):
         difference = _numeric(stated, point) - _numeric(derived, point)
@@ -219,7 +223,9 @@ def check_body(body: Body) -> None:
     )
     residual = sp.Matrix(body.residual(a, alpha, w, p))
     if residual.shape != (6, 1):
-        raise ElementError(f"{where}: residual(a, alpha, w, p) must be 6 x 1, found {residual.shape}")
+        raise ElementError(
+            f"{where}: residual(a, alpha, w, p) must be 6 x 1, found {residual.shape}"
+        )
     mass = residual.jacobian(sp.Matrix.vstack(a, alpha))
     if mass.free_symbols & {*a, *alpha}:
         raise ElementError(f"{where}: residual(a, alpha, w, p) is not linear in a and alpha")
@@ -239,14 +245,12 @@ def _energy_rate(
     """dT/dt equals the power of the residual (classical acceleration a, velocity in body axes)."""
     a, alpha, v, w = names
     v_rate = a - w.cross(v)
-    rate = sum(
-        energy.diff(s) * r
-        for s, r in zip((*v, *w), (*v_rate, *alpha), strict=True)
-    )
+    rate = sum(energy.diff(s) * r for s, r in zip((*v, *w), (*v_rate, *alpha), strict=True))
     power = residual[:3, :].dot(v) + residual[3:, :].dot(w)
     if sp.simplify(sp.expand(rate - power)) != 0:
         raise ElementError(
-            f"{where}: the power of residual(a, alpha, w, p) is not the rate of kinetic_energy(v, w, p)"
+            f"{where}: the power of residual(a, alpha, w, p) is not the rate of "
+            "kinetic_energy(v, w, p)"
         )
 
 

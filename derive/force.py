@@ -42,7 +42,7 @@ def relative_motion() -> tuple[tuple[Equation, ...], tuple[sp.MatrixSymbol, ...]
 
 
 def wrench(element: ForceElement) -> Derivation:
-    """(p, t, effort, motion of both ends) -> force and moment on T, energy, power; inertial axes."""
+    """(p, t, effort, motion of both ends) -> force and moment on T, energy and power."""
     p = Symbols("p", tuple(x.name for x in element.parameters))
     parameters = vector("p", len(p))
     effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)

@@ -1,4 +1,4 @@
-"""Which elements there are: every class in `derive/elements/`, and those of a file of the user's."""
+"""Which elements there are: each class in `derive/elements/`, and those of a file of the user's."""
 
 from __future__ import annotations
 
@@ -25,19 +25,18 @@ def kind_of(element: Element) -> str:
 
 def elements_in(module: ModuleType) -> list[Element]:
     """One instance of every element class that the module itself defines, in order of the text."""
-    bases = tuple(base for _, base in KINDS)
     return [
         value()
         for value in vars(module).values()
         if isinstance(value, type)
-        and issubclass(value, bases)
+        and issubclass(value, (Hinge, Body, ForceElement))
         and value.__module__ == module.__name__
         and isinstance(vars(value).get("name"), str)
     ]
 
 
 def builtin_elements() -> list[Element]:
-    """All elements of `derive/elements/`, by file name.  Raises ElementError for a name used twice."""
+    """All elements of `derive/elements/`, by file name; ElementError for a name used twice."""
     found: dict[tuple[str, str], str] = {}
     result: list[Element] = []
     for info in sorted(pkgutil.iter_modules(elements.__path__), key=lambda i: i.name):

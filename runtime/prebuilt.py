@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 from mstmm import abi
@@ -33,13 +34,13 @@ class Element:
 def module() -> tuple[Any, Any]:
     """(ffi, lib) of the compiled kernels.  EnvironmentFailure if they are missing or stale."""
     try:
-        from mstmm.generated import _kernels
+        kernels: Any = import_module("mstmm.generated._kernels")
     except ImportError as error:
         raise EnvironmentFailure(
             f"the compiled kernels cannot be loaded ({error}); install mstmm again: "
             "pip install -e . (a C compiler is needed)"
         ) from error
-    return _kernels.ffi, _kernels.lib
+    return kernels.ffi, kernels.lib
 
 
 def text(ffi: Any, pointer: Any) -> str:

@@ -163,7 +163,7 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     tableau = get(settings.method)
     if settings.step is None and not tableau.adaptive:
         raise SceneError(
-            f"method {settings.method!r} takes fixed steps: give step in s, or take dopri5 or dop853"
+            f"method {settings.method!r} takes fixed steps: give step in s, or use dopri5, dop853"
         )
     start = system.start(settings.t_start, q, u)
     breaks = [b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end]
