@@ -37,13 +37,14 @@ class Observed:
         self.engine, self.run = model._engine, run
         self.failures: tuple[str, ...] = ()
         self.references = references(model)
+        self.known = frozenset(self.references)
         self._points: dict[str, Array] = {}
         self._parts: dict[str, Array] = {}
 
     def points(self, reference: str) -> Array:
         """(n, 24): motion of "body" or "body.end", see `Observation`."""
         if reference not in self._points:
-            if reference not in self.references and split(reference)[0] != "ground":
+            if reference not in self.known and split(reference)[0] != "ground":
                 raise SceneError(self._unknown(reference))
             self._observe("points", reference)
         return self._points[reference]
@@ -64,7 +65,7 @@ class Observed:
         wanted = list(self.references)
         size = len(run.t) * (24 * len(wanted) + 6 * bodies + 2 * self.engine.nu + 10)
         parts = PARTS if size <= _BATCH else (part,)
-        if size > _BATCH or reference not in self.references:
+        if size > _BATCH or reference not in self.known:
             wanted = [] if reference is None else [reference]
         probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
         seen = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)

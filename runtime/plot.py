@@ -10,6 +10,7 @@ import numpy as np
 
 from mstmm.errors import SceneError
 
+from .curves import curve
 from .dataset import extra
 from .files import replacing
 from .table import default_names
@@ -31,6 +32,7 @@ _STYLE: dict[str, Any] = {
     "axes.edgecolor": "#555555",
     "axes.axisbelow": True,
     "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 5),
     "lines.linewidth": 1.6,
     "legend.frameon": False,
@@ -39,6 +41,9 @@ _STYLE: dict[str, Any] = {
 
 #: Points of a smooth curve between samples of the integrator's own steps.
 _FINE = 1500
+
+#: A panel shows at least this part of its largest value.
+_FLAT = 1e-3
 
 _UNIT_TEXT = {
     "N*m": "N m",
@@ -59,7 +64,8 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
         from matplotlib.figure import Figure
     except ImportError as error:
         raise extra("plot", "a picture", error) from None
-    quantities = [result.quantity(name) for name in list(names) or default_names(result)]
+    chosen = [result.quantity(name) for name in list(names) or default_names(result)]
+    quantities = list({quantity.name: quantity for quantity in chosen}.values())
     if not quantities:
         raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")
     panels = _panels(quantities)
@@ -92,23 +98,27 @@ def _draw(axis: Any, result: Result, panel: Sequence[Quantity]) -> None:
     lines = 0
     for quantity in panel:
         labels = [f"{quantity.name}.{x}" for x in quantity.labels] or [quantity.name]
-        columns = quantity.values.reshape(len(result.t), -1).T
-        for label, values in zip(labels, columns, strict=True):
-            axis.plot(*_broken(result.t, values), label=label)
+        times, columns = curve(result.t, quantity)
+        for label, values in zip(labels, columns.T, strict=True):
+            axis.plot(times, values, label=label)
             lines += 1
     unit = panel[0].unit
     name = panel[0].name if lines == 1 else ""
     text = _UNIT_TEXT.get(unit, unit)
     axis.set_ylabel(" in ".join(x for x in (name, text) if x))
     axis.margins(x=0.01)
+    _flatten(axis)
     if lines > 1:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.4)
 
 
-def _broken(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Time and values with a gap where two samples share one time."""
-    jumps = np.flatnonzero(np.diff(t) == 0) + 1
-    return np.insert(t, jumps, np.nan), np.insert(values, jumps, np.nan)
+def _flatten(axis: Any) -> None:
+    """Show a constant as a line, not its last digits as mountains."""
+    low, high = axis.dataLim.intervaly
+    least = _FLAT * max(abs(low), abs(high))
+    if np.isfinite([low, high]).all() and high - low < least:
+        middle = (low + high) / 2
+        axis.set_ylim(middle - least / 2, middle + least / 2)
 
 
 def _write(figure: Any, path: Path) -> None:

@@ -5,8 +5,8 @@ Every name gives values over time with their unit and one label per column.  Axe
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,18 +24,24 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+Values = Callable[[], Array]
+
 _XYZ, _WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Values (n,) or (n, k) over time; `labels` has one entry per column."""
+    """Values (n,) or (n, k) over time; `labels` has one entry per column.
+
+    `rates` are their time derivatives where these are quantities themselves.
+    """
 
     name: str
     values: Array
     unit: str
     long_name: str
     labels: tuple[str, ...] = ()
+    rates: Callable[[], Array] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,11 @@ SUMS: dict[str, tuple[str, str, slice]] = {
     "angular_momentum": ("kg*m2/s", "angular momentum about the inertial origin", slice(7, 10)),
 }
 
+#: Quantities whose time derivatives are quantities too.
+RATES = {
+    "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
+}  # fmt: skip
+
 _COLUMNS = {
     "position": slice(0, 3), "velocity": slice(3, 6), "acceleration": slice(6, 9),
     "angular_velocity": slice(9, 12), "angular_acceleration": slice(12, 15),
@@ -86,14 +97,16 @@ _COLUMNS = {
 
 
 class Quantities:
-    """Every quantity of a run by its name, from the states and what they show."""
+    """Every quantity of a run by its name, from the states and what they show.
 
-    def __init__(self, observed: Observed) -> None:
-        self.observed, self.run = observed, observed.run
+    Names are made per owner, a hinge, a body, an end or the scene (""), when they are asked for.
+    """
+
+    def __init__(self, observed: Observed, builtin: Collection[str]) -> None:
+        self.observed, self.run, self._builtin = observed, observed.run, builtin
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
-        self._table: dict[str, Callable[[], Quantity]] | None = None
-        self._scalars: list[str] = []
+        self._tables: dict[str, Table] = {}
 
     # --- of bodies ------------------------------------------------------------------------------
 
@@ -137,76 +150,155 @@ class Quantities:
 
     # --- by name --------------------------------------------------------------------------------
 
-    @property
-    def table(self) -> dict[str, Callable[[], Quantity]]:
-        """Every name and how to get its quantity."""
-        if self._table is None:
-            self._table = self._names()
-        return self._table
-
-    @property
-    def scalars(self) -> list[str]:
-        """One name for every number there is per sample, in the order of a wide table."""
-        return self._scalars if self.table else []
-
     def get(self, name: str) -> Quantity:
         """The quantity of this name; SceneError with the nearest name if there is none."""
-        found = self.table.get(name)
-        if found is None:
-            hint = near(name, _nearby(name, self.table))
-            raise SceneError(f'"{name}": there is no such quantity{hint}')
-        return found()
+        parts = name.split(".")
+        owners = [".".join(parts[:k]) for k in range(1, len(parts))]
+        for owner in ["", *(x for x in owners if self._owns(x))]:
+            entry = self.of(owner).entries.get(name)
+            if entry is not None:
+                return entry()
+        known = [n for x in owners if self._owns(x) for n in self.of(x).entries]
+        hint = near(name, known or self.names())
+        raise SceneError(f'"{name}": there is no such quantity{hint}')
 
-    def _names(self) -> dict[str, Callable[[], Quantity]]:
-        table: dict[str, Callable[[], Quantity]] = {}
-        for hinge in self.layout.hinges.values():
-            self._coordinates(table, hinge)
-            for kind, about in HINGE.items():
-                get = _bound(self.of_hinge, hinge.name, kind)
-                self._scalars += _vector(table, f"{hinge.name}.{kind}", hinge.name, about, get)
-        for reference in self.observed.references:
-            for kind, about in BODY.items():
-                get = _bound(self.of_body, reference, kind)
-                self._scalars += _vector(table, f"{reference}.{kind}", reference, about, get)
-        for name in SUMS:
-            self._sum(table, name)
-        table["work"] = lambda: Quantity(
-            "work", self.run.work, "J", "work of everything that is not stored"
-        )
-        self._scalars.append("work")
-        return table
+    def names(self) -> list[str]:
+        """Every name there is."""
+        return [name for owner in self.owners() for name in self.of(owner).entries]
 
-    def _coordinates(self, table: dict[str, Callable[[], Quantity]], hinge: HingeSlots) -> None:
-        """q, u, their rates and efforts by the hinge's own names and by number."""
+    def scalars(self) -> list[str]:
+        """One name for every number there is per sample, in the order of a wide table."""
+        return [name for owner in self.owners() for name in self.of(owner).scalars]
+
+    def owners(self) -> list[str]:
+        """Hinges, bodies and ends, and the scene itself."""
+        return [*self.layout.hinges, *self.observed.references, ""]
+
+    def of(self, owner: str) -> Table:
+        """Names of one owner."""
+        if owner not in self._tables:
+            table = Table({}, [])
+            if owner in self.layout.hinges:
+                self._hinge(table, self.layout.hinges[owner])
+            elif owner:
+                self._body(table, owner)
+            else:
+                self._scene(table)
+            self._tables[owner] = table
+        return self._tables[owner]
+
+    def _owns(self, owner: str) -> bool:
+        return owner in self.layout.hinges or owner in self.observed.known
+
+    def _body(self, table: Table, reference: str) -> None:
+        for kind, about in BODY.items():
+            rates = RATES.get(kind)
+            table.vector(
+                f"{reference}.{kind}", reference, about, self._bound(self.of_body, reference, kind),
+                None if rates is None else self._bound(self.of_body, reference, rates),
+            )  # fmt: skip
+
+    def _scene(self, table: Table) -> None:
+        for name, (unit, long_name, columns) in SUMS.items():
+            get = self._summed(name)
+            if name == "energy" or columns.stop - columns.start == 1:
+                table.scalar(name, unit, long_name, get)
+            else:
+                table.vector(name, "the scene", Kind(unit, long_name, _XYZ, ()), get)
+        about = "work of everything that is not stored"
+        power = self._summed("power")
+        table.scalar("work", "J", about, lambda: self.run.work, rates=power)
+
+    def _hinge(self, table: Table, hinge: HingeSlots) -> None:
+        """q, u, their rates and efforts by the hinge's own names and by number; loads."""
+        q, u = hinge.q_slice, hinge.u_slice
+        efforts = [f"effort_{name.removesuffix('_rate')}" for name in hinge.u_names]
+        efforts = ["effort"] if len(efforts) == 1 else efforts
+        units = [effort_unit(unit) for unit in hinge.u_units]
+        rate_units = [rate_unit(unit) for unit in hinge.u_units]
         accelerations = [acceleration_name(name) for name in hinge.u_names]
-        efforts = [effort_unit(unit) for unit in hinge.u_units]
-        groups: list[tuple[str, str, list[str], list[str], Callable[[], Array]]] = [
-            ("q", "coordinate", list(hinge.q_names), list(hinge.q_units),
-             lambda: self.run.q[:, hinge.q_slice]),
-            ("u", "speed", list(hinge.u_names), list(hinge.u_units),
-             lambda: self.run.u[:, hinge.u_slice]),
-            ("udot", "acceleration", accelerations, [rate_unit(unit) for unit in hinge.u_units],
-             lambda: self.observed.part("udot")[:, hinge.u_slice]),
-            ("effort", "effort", [f"effort_{name}" for name in hinge.u_names], efforts,
-             lambda: self.effort(hinge.name)),
-        ]  # fmt: skip
-        for short, word, names, units, get in groups:
-            for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-                full, long_name = f"{hinge.name}.{name}", f"{word} {name} of hinge {hinge.name}"
-                table[full] = _column(get, k, full, unit, long_name)
-                self._scalars.append(full)
-                table[f"{hinge.name}.{short}[{k}]"] = table[full]
-            if len(names) == 1:
-                table[f"{hinge.name}.{short}"] = table[f"{hinge.name}.{short}[0]"]
+        simple = hinge.quaternion is None and hinge.type in self._builtin
 
-    def _sum(self, table: dict[str, Callable[[], Quantity]], name: str) -> None:
-        unit, long_name, columns = SUMS[name]
-        if name == "energy" or columns.stop - columns.start == 1:
-            table[name] = lambda: Quantity(name, self.sum(name), unit, long_name)
-            self._scalars.append(name)
-            return
-        about = Kind(unit, long_name, _XYZ, ())
-        self._scalars += _vector(table, name, "the scene", about, lambda: self.sum(name))
+        def udot() -> Array:
+            return self.observed.part("udot")[:, u]
+
+        def speeds() -> Array:
+            return self.run.u[:, u]
+
+        group = _Group(table, hinge.name)
+        group.add("q", "coordinate", hinge.q_names, hinge.q_units, lambda: self.run.q[:, q],
+                  speeds if simple else None)  # fmt: skip
+        group.add("u", "speed", hinge.u_names, hinge.u_units, speeds, udot)
+        group.add("udot", "acceleration", accelerations, rate_units, udot)
+        group.add("effort", "effort", efforts, units, lambda: self.effort(hinge.name))
+        for kind, about in HINGE.items():
+            get = self._bound(self.of_hinge, hinge.name, kind)
+            table.vector(f"{hinge.name}.{kind}", hinge.name, about, get)
+
+    def _summed(self, name: str) -> Values:
+        return lambda: self.sum(name)
+
+    @staticmethod
+    def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:
+        return lambda: method(name, kind)
+
+
+@dataclass
+class Table:
+    """Names of one owner: how to get each quantity, and one name for every number."""
+
+    entries: dict[str, Callable[[], Quantity]]
+    scalars: list[str]
+
+    def scalar(
+        self, name: str, unit: str, long_name: str, get: Values, k: int | None = None,
+        rates: Values | None = None, listed: bool = True,
+    ) -> None:  # fmt: skip
+        """One number, column k of what `get` gives."""
+        slope = None if rates is None else (lambda: _pick(rates(), k))
+        self.entries[name] = lambda: Quantity(name, _pick(get(), k), unit, long_name, rates=slope)
+        if listed:
+            self.scalars.append(name)
+
+    def vector(
+        self, name: str, owner: str, about: Kind, get: Values, rates: Values | None = None
+    ) -> None:
+        """The vector under its name, each component under name.x, and short as in rod1.tip.vx."""
+        long_name = f"{about.long_name} of {owner}"
+        self.entries[name] = lambda: Quantity(
+            name, get(), about.unit, long_name, about.labels, rates
+        )
+        for k, label in enumerate(about.labels):
+            text = f"{long_name}, {label}"
+            short = f"{owner}.{about.short[k]}" if about.short else ""
+            taken = not short or short in self.entries
+            self.scalar(f"{name}.{label}", about.unit, text, get, k, rates, listed=taken)
+            if not taken:
+                self.scalar(short, about.unit, text, get, k, rates)
+
+
+@dataclass
+class _Group:
+    """Columns of one hinge under their own names and by number: shoulder.angle, shoulder.q[0]."""
+
+    table: Table
+    hinge: str
+
+    def add(
+        self, short: str, word: str, names: Sequence[str], units: Sequence[str], get: Values,
+        rates: Values | None = None,
+    ) -> None:  # fmt: skip
+        """One kind of quantity, one name and unit per column."""
+        for k, (name, unit) in enumerate(zip(names, units, strict=True)):
+            full, long_name = f"{self.hinge}.{name}", f"{word} {name} of hinge {self.hinge}"
+            self.table.scalar(full, unit, long_name, get, k, rates)
+            self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
+        if len(names) == 1 and names[0] != short:
+            self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]
+
+
+def _pick(values: Array, k: int | None) -> Array:
+    return values if k is None else values[:, k]
 
 
 def acceleration_name(speed: str) -> str:
@@ -218,46 +310,3 @@ def acceleration_name(speed: str) -> str:
 def rate_unit(unit: str) -> str:
     """Unit of the time derivative: m/s -> m/s2."""
     return f"{unit}2" if unit.endswith("/s") else f"{unit or '1'}/s"
-
-
-def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Callable[[], Array]:
-    return lambda: method(name, kind)
-
-
-def _column(
-    get: Callable[[], Array], k: int, name: str, unit: str, long_name: str
-) -> Callable[[], Quantity]:
-    return lambda: Quantity(name, get()[:, k], unit, long_name)
-
-
-def _vector(
-    table: dict[str, Callable[[], Quantity]],
-    name: str,
-    owner: str,
-    about: Kind,
-    get: Callable[[], Array],
-) -> list[str]:
-    """The vector under its name, each component under name.x, and short as in rod1.tip.vx.
-
-    Returns one name per component, the short one where it is free.
-    """
-    names = []
-    long_name = f"{about.long_name} of {owner}"
-    table[name] = lambda: Quantity(name, get(), about.unit, long_name, about.labels)
-    for k, label in enumerate(about.labels):
-        full = f"{name}.{label}"
-        table[full] = _column(get, k, full, about.unit, f"{long_name}, {label}")
-        if about.short:
-            short = f"{owner}.{about.short[k]}"
-            if short not in table:
-                table[short] = _column(get, k, short, about.unit, f"{long_name}, {label}")
-                full = short
-        names.append(full)
-    return names
-
-
-def _nearby(name: str, table: dict[str, Callable[[], Quantity]]) -> list[str]:
-    """Names to suggest from: those of the same body or hinge, else all."""
-    owner = name.rsplit(".", 1)[0]
-    same = [known for known in table if known.rsplit(".", 1)[0] == owner]
-    return same or list(table)

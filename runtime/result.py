@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.hinge_types import HINGE_TYPES
+
 from .certificate import Certificate, certificate
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
@@ -63,7 +65,7 @@ class Result:
         self.statistics: Statistics | None = run.statistics
         self.settings: Settings = run.settings
         self._observed = Observed(model, run)
-        self._quantities = Quantities(self._observed)
+        self._quantities = Quantities(self._observed, HINGE_TYPES)
 
     @property
     def success(self) -> bool:
@@ -182,7 +184,7 @@ class Result:
 
     def names(self) -> tuple[str, ...]:
         """Every name that `quantity`, `plot` and `table` take."""
-        return tuple(self._quantities.table)
+        return tuple(self._quantities.names())
 
     def quantity(self, name: str) -> Quantity:
         """Values with unit by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy"."""

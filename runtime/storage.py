@@ -41,7 +41,7 @@ def _netcdf(result: Result, path: Path) -> None:
 
 def _csv(result: Result, path: Path) -> None:
     """One row per sample, one column per number; the header holds names and units."""
-    quantities = [result.quantity(name) for name in result._quantities.scalars]
+    quantities = [result.quantity(name) for name in result._quantities.scalars()]
     header = ["time [s]", "event"]
     header += [f"{q.name} [{q.unit}]" if q.unit else q.name for q in quantities]
     columns = [result.t.tolist(), result.event.tolist(), *(q.values.tolist() for q in quantities)]

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def fine(t: float = 0.5, width: float = 1e-4) -> Array:
-    return t + width * np.arange(-2, 3)
+    return np.asarray(t + width * np.arange(-2, 3))
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +60,7 @@ def test_orientation_turns_with_the_angular_velocity(run: Result, reference: str
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-15)
     w, x, y, z = q[3]
     matrix = 0.5 * np.array([[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]])
-    np.testing.assert_allclose(
-        slope(q), matrix @ run.angular_velocity(reference)[3], atol=1e-8
-    )
+    np.testing.assert_allclose(slope(q), matrix @ run.angular_velocity(reference)[3], atol=1e-8)
 
 
 def test_ends_are_fixed_in_their_bodies(run: Result) -> None:
@@ -113,7 +111,7 @@ def outer(result: Result, k: int) -> dict[str, list[tuple[Array, Array]]]:
 
 @pytest.mark.parametrize("k", [0, 3, 6])
 def test_forces_and_moments_move_every_body(run: Result, k: int) -> None:
-    """Newton and Euler for each body from its hinges' loads, with the sign of inboard on outboard."""
+    """Newton and Euler for each body from the loads of its hinges, inboard on outboard."""
     scene, loads = run.model.scene, loads_on(run, k)
     for body in scene.body:
         turn = np.array([turned(run.orientation(body.name)[k], e) for e in np.eye(3)]).T
@@ -218,7 +216,9 @@ def test_quantities_by_name_have_units(run: Result) -> None:
     expected = {
         "elbow.angle1": ("rad", run.q[:, 7]), "elbow.angle1_rate": ("rad/s", run.u[:, 6]),
         "elbow.angle1_acceleration": ("rad/s2", run.udot[:, 6]),
-        "slider.displacement": ("m", run.q[:, 13]), "slider.effort[0]": ("N", run.effort("slider")[:, 0]),
+        "slider.displacement": ("m", run.q[:, 13]),
+        "slider.effort[0]": ("N", run.effort("slider")[:, 0]),
+        "slider.effort_angle": ("N*m", run.effort("slider")[:, 1]),
         "space.vx": ("m/s", run.u[:, 0]), "space.q[3]": ("", run.q[:, 3]),
         "arm.tip.y": ("m", run.position("arm.tip")[:, 1]),
         "arm.tip.vz": ("m/s", run.velocity("arm.tip")[:, 2]),

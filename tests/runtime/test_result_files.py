@@ -1,0 +1,139 @@
+"""Results in files: nothing is lost on the way, nothing half-written, clear words when it fails."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from support.result_scenes import motor, pins, tree
+
+import mstmm
+from mstmm.runtime.result import Result
+
+
+@pytest.fixture(scope="module")
+def run() -> Result:
+    return mstmm.compile(tree()).simulate(0.5, rtol=1e-8, certify=True)
+
+
+def test_netcdf_brings_everything_back(run: Result, tmp_path: Path) -> None:
+    path = run.save(tmp_path / "run.nc")
+    again = mstmm.load_result(path)
+    assert again.model.scene == run.model.scene
+    for name in run.names():
+        np.testing.assert_array_equal(again.quantity(name).values, run.quantity(name).values)
+    assert (again.success, again.status, again.message) == (run.success, run.status, run.message)
+    assert again.settings == run.settings and again.statistics == run.statistics
+    assert str(again.certificate) == str(run.certificate)
+    for ours, theirs in zip(again.last_state, run.last_state, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_netcdf_is_labelled_with_units_and_provenance(run: Result, tmp_path: Path) -> None:
+    with xarray.open_dataset(run.save(tmp_path / "run.nc"), engine="h5netcdf") as data:
+        assert data["position"].dims == ("time", "body", "axis")
+        assert data["position"].attrs["units"] == "m" and data["force"].attrs["units"] == "N"
+        assert all("long_name" in variable.attrs for variable in data.variables.values())
+        tip = data["position"].sel(body="arm.tip", axis="y").values
+        np.testing.assert_array_equal(tip, run.position("arm.tip")[:, 1])
+        wrist = data["moment"].sel(hinge="wrist").values
+        np.testing.assert_array_equal(wrist, run.moment("wrist"))
+        angle = data["q"].sel(coordinate="elbow.angle2")
+        np.testing.assert_array_equal(angle.values, run.coordinate("elbow")[:, 1])
+        assert str(angle["coordinate_units"].values) == "rad"
+        assert "[[hinge]]" in str(data["scene"].values)
+        assert json.loads(data.attrs["versions"])["mstmm"] == mstmm.__version__
+        assert len(data.attrs["kernels_sha256"]) == 64
+        assert json.loads(data.attrs["settings"])["rtol"] == 1e-8
+        assert data["error_q_0"].attrs["units"] == "m"
+
+
+def test_events_and_interrupted_runs_survive(tmp_path: Path) -> None:
+    data = {
+        "gravity": [0, -9.81, 0], "body": [{"name": "a", "mass": 1, "inertia": [1, 1, 1]}],
+        "hinge": [{"name": "h", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
+                   "outboard": "a"}],
+        "event": [{"when": "a.y < -1", "do": "stop"}],
+    }  # fmt: skip
+    run = mstmm.compile(mstmm.Scene.from_data(data)).simulate(5.0)
+    again = mstmm.load_result(run.save(tmp_path / "run.nc"))
+    assert again.message == run.message and "stopped by" in run.message
+    np.testing.assert_array_equal(again.event, run.event)
+    assert run.t[-1] == pytest.approx(np.sqrt(2 / 9.81), rel=1e-8)
+    blown = mstmm.compile(motor("exp(u[0])^3", speed=1.0)).simulate(1.0)
+    again = mstmm.load_result(blown.save(tmp_path / "blown.nc"))
+    assert not again.success and again.status == blown.status and again.message == blown.message
+
+
+def test_a_scene_longer_than_an_attribute_can_hold(tmp_path: Path) -> None:
+    run = mstmm.compile(pins(150, [0.1] * 150)).simulate(0.01)
+    assert len(run.model.scene.to_toml()) > 70_000
+    assert mstmm.load_result(run.save(tmp_path / "long.nc")).model.nu == 150
+
+
+def test_csv_has_names_units_and_every_digit(run: Result, tmp_path: Path) -> None:
+    with run.save(tmp_path / "run.csv").open(newline="") as file:
+        header, *rows = list(csv.reader(file))
+    assert header[0] == "time [s]" and len(set(header)) == len(header)
+    values = {
+        name: np.array(column, float)
+        for name, column in zip(header, zip(*rows, strict=True), strict=True)
+    }
+    np.testing.assert_array_equal(values["time [s]"], run.t)
+    np.testing.assert_array_equal(values["arm.tip.y [m]"], run.position("arm.tip")[:, 1])
+    np.testing.assert_array_equal(values["elbow.angle1 [rad]"], run.coordinate("elbow")[:, 0])
+    np.testing.assert_array_equal(values["energy [J]"], run.energy())
+    np.testing.assert_array_equal(values["wrist.qw"] if "wrist.qw" in values else values["wrist.w"],
+                                  run.coordinate("wrist")[:, 0])  # fmt: skip
+
+
+@pytest.mark.parametrize("name, package", [("a.nc", "xarray"), ("b.nc", "h5netcdf")])
+def test_a_missing_extra_is_named(
+    run: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(mstmm.EnvironmentFailure, match=rf"{package}.*pip install 'mstmm\[io\]'"):
+        run.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+    run.save(tmp_path / "still.csv")
+
+
+def test_a_full_disk_keeps_the_old_file_and_the_result(
+    run: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", full)
+        with pytest.raises(mstmm.EnvironmentFailure, match=r"run\.csv.*No space left"):
+            run.save(path)
+    assert path.read_text() == "old" and len(list(tmp_path.iterdir())) == 1
+    run.save(path)
+    assert path.read_text().startswith("time")
+
+
+def test_words_for_paths_that_make_no_sense(run: Result, tmp_path: Path) -> None:
+    with pytest.raises(mstmm.SceneError, match=r"ends in \.nc or \.csv"):
+        run.save(tmp_path / "run.xlsx")
+    with pytest.raises(mstmm.EnvironmentFailure, match="cannot be written"):
+        run.save(tmp_path / "nowhere" / "run.csv")
+    with pytest.raises(mstmm.SceneError, match="there is no such file"):
+        mstmm.load_result(tmp_path / "none.nc")
+    for text in ("", "rubbish", "\x89HDF\r\n\x1a\n"):
+        (tmp_path / "bad.nc").write_text(text, encoding="latin-1")
+        with pytest.raises(mstmm.SceneError, match=r"bad\.nc.*not a NetCDF file"):
+            mstmm.load_result(tmp_path / "bad.nc")
+    xarray.Dataset({"x": 1}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with pytest.raises(mstmm.SceneError, match="not a result of mstmm"):
+        mstmm.load_result(tmp_path / "other.nc")
