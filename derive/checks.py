@@ -135,8 +135,8 @@ def _is_rotation(where: str, motion: HingeMotion, point: Numbers) -> None:
         if defect > _TOLERANCE or mpmath.det(r) < 0:
             raise ElementError(
                 f"{where}: rotation(q, p) is not a rotation: "
-                f"|R^T R - I| = {mpmath.nstr(defect, 3)}, det R = {mpmath.nstr(mpmath.det(r), 5)} at "
-                + ", ".join(f"{k} = {float(v):.3g}" for k, v in point.items())
+                f"|R^T R - I| = {mpmath.nstr(defect, 3)}, det R = {mpmath.nstr(mpmath.det(r), 5)} "
+                "at " + ", ".join(f"{k} = {float(v):.3g}" for k, v in point.items())
             )
 
 
