@@ -24,6 +24,7 @@ apidoc_modules = [
         "exclude_patterns": ["**/__main__.py"],
     }
 ]
+autodoc_default_options = {"ignore-module-all": True}  # described where it is defined
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 suppress_warnings = ["ref.python"]  # short names that several classes share
