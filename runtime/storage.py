@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import shutil
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mstmm.errors import SceneError
+from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.scene import Scene
 
 from . import provenance
@@ -36,7 +37,22 @@ def _netcdf(result: Result, path: Path) -> None:
         import h5netcdf  # noqa: F401
     except ImportError as error:
         raise extra("io", "a NetCDF file", error) from None
+    _room_for(int(data.nbytes) + _OVERHEAD, path)
     data.to_netcdf(path, engine="h5netcdf")
+
+
+#: Bytes of a NetCDF file beside its arrays, generously.
+_OVERHEAD = 2_000_000
+
+
+def _room_for(size: int, path: Path) -> None:
+    """EnvironmentFailure if the disk is too full.  HDF5 crashes the process where it runs full."""
+    free = shutil.disk_usage(path.parent).free
+    if free < size:
+        raise EnvironmentFailure(
+            f'"{path.parent}" has {free / 1e6:.1f} MB left, a NetCDF file of this result needs '
+            f"{size / 1e6:.1f} MB; make room, take fewer samples or another place"
+        )
 
 
 def _csv(result: Result, path: Path) -> None:

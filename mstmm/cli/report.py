@@ -41,9 +41,7 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
     """Some samples; columns that nobody asked for are left out where the terminal is narrow."""
     if names:
         return result.table(*names, rows=rows)
-    from mstmm.runtime.table import default_names
-
-    chosen = [*(default_names(result) or _tip(result)), "energy"]
+    chosen = [*default_quantities(result), "energy"]
     text = result.table(*chosen, rows=rows)
     while len(chosen) > 1 and max(map(len, text.splitlines())) > width:
         del chosen[-2]
@@ -51,10 +49,16 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
     return text
 
 
-def _tip(result: Result) -> list[str]:
-    """Where the last body's last end is, for scenes whose coordinates are all quaternions."""
-    body = result.model.scene.body[-1:]
-    return [f"{'.'.join([b.name, *list(b.ends)[-1:]])}.{axis}" for b in body for axis in "xyz"]
+def default_quantities(result: Result) -> list[str]:
+    """What to show if nobody asked: hinge coordinates, or where the last body's last end is.
+
+    The second is for scenes whose coordinates are all quaternions.
+    """
+    from mstmm.runtime.table import default_names
+
+    scene = result.model.scene
+    tips = [".".join([body.name, *list(body.ends)[-1:]]) for body in scene.body[-1:]]
+    return default_names(result) or [f"{tip}.{axis}" for tip in tips for axis in "xyz"]
 
 
 def to_json(result: Result, seconds: float) -> dict[str, Any]:

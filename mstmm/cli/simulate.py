@@ -126,6 +126,8 @@ def simulate(
         tuple(quantity or ()), certify, resume, sweep,
     )  # fmt: skip
     _refuse_endless(plan)
+    from . import report
+
     need_for(plan.output, "--output")
     if plan.plot is not None:
         need_for(plan.plot, "--plot")
@@ -140,7 +142,8 @@ def simulate(
             result = certified(result, progress)
             result.save(plan.output)
     if plan.plot is not None:
-        result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
+        names = plan.quantities or report.default_quantities(result) or ["energy"]
+        result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
     _report(plan, result, seconds, json)
     if interrupted(result):
         raise typer.Exit(130)

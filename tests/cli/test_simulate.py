@@ -68,6 +68,15 @@ def test_plot_of_quantities(mstmm: Command, folder: Path) -> None:
     assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_plot_of_a_scene_whose_coordinates_are_quaternions(mstmm: Command, folder: Path) -> None:
+    (folder / "ball.toml").write_text(
+        PENDULUM.replace('"pin"', '"ball"').replace("q = [0.3]", "u = [1, 2, 3]")
+    )
+    done = mstmm("simulate", "ball.toml", "--t-end", "0.2", "--plot", "a.svg")
+    assert done.code == 0 and "rod.tip.x" in done.out
+    assert "<svg" in (folder / "a.svg").read_text()
+
+
 def test_unknown_quantity_is_refused_before_the_run(mstmm: Command, folder: Path) -> None:
     done = mstmm("simulate", "pendulum.toml", "-q", "rod.tp.position")
     assert done.code == 2 and "did you mean" in done.err
@@ -153,3 +162,15 @@ def test_folder_that_cannot_be_written(mstmm: Command) -> None:
 def test_device_is_no_result_file(mstmm: Command, folder: Path) -> None:
     (folder / "null.nc").symlink_to("/dev/null")
     assert mstmm("simulate", "pendulum.toml", "-o", "null.nc").code == 2
+
+
+def test_disk_too_full_for_netcdf(
+    mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Usage:
+        free = 1000
+
+    monkeypatch.setattr("mstmm.runtime.storage.shutil.disk_usage", lambda path: Usage)
+    done = mstmm("simulate", "pendulum.toml", "--t-end", "0.1")
+    assert done.code == 3 and "MB left" in done.err
+    assert not list(folder.glob("*.nc")) and not list(folder.glob(".*.nc"))
