@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Needed = Callable[[Array], Array]
 
 _STEP = 1e-6  # of the difference quotients, rad or m
-_UPHILL_STEP = 0.5  # longest step away from an unstable equilibrium, rad or m
+_LONGEST = 0.5  # step, rad or m
+_SOFT = 1e-6  # part of the largest stiffness below which a direction counts as slack
 _MAX_ITERATIONS = 100
 
 
@@ -51,12 +52,8 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
             _refuse_undetermined(model, slope, free)
             return q
         step = np.zeros(model.nu)
-        downhill, step[free] = _step(slope, residual)
-        if downhill:
-            q, residual = _damped(model, q, step, needed, size)
-        else:
-            q = moved(model, q, _limited(step, _UPHILL_STEP))
-            residual = needed(q)
+        step[free] = _step(slope, residual)
+        q, residual = _followed(model, q, step, needed, free)
     raise NumericalFailure(
         f"no equilibrium found near the start: after {_MAX_ITERATIONS} steps an effort of "
         f"{size:.3g} (N or N*m) is left; give another start, q = ..."
@@ -84,35 +81,39 @@ def _slope(model: Model, q: Array, needed: Needed, free: list[int]) -> Array:
     return np.array(columns).reshape(len(free), len(free)).T
 
 
-def _step(slope: Array, residual: Array) -> tuple[bool, Array]:
-    """(whether the stiffness is positive definite, step towards equilibrium).
+def _step(slope: Array, residual: Array) -> Array:
+    """Newton's step where the stiffness is positive definite; else one that runs downhill too.
 
-    Where it is not, the step goes down along the directions that would run uphill, so that an
-    unstable equilibrium is left behind (for forces without potential this is only a heuristic).
+    Along directions in which the stiffness is negative or vanishes, Newton would run uphill or far
+    away; the step goes with the forces there, so that unstable equilibria are left behind (for
+    forces without potential this is only a heuristic).
     """
     values, directions = np.linalg.eigh((slope + slope.T) / 2)
-    floor = 1e-9 * float(np.abs(values).max(initial=1e-300))
-    if values.min(initial=np.inf) > -floor:
-        return True, np.asarray(np.linalg.lstsq(slope, -residual, rcond=1e-9)[0])
-    softened = np.maximum(np.abs(values), floor)
-    return False, np.asarray(-directions @ ((directions.T @ residual) / softened))
+    largest = float(np.abs(values).max(initial=1e-300))
+    if values.min(initial=np.inf) > _SOFT * largest:
+        return np.asarray(np.linalg.solve(slope, -residual))
+    softened = np.maximum(np.abs(values), _SOFT * largest)
+    return np.asarray(-directions @ ((directions.T @ residual) / softened))
 
 
-def _limited(step: Array, longest: float) -> Array:
-    return np.asarray(step / max(1.0, float(np.abs(step).max(initial=0.0)) / longest))
-
-
-def _damped(
-    model: Model, q: Array, step: Array, needed: Needed, size: float
+def _followed(
+    model: Model, q: Array, step: Array, needed: Needed, free: list[int]
 ) -> tuple[Array, Array]:
-    """A Newton step, at most one unit long, halved until the residual falls."""
-    step = _limited(step, 1.0)
+    """q after the step, at most _LONGEST long, halved until it falls or does not climb again.
+
+    Where forces have a potential, `needed` is its gradient: the step has not passed the bottom by
+    much as long as the gradient along it has not turned around to more than half its size.
+    """
+    step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
+    before = needed(q)
+    size, along = float(np.abs(before).max(initial=0.0)), abs(float(before @ step[free]))
     for _ in range(20):
         trial = moved(model, q, step)
         residual = needed(trial)
-        if float(np.abs(residual).max(initial=0.0)) < size:
+        falls = float(np.abs(residual).max(initial=0.0)) < size
+        if falls or float(residual @ step[free]) <= along / 2:
             break
-        step = step / 2
+        step, along = step / 2, along / 2
     return trial, residual
 
 
