@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .extras import install, missing, result_ending
 from .options import Json, output_file
 from .progress import bar
-from .simulate import certified
+from .simulate import certified, load_method
 
 if TYPE_CHECKING:
     from mstmm.runtime.result import Result
@@ -100,6 +100,7 @@ def _simulate(text: str) -> tuple[Result, float]:
     import mstmm
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
+    load_method("dop853")
     times = [T_END * i / (SAMPLES - 1) for i in range(SAMPLES)]
     with bar() as progress:
         begin = time.perf_counter()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
@@ -46,10 +47,17 @@ def _plain_hinge(entry: Entry) -> dict[str, Any]:
     return data
 
 
+#: What a scene gives for the built-in body; its kernels take moments derived from these.
+_RIGID = ("mass [kg]", "center_of_mass [m]", "inertia [kg*m2]")
+
+
 def _elements(kind: str, title: str) -> Section:
     from .stored import builtin
 
-    entries = builtin(kind)
+    entries = [
+        replace(e, parameters=_RIGID) if (kind, e.name) == ("body", "rigid") else e
+        for e in builtin(kind)
+    ]
     rows = [(e.name, e.title, _joined(e.parameters)) for e in entries]
     return Section(title, (kind, "what it is", "parameters"), rows, [e.to_json() for e in entries])
 

@@ -6,7 +6,9 @@ import contextlib
 import json
 import math
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -70,12 +72,22 @@ def note(message: str) -> None:
 
 
 def _on_stderr(head: str, text: str, colour: str) -> None:
+    if sys.stderr.isatty():
+        width = max(shutil.get_terminal_size().columns, 40)
+        text = "\n".join(_folded(line, width, head) for line in text.splitlines())
     if sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
         text = f"\x1b[{colour}m{head}\x1b[0m{text}" if head else f"\x1b[{colour}m{text}\x1b[0m"
     else:
         text = head + text
     sys.stderr.write(text + "\n")
     sys.stderr.flush()
+
+
+def _folded(line: str, width: int, head: str) -> str:
+    """A line broken between words, as a terminal would break it anywhere."""
+    return textwrap.fill(
+        head + line, width, break_long_words=False, break_on_hyphens=False
+    ).removeprefix(head)
 
 
 def console(file: Any = None) -> Console:

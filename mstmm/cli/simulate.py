@@ -133,6 +133,7 @@ def simulate(
         need_for(plan.plot, "--plot")
     use_files(hinge or [])
     model = _model(plan)
+    load_method(plan.method)
     with _terminated_as_interrupted(), bar() as progress:
         begin = time.perf_counter()
         result = _run(plan, model, progress)
@@ -234,6 +235,17 @@ def certified(result: Result, progress: Bar) -> Result:
     return Result(
         result.model, replace(run, notes=(*run.notes, *watch.notes)), error, result.certificate.step
     )
+
+
+def load_method(name: str) -> None:
+    """Read a method's coefficients, so that the time of a run is the run's.
+
+    SceneError for a method that does not exist.
+    """
+    if not name.startswith("scipy-"):
+        from mstmm.runtime.steppers import get
+
+        get(name)
 
 
 def interrupted(result: Result) -> bool:
