@@ -148,10 +148,10 @@ def _momentum(result: Result) -> list[Drift]:
     scene, found = result.model.scene, list[Drift]()
     if not len(result.t) or not _isolated(scene):
         return found
-    force, moment = _support(result)
+    reach = max((_largest(result.position(b.name)) for b in scene.body), default=0.0)
+    force, moment = _support(result, reach)
     kinetic = np.sqrt(2 * _largest(result.energies()["kinetic"]))
     mass = sum(body.mass for body in scene.body)
-    reach = max((_largest(result.position(b.name)) for b in scene.body), default=0.0)
     linear, angular = result.momentum(), result.angular_momentum()
     speed = kinetic * np.sqrt(mass)
     scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
@@ -184,18 +184,19 @@ def _passive(hinge: Hinge) -> bool:
     return not acts and hinge.drive is None and hinge.release is None
 
 
-def _support(result: Result) -> tuple[list[bool], list[bool]]:
+def _support(result: Result, reach: float) -> tuple[list[bool], list[bool]]:
     """Which components of force, and of moment about the origin, the ground never passes on."""
     scene = result.model.scene
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
-    largest = [_largest(result._observed.part("loads")[:, :, k : k + 3]) for k in (0, 3)]
+    loads = result._observed.part("loads")
+    largest = [_largest(loads[:, :, :3]), _largest(loads[:, :, 3:])]
+    largest[1] += largest[0] * reach
     for hinge in scene.hinge:
         if hinge.inboard_body == "ground":
             f = result.force(hinge.name)
             force = force + f
             place = result.position(hinge.outboard)
             moment = moment + result.moment(hinge.name) + np.cross(place, f)
-            largest[1] = max(largest[1], _largest(place) * _largest(f))
     zero = [[_largest(x[:, k]) <= _ZERO * size for k in range(3)]
             for x, size in zip((force, moment), largest, strict=True)]  # fmt: skip
     return zero[0], zero[1]

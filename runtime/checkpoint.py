@@ -63,7 +63,7 @@ class Checkpoint:
     def load(self) -> tuple[State, Samples]:
         """State and samples.  SceneError if the file is no checkpoint, or one of another run."""
         try:
-            with np.load(self.path, allow_pickle=False) as file:
+            with self.path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 data = {name: file[name] for name in file.files}
         except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
             raise SceneError(f'checkpoint "{self.path}" cannot be read: {error}') from None

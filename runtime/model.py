@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -190,7 +191,7 @@ class Model:
         max_steps: int = 0,
         certify: bool = False,
         progress: Callable[[float, float], None] | None = None,
-        checkpoint: str | None = None,
+        checkpoint: str | Path | None = None,
         resume: bool = False,
     ) -> Result:
         """Integrate to `t_end` (s).

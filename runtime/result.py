@@ -235,7 +235,7 @@ def simulate(
     *,
     certify: bool,
     progress: Callable[[float, float], None] | None,
-    checkpoint: str | None,
+    checkpoint: str | Path | None,
     resume: bool,
 ) -> Result:
     """One run, and a second one where its error is asked for; see `Model.simulate`."""

@@ -150,7 +150,8 @@ class _Loop:
             if flag[0]:
                 raise KeyboardInterrupt
             try:
-                text = solver.step()
+                with np.errstate(all="ignore"):  # nan is how a bad trial step shows
+                    text = solver.step()
             except (ValueError, np.linalg.LinAlgError) as error:
                 text, solver.status = str(error), "failed"
             if solver.status == "failed" or not np.isfinite(solver.y).all():
@@ -214,7 +215,8 @@ class _Loop:
         self.truth[event], self.fired = True, self.fired + 1
         if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
             self.rows.pop()
-        self.rows.append(before)
+        if answer != lib.MSTMM_FIRE_STOP:
+            self.rows.append(before)
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
         if answer == lib.MSTMM_FIRE_STOP:
             name = self.system.scene.event_names[event]

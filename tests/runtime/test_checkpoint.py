@@ -1,0 +1,208 @@
+"""Interrupted runs: nothing is lost, and a resumed run has the bytes of an uninterrupted one."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.result_scenes import pins, rod
+
+import mstmm
+from mstmm.runtime import execution
+from mstmm.runtime.integrate import Run
+
+#: Runs a scene from a file; says where it is, so that the parent can interrupt it half-way.
+PROGRAM = """
+import sys
+import numpy as np
+import mstmm
+scene, out, mode, t_end = sys.argv[1:]
+model = mstmm.compile(mstmm.load_scene(scene))
+more = {} if mode == "full" else {"checkpoint": out + ".ck.npz", "resume": mode == "resume"}
+if mode == "cut":
+    more["progress"] = lambda t, end: print(t, flush=True)
+run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, **more)
+print(run.message)
+arrays = {n: getattr(run, n) for n in ("t", "q", "u", "work", "event")}
+np.savez(out, memory=run.trajectory.memory, energy=run.energy(), **arrays)
+print("status", run.status, "success", run.success)
+"""
+
+
+def remembering() -> mstmm.Scene:
+    """A chain with everything a run remembers: work, a release, turns of a ball with a spring."""
+    hinges = [
+        {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "rod0",
+         "drive": "0.5*sin(3*t)", "release": "t >= 1"},
+        {"name": "pin", "type": "pin", "inboard": "rod0.tip", "outboard": "rod1",
+         "initial": {"q": [0.7]}},
+        {"name": "ball", "type": "ball", "inboard": "rod1.tip", "outboard": "rod2",
+         "axis": [1, 0, 0], "initial": {"u": [9.0, 0.1, 0.2]},
+         "law": {"stiffness": [0.01, 0.01, 0.01], "damping": [0.001, 0.001, 0.001]}},
+    ]  # fmt: skip
+    bodies = [rod(f"rod{i}") for i in range(3)]
+    return mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=hinges)
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *arguments], stdout=subprocess.PIPE, text=True
+    )
+
+
+@pytest.mark.slow
+def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(remembering().to_toml())
+    t_end = "80"
+    full = start(str(scene), str(tmp_path / "full.npz"), "full", t_end)
+    cut = start(str(scene), str(tmp_path / "cut.npz"), "cut", t_end)
+    assert cut.stdout is not None
+    for _ in range(2):  # slices of 0.1 s
+        assert cut.stdout.readline()
+    cut.send_signal(signal.SIGINT)
+    told = cut.communicate(timeout=60)[0]
+    assert cut.returncode == 0 and "interrupted at t = " in told and "success False" in told
+    os.replace(tmp_path / "cut.npz.ck.npz", tmp_path / "rest.npz.ck.npz")
+    rest = start(str(scene), str(tmp_path / "rest.npz"), "resume", t_end)
+    assert "success True" in rest.communicate(timeout=60)[0]
+    full.communicate(timeout=60)
+    with (
+        np.load(tmp_path / "full.npz") as one,
+        np.load(tmp_path / "rest.npz") as other,
+        np.load(tmp_path / "cut.npz") as part,
+    ):
+        assert 10 < len(part["t"]) < len(one["t"])
+        assert np.ptp(one["memory"][:, 1]) > 6 and set(one["memory"][:, 0]) == {0.0, 1.0}
+        for name in one.files:
+            assert one[name].tobytes() == other[name].tobytes(), name
+            assert one[name][: len(part["t"])].tobytes() == part[name].tobytes(), name
+    assert not (tmp_path / "rest.npz.ck.npz").exists()
+
+
+def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
+    """Ctrl-C, from within, as soon as a run has passed this time."""
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+
+    def look(self: execution.Watch, run: Run, earlier: object) -> None:
+        if run.t > at:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(execution.Watch, "look", look)
+
+
+def test_a_checkpoint_of_another_run_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
+    with monkeypatch.context() as patch:
+        interrupted(patch, 1.0)
+        run = model.simulate(5.0, checkpoint=path, step=0.01, method="rk4")
+    assert run.status is None and not run.success and 1.0 < run.t[-1] < 1.1
+    assert run.last_state[0] == run.t[-1] and path.exists()
+    other = mstmm.compile(pins(2, [0.3, 0.5]))
+    with pytest.raises(mstmm.SceneError, match=r"run\.npz.*the scene has changed"):
+        other.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
+    for change in ({"step": 0.02}, {"t_end": 6.0}, {"method": "dop853", "step": None}):
+        settings = {"t_end": 5.0, "step": 0.01, "method": "rk4"} | change
+        with pytest.raises(mstmm.SceneError, match="the settings or the start have changed"):
+            model.simulate(checkpoint=path, resume=True, **settings)  # type: ignore[arg-type]
+    with np.load(path) as file:
+        assert all(file[name].dtype.kind in "fiU" for name in file.files)  # no pickle
+    whole = model.simulate(5.0, step=0.01, method="rk4")
+    again = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
+    assert again.q.tobytes() == whole.q.tobytes() and again.statistics == whole.statistics
+    assert list(tmp_path.iterdir()) == []
+    once_more = model.simulate(0.1, checkpoint=path, resume=True)  # nothing there: from the start
+    assert once_more.success and once_more.t[0] == 0.0
+
+
+@pytest.mark.parametrize("content", [b"", b"rubbish", b"PK\x03\x04 half a zip"])
+def test_a_file_that_is_no_checkpoint(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "run.npz"
+    path.write_bytes(content)
+    with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
+        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
+    np.savez(path, x=1)
+    with pytest.raises(mstmm.SceneError, match="not one of this version"):
+        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
+
+
+def test_a_folder_that_is_not_there_is_noticed_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(mstmm.EnvironmentFailure, match="its folder cannot be written"):
+        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=tmp_path / "no" / "run.npz")
+
+
+def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = mstmm.compile(pins(2, [0.3, 0.4]))
+    monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    run = model.simulate(1.0, checkpoint=tmp_path / "run.npz")
+    assert run.success and run.t[-1] == 1.0
+    (note,) = (text for text in run.warnings if "no checkpoint" in text)
+    assert "No space left on device" in note
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_checkpoints_are_written_on_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    path, seen = tmp_path / "run.npz", list[int]()
+
+    def progress(t: float, t_end: float) -> None:
+        if path.exists():
+            with np.load(path) as file:
+                seen.append(len(file["t"]))
+
+    assert mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, progress=progress).success
+    assert len(seen) > 3 and seen == sorted(set(seen))
+
+
+# --- progress -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("certify", [False, True])
+def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: bool) -> None:
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    told = list[tuple[float, float]]()
+    model = mstmm.compile(pins(1, [0.3]))
+    run = model.simulate(2.0, progress=lambda *x: told.append(x), certify=certify)
+    times = [t for t, _ in told]
+    assert run.success and {end for _, end in told} == {2.0}
+    assert times == sorted(times) and times[-1] > 1.7 and times[0] < 0.5
+
+
+def test_a_progress_callback_that_raises_does_not_break_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    calls = list[float]()
+
+    def progress(t: float, t_end: float) -> None:
+        calls.append(t)
+        raise ValueError("a defect of the caller")
+
+    run = mstmm.compile(pins(1, [0.3])).simulate(1.0, progress=progress)
+    assert run.success and len(calls) == 1
+    assert any("a defect of the caller" in text for text in run.warnings)
+
+
+def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
+    run = mstmm.compile(pins(1, [0.3])).simulate(1.0, output_times=np.linspace(0, 1, 3))
+    assert json.dumps(run.settings.output_times) == "[0.0, 0.5, 1.0]"

@@ -1,0 +1,107 @@
+"""Runs that fail end with a status, a time, the last good state and the name of a hinge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.result_scenes import motor, pins, rod
+
+import mstmm
+from mstmm.runtime.integrate import Status
+from mstmm.runtime.result import Result
+
+
+def check_remains(run: Result) -> None:
+    """What was computed before a failure is all there and finite."""
+    assert not run.success and len(run.t) >= 1
+    assert np.isfinite(run.q).all() and np.isfinite(run.u).all()
+    t, q, u = run.last_state
+    assert np.isfinite(t) and np.isfinite(q).all() and np.isfinite(u).all()
+    assert t == pytest.approx(run.t[-1]) and f"{t:.6g}"[:6] in run.message
+    assert str(run.certificate) and run.table() and len(run.names()) > 10
+
+
+@pytest.mark.parametrize("method, step", [("dop853", None), ("dopri5", None), ("rk4", 1e-3)])
+def test_a_motor_that_blows_up(method: str, step: float | None) -> None:
+    """u' = 3 exp(3u) from u = 1 is infinite at t = exp(-3)/9."""
+    run = mstmm.compile(motor("exp(u[0])^3", speed=1.0)).simulate(1.0, method=method, step=step)
+    assert run.status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
+    assert run.last_state[0] == pytest.approx(np.exp(-3) / 9, rel=0.3 if step else 1e-6)
+    assert "motor.angle_rate" in run.message
+    check_remains(run)
+
+
+def test_an_effort_outside_its_domain() -> None:
+    run = mstmm.compile(motor("log(q[0])", speed=-1.0)).simulate(5.0)
+    assert run.status in (Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED)
+    assert "motor" in run.message or "expression" in run.message
+    check_remains(run)
+
+
+def test_too_many_steps() -> None:
+    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, max_steps=7)
+    assert run.status is Status.TOO_MANY_STEPS and "more steps than allowed" in run.message
+    assert run.statistics is not None and run.statistics.steps == 7 and len(run.t) == 8
+    check_remains(run)
+
+
+def test_output_times_do_not_hide_the_last_good_state() -> None:
+    model = mstmm.compile(pins(2, [0.3, 0.4]))
+    run = model.simulate(5.0, max_steps=7, output_times=[0.0, 2.5, 5.0])
+    t, q, u = run.last_state
+    assert list(run.t) == [0.0] and 0 < t < 2.5
+    np.testing.assert_array_equal(q, model.simulate(5.0, max_steps=7).q[-1])
+    assert u.shape == (2,)
+
+
+def singular() -> mstmm.Scene:
+    """A massless carriage on a pin about x, a rod without inertia about its own axis hung from it.
+
+    With the rod along x nothing resists the first pin.
+    """
+    thin = rod("rod") | {"inertia": [0, 1 / 12, 1 / 12]}
+    carriage = {"name": "carriage", "mass": 0.0}
+    roll = {"name": "roll", "type": "pin", "axis": [1, 0, 0], "inboard": "ground",
+            "outboard": "carriage"}  # fmt: skip
+    fold = {"name": "fold", "type": "pin", "inboard": "carriage", "outboard": "rod",
+            "initial": {"q": [0.5]}}  # fmt: skip
+    return mstmm.Scene(gravity=(0, 0, 0), body=[carriage, thin], hinge=[roll, fold])
+
+
+@pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
+def test_a_state_in_which_a_motion_is_undetermined(method: str) -> None:
+    model = mstmm.compile(singular())
+    run = model.simulate(1.0, method=method, initial=([0.0, 0.0], [0.0, 0.0]))
+    assert run.status in (Status.RHS_FAILED, Status.STEP_TOO_SMALL)
+    assert 'hinge "roll"' in run.message and "undetermined" in run.message
+    assert not run.success and run.last_state[0] == 0.0
+    assert np.isnan(run.energy()).all() and any("roll" in text for text in run.warnings)
+    assert str(run.certificate)
+
+
+def test_a_run_into_a_state_in_which_a_motion_is_undetermined() -> None:
+    """The rod is driven along x at t = 0.5 exactly."""
+    data = singular().model_dump(by_alias=True, exclude_unset=True)
+    data["hinge"][1].pop("initial")
+    data["hinge"][1]["drive"] = ["0.5*max(1 - 2*t, 0)"]
+    run = mstmm.compile(mstmm.Scene.from_data(data)).simulate(1.0)
+    assert run.status is Status.RHS_FAILED and 'hinge "roll"' in run.message
+    assert run.last_state[0] == pytest.approx(0.5, abs=1e-6)
+    assert not run.success and len(run.t) > 2 and np.isfinite(run.u).all()
+
+
+def test_success_is_never_said_of_numbers_that_are_not_finite() -> None:
+    from dataclasses import replace
+
+    run = mstmm.compile(pins(1, [0.3])).simulate(1.0)
+    u = run.u.copy()
+    u[3, 0] = np.nan
+    spoilt = Result(run.model, replace(run.trajectory, u=u))
+    assert run.success and not spoilt.success
+    assert any("not finite" in text for text in spoilt.warnings)
+
+
+@pytest.mark.parametrize("t_end", [-1.0, np.nan, np.inf])
+def test_times_that_make_no_sense(t_end: float) -> None:
+    with pytest.raises(mstmm.SceneError, match="t_end"):
+        mstmm.compile(pins(1, [0.3])).simulate(t_end)
