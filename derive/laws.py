@@ -76,7 +76,7 @@ def _friction(p: dict[str, sp.Expr], u: sp.Expr) -> sp.Expr:
 
 # --- rotations by quaternion: a potential of swing and unwrapped twist ------------------------
 
-#: Stiffness about x', y' (swing) and z' (twist), rest twist, damping about x', y', z'.
+#: Stiffness about the hinge axes x, y, z, rest twist about the law axis, damping about x, y, z.
 ROTATIONAL = ("kx", "ky", "kz", "rest_twist", "cx", "cy", "cz")
 
 
@@ -85,15 +85,16 @@ def _swing_twist(
 ) -> tuple[list[Equation], sp.Matrix, sp.Expr, sp.Expr]:
     """(equations, torque in body axes, energy, lost power) of V(swing vector, twist).
 
-    In law axes the rotation is a twist about z' followed by a swing s about an axis normal to z';
-    V = (kx sx^2 + ky sy^2 + kz (twist - rest)^2)/2.  The torque is minus the gradient of V along
+    In law axes (z' along the hinge's axis a) the rotation is a twist psi about z' followed by a
+    swing s about an axis normal to z'.  With sigma = s + (psi - rest) a in hinge axes,
+    V = (kx sigma_x^2 + ky sigma_y^2 + kz sigma_z^2)/2.  The torque is minus the gradient of V along
     the body's infinitesimal rotations, so no energy is made at any angle.  The twist is unwrapped
     to the turn nearest to `twist_ref`.
     """
     kx, ky, kz, rest, cx, cy, cz = (p[first + i, 0] for i in range(7))
-    local = vector("law_q", 4)
-    turned = sp.Matrix([axes[j, i] for i in range(3) for j in range(3)]).reshape(3, 3)
-    axial_part = turned * sp.Matrix(quaternion[1:])
+    local, sigma, push = vector("law_q", 4), vector("sigma", 3), vector("push", 3)
+    frame = sp.Matrix(3, 3, lambda i, j: axes[i, j])
+    axial_part = frame.T * sp.Matrix(quaternion[1:])
     w, x, y, z = sp.symbols("w x y z", real=True)
     square = w**2 + x**2 + y**2 + z**2
     inner, outer = w**2 + z**2, x**2 + y**2
@@ -111,22 +112,27 @@ def _swing_twist(
         along = rates.diff(direction)
         change = sp.Integer(0)
         for symbol, rate in zip((w, x, y, z), along, strict=True):
-            change += (kx * sx * sx.diff(symbol) + ky * sy * sy.diff(symbol)) * rate
-            change += kz * (twist[0, 0] - rest) * twist_rate.get(symbol, 0) * rate
+            change += (push[0, 0] * sx.diff(symbol) + push[1, 0] * sy.diff(symbol)) * rate
+            change += push[2, 0] * twist_rate.get(symbol, 0) * rate
         torque.append(-_named(change, swing, share, factor, slope).xreplace(arrays))
-    energy = (kx * sx**2 + ky * sy**2 + kz * (twist[0, 0] - rest) ** 2) / 2
-    energy = _named(energy, swing, share, factor, slope).xreplace(arrays)
-    local_spin = turned * spin
-    damping = sp.Matrix([-c * s for c, s in zip((cx, cy, cz), local_spin, strict=True)])
+    swings = [_named(s, swing, share, factor, slope).xreplace(arrays) for s in (sx, sy)]
+    damping = sp.Matrix([-c * s for c, s in zip((cx, cy, cz), spin, strict=True)])
+    stiffness = sp.ImmutableDenseMatrix(sp.diag(kx, ky, kz))
     equations = [
         Equation(
             "quaternion in law axes", local, sp.ImmutableDenseMatrix([quaternion[0], *axial_part])
         ),
         *_swing_function(share.xreplace(arrays), (outer / inner).xreplace(arrays), factor, slope),
         Equation("unwrapped twist", twist, _unwrapped(local)),
+        Equation(
+            "swing and twist, law axes",
+            sigma,
+            sp.ImmutableDenseMatrix([*swings, twist[0, 0] - rest]),
+        ),
+        Equation("gradient of V by them", push, axes.T * (stiffness * (axes * sigma))),
     ]
-    body_torque = turned.T * (sp.Matrix(torque) + damping)
-    return equations, body_torque, energy, damping.dot(local_spin)
+    energy = sum(sigma[i, 0] * push[i, 0] for i in range(3)) / 2
+    return equations, frame * sp.Matrix(torque) + damping, energy, damping.dot(spin)
 
 
 def _named(
@@ -183,7 +189,7 @@ def _unwrapped(local: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 
 
 def rotation_law() -> Derivation:
-    """Law of a ball hinge: swing-twist potential, damping about the law axes, given torques."""
+    """Law of a ball hinge: swing-twist potential, damping about outboard axes, given torques."""
     p, q, u = vector("p", 7), vector("q", 4), vector("u", 3)
     axes, given = sp.MatrixSymbol("B", 3, 3), vector("effort", 3)
     spin = sp.Matrix([u[i, 0] for i in range(3)])
@@ -222,22 +228,20 @@ SIX = ("kx", "ky", "kz", "rest_x", "rest_y", "rest_z", "cx", "cy", "cz", *ROTATI
 
 
 def six_direction_law() -> Derivation:
-    """Law of a free or elastic hinge: V = d'^T K d'/2 in inboard law axes plus swing and twist."""
+    """Law of a free or elastic hinge: V = d^T K d/2 in inboard hinge axes plus swing and twist."""
     p, q, u = vector("p", len(SIX)), vector("q", 7), vector("u", 6)
     axes, given = sp.MatrixSymbol("B", 3, 3), vector("effort", 6)
     spin = sp.Matrix([u[i, 0] for i in range(3, 6)])
     quaternion = sp.Matrix([q[i, 0] for i in range(3, 7)])
     equations, torque, energy, lost = _swing_twist(quaternion, p, 9, axes, spin)
     rotation, d_rate = sp.MatrixSymbol("R", 3, 3), vector("law_rate", 3)
-    frame = sp.Matrix(3, 3, lambda i, j: axes[i, j])
     turned = sp.Matrix(3, 3, lambda i, j: rotation[i, j])
-    stretch = frame.T * sp.Matrix([q[i, 0] for i in range(3)])
-    stretch -= sp.Matrix([p[3 + i, 0] for i in range(3)])
+    stretch = sp.Matrix([q[i, 0] - p[3 + i, 0] for i in range(3)])
     rate = sp.Matrix([d_rate[i, 0] for i in range(3)])
     spring = sp.Matrix([-p[i, 0] * stretch[i] for i in range(3)])
     damper = sp.Matrix([-p[6 + i, 0] * rate[i] for i in range(3)])
     energy += sum(p[i, 0] * stretch[i] ** 2 for i in range(3)) / 2
-    force = turned.T * frame * (spring + damper)
+    force = turned.T * (spring + damper)
     efforts = sp.Matrix([given[i, 0] for i in range(6)])
     tau = sp.Matrix.vstack(force, torque) + efforts
     speeds = sp.Matrix([u[i, 0] for i in range(6)])
@@ -245,9 +249,7 @@ def six_direction_law() -> Derivation:
     power = lost + damper.dot(rate) + efforts.dot(speeds)
     equations += [
         Equation("rotation", rotation, sp.ImmutableDenseMatrix(rotation_of(*quaternion))),
-        Equation(
-            "rate of d in law axes", d_rate, sp.ImmutableDenseMatrix(frame.T * turned * velocity)
-        ),
+        Equation("rate of d in hinge axes", d_rate, sp.ImmutableDenseMatrix(turned * velocity)),
         Equation("efforts", vector("tau", 6), sp.ImmutableDenseMatrix(tau)),
         Equation("stored energy", V.symbol, sp.ImmutableDenseMatrix([energy])),
         Equation("lost power", POWER.symbol, sp.ImmutableDenseMatrix([power])),

@@ -16,7 +16,7 @@
 #define HINGE 169     /* transfer matrix of its inboard hinge */
 #define SCALE 338     /* magnitudes of the body's force rows */
 #define STATE 374     /* state at P */
-#define PER_BODY 400
+#define PER_BODY MSTMM_PRODUCT_MATRICES
 #define ROWS 12
 
 static void multiply(const real *a, const real *b, real *out)
@@ -211,10 +211,11 @@ int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot)
 {
     const mstmm_model *model = state->model;
     real overall[N * N], step[N * N], z[N], next[N];
+    real *numbers = state->workspace + model->product->place;
     memset(overall, 0, sizeof overall);
     for (int i = 0; i < N; i++) overall[(N + 1) * i] = 1;
     for (int i = 0; i < model->n_bodies; i++) {
-        real *store = model->product->workspace + (size_t)PER_BODY * i;
+        real *store = numbers + (size_t)PER_BODY * i;
         body_matrix(state, i, applied + 6 * i, store);
         int code = hinge_matrix(state, i, store);
         if (code) return mstmm_fail(state, MSTMM_FAILED_PRODUCT_PIVOT, i, code);
@@ -226,7 +227,7 @@ int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot)
     const real *parent = still;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
-        real *store = model->product->workspace + (size_t)PER_BODY * i;
+        real *store = numbers + (size_t)PER_BODY * i;
         real *block = state->workspace + body->block;
         apply(store + HINGE, z, next);
         mstmm_sweep_frames_state_deviation(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_MOTION, next,

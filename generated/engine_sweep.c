@@ -366,7 +366,6 @@ static int compare_product(mstmm_state *state, const real *product, real *udot)
         udot[i] = product[i];
     }
     real relative = size > 0 ? gap / size : gap;
-    if (!(relative <= *check->estimate)) *check->estimate = relative;
     return relative <= check->accuracy
                ? 0
                : mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, worst, MSTMM_FAILED_PRODUCT_ERROR);
@@ -378,8 +377,12 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
 {
     mstmm_state state = {.model = model, .workspace = workspace, .t = t, .memory = memory,
                          .failure = failure};
-    real *applied = model->product ? model->product->workspace + 400 * model->n_bodies : NULL;
-    real *product = applied ? applied + 6 * model->n_bodies : NULL;
+    const mstmm_product *check = model->product;
+    real *applied = NULL, *product = NULL;
+    if (check) {
+        applied = workspace + check->place + (size_t)MSTMM_PRODUCT_MATRICES * model->n_bodies;
+        product = workspace + check->place + (size_t)MSTMM_PRODUCT_PER_BODY * model->n_bodies;
+    }
     int code = mstmm_state_begin(&state, q, u);
     if (code) return code;
     code = mstmm_forward_pass(&state, qdot);

@@ -94,11 +94,14 @@ typedef struct {
 #define MSTMM_PRODUCT_BALL 1
 #define MSTMM_PRODUCT_ACCELERATION 2
 
+/* Numbers per body: two transfer matrices, scales, a state; applied loads. */
+#define MSTMM_PRODUCT_MATRICES 400
+#define MSTMM_PRODUCT_PER_BODY 406
+
 typedef struct {
     int kind;
-    real accuracy;   /* largest relative deviation from the Riccati sweep that is accepted */
-    real *estimate;  /* the largest one seen */
-    real *workspace; /* n_bodies x 400 */
+    real accuracy; /* largest relative deviation from the Riccati sweep that is accepted */
+    int64_t place; /* of its numbers in the workspace: MSTMM_PRODUCT_PER_BODY a body, then nu */
 } mstmm_product;
 
 typedef struct {

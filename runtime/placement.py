@@ -79,7 +79,7 @@ def alignment(hinge: Hinge) -> tuple[Matrix, Matrix, tuple[float, ...]]:
 
 
 def law_axes(hinge: Hinge) -> Matrix:
-    """Axes of a rotational law: z along the hinge axis, in the hinge's user axes."""
+    """Axes in which a rotation is split: twist about z, the hinge's axis; in its user axes."""
     return _about(hinge.unit_axis, None)
 
 

@@ -86,7 +86,7 @@ def random_hinge(rng: Generator, name: str, kind: str, inboard: str, outboard: s
     if inboard == "ground":
         hinge["position"] = _vector(rng)
     hinge["orientation"] = _quaternion(rng) if rng.random() < 0.5 else _vector(rng, 3.0)
-    if kind not in ("fixed", "gimbal", "ball", "free", "elastic"):
+    if kind not in ("fixed", "gimbal"):  # the axis of a ball is that of its law's twist
         hinge["axis"] = _vector(rng)
     if kind in ("universal", "planar"):
         axis = np.array(hinge["axis"])
