@@ -183,7 +183,10 @@ def _model(plan: Plan) -> Model:
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         for name in plan.quantities:
-            start.quantity(name)
+            try:
+                start.quantity(name)
+            except SceneError as error:
+                raise SceneError(f"--quantity {error}") from None
     return model
 
 

@@ -79,7 +79,8 @@ def test_plot_of_a_scene_whose_coordinates_are_quaternions(mstmm: Command, folde
 
 def test_unknown_quantity_is_refused_before_the_run(mstmm: Command, folder: Path) -> None:
     done = mstmm("simulate", "pendulum.toml", "-q", "rod.tp.position")
-    assert done.code == 2 and "did you mean" in done.err
+    assert done.code == 2 and '--quantity "rod.tp.position"' in done.err
+    assert "did you mean" in done.err
     assert not (folder / "pendulum.nc").exists()
 
 
