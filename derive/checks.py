@@ -5,6 +5,7 @@ Numbers are drawn from a fixed sequence within the declared bounds and evaluated
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Iterable
 
@@ -14,15 +15,17 @@ import sympy as sp
 from mstmm.errors import ElementError
 from mstmm.spec import Param
 
+from . import stated
+from .direct import Undefined, evaluate_matrix
 from .element import Body, ForceElement, Hinge, Symbols
 from .hinge import HingeMotion, motion_of, speeds_of
-from .registry import Element
+from .registry import Element, kind_of
 from .units import Dimension, Misfit, dimension, dimension_of, text
 
 _DIGITS = 40
 _POINTS = 5
 _TOLERANCE = mpmath.mpf(10) ** -25
-Numbers = dict[sp.Symbol, sp.Float]
+Numbers = dict[sp.Basic, float]
 
 
 def check(element: Element) -> None:
@@ -36,21 +39,60 @@ def check(element: Element) -> None:
         check_force(element)
 
 
+#: Longest name of an element: it becomes part of file names.
+_LONGEST = 60
+
+
 def _check_names(element: Element) -> None:
-    if not element.name.isidentifier() or not element.name.isascii():
+    name = element.name
+    if not name.isidentifier() or not name.isascii() or len(name) > _LONGEST:
         raise ElementError(
-            f"{element.name!r} is not a name: letters, digits, underscores, a letter first"
+            f"{name!r:.80} is not a name: at most {_LONGEST} letters, digits and underscores, "
+            "starting with a letter"
         )
-    groups = [element.parameters]
+    where = f"{kind_of(element)} {name}"
+    groups = {"parameters": element.parameters}
     if isinstance(element, Hinge):
-        groups += [element.coordinates, speeds_of(element)]
-    for group in groups:
-        names = [p.name for p in group]
-        for name in names:
-            if names.count(name) > 1:
-                raise ElementError(f"{element.name}: {name!r} is declared twice")
-    for parameter in (p for group in groups for p in group):
-        dimension(parameter.unit)
+        groups["coordinates"] = element.coordinates
+        if element.speeds is not None:
+            groups["speeds"] = element.speeds
+    for what, group in groups.items():
+        _check_declared(f"{where}: {what}", group)
+
+
+def _check_declared(where: str, group: object) -> None:
+    """A tuple of Param with names, known units, and bounds in order."""
+    if not isinstance(group, (tuple, list)) or not all(isinstance(p, Param) for p in group):
+        raise ElementError(
+            f'{where}: expected a tuple such as (Param("radius", "m"),), found {group!r:.80}'
+        )
+    seen: set[str] = set()
+    for p in group:
+        if not isinstance(p.name, str) or not p.name.isidentifier() or not p.name.isascii():
+            raise ElementError(
+                f"{where}: {p.name!r:.80} is not a name: letters, digits and underscores"
+            )
+        if p.name in seen:
+            raise ElementError(f"{where}: {p.name!r} is declared twice")
+        seen.add(p.name)
+        if not isinstance(p.unit, str):
+            raise ElementError(f'{where}: unit of {p.name}: expected text such as "m", "N*m/rad"')
+        try:
+            dimension(p.unit)
+        except ElementError as error:
+            raise ElementError(f"{where}: {p.name}: {error}") from None
+        _check_bounds(f"{where}: {p.name}", p)
+
+
+def _check_bounds(where: str, p: Param) -> None:
+    for what in ("default", "minimum", "maximum"):
+        value = getattr(p, what)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if value is not None and not (number and math.isfinite(value)):
+            raise ElementError(f"{where}: {what}: expected a number, found {value!r:.40}")
+    ordered = [v for v in (p.minimum, p.default, p.maximum) if v is not None]
+    if ordered != sorted(ordered):
+        raise ElementError(f"{where}: expected minimum <= default <= maximum, found {ordered}")
 
 
 # --- hinges -----------------------------------------------------------------------------------
@@ -64,13 +106,19 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
     motion = motion_of(hinge)
     _only_known_symbols(where, motion)
     _units_fit(where, motion)
+    q, u, p = motion.q, motion.u, motion.p
+    given = (
+        ("subspace(q, p)",
+         stated.optional(where, "subspace(q, p)", hinge.subspace, q, p), motion.subspace),
+        ("bias(q, u, p)",
+         stated.optional(where, "bias(q, u, p)", hinge.bias, q, u, p), motion.bias),
+    )  # fmt: skip
     for point in _points(motion):
         _is_rotation(where, motion, point)
+        _numeric(f"{where}: position(q, p)", motion.position, point)
         _has_full_rank(where, motion, point)
-        _agrees(where, "subspace(q, p)", hinge.subspace(motion.q, motion.p), motion.subspace, point)
-        _agrees(
-            where, "bias(q, u, p)", hinge.bias(motion.q, motion.u, motion.p), motion.bias, point
-        )
+        for what, matrix, derived in given:
+            _agrees(where, what, matrix, derived, point)
     return motion
 
 
@@ -85,7 +133,7 @@ def _points(motion: HingeMotion) -> Iterable[Numbers]:
             (motion.p, motion.hinge.parameters),
         ):
             for symbol, parameter in zip(symbols, declared, strict=True):
-                point[symbol] = sp.Float(_draw(parameter, numbers), _DIGITS)
+                point[symbol] = _draw(parameter, numbers)
         yield point
 
 
@@ -98,39 +146,46 @@ def _draw(parameter: Param, numbers: random.Random) -> float:
     return numbers.uniform(low, high)
 
 
-def _numeric(matrix: sp.Matrix, point: Numbers) -> mpmath.matrix:
-    with mpmath.workdps(_DIGITS):
-        values = [
-            [mpmath.mpf(sp.N(e.xreplace(point), _DIGITS)) for e in matrix.row(i)]
-            for i in range(matrix.rows)
-        ]
-        return mpmath.matrix(values) if values and values[0] else mpmath.matrix(matrix.rows, 0)
+def _numeric(where: str, matrix: sp.Matrix, point: Numbers) -> mpmath.matrix:
+    if 0 in matrix.shape:
+        return mpmath.matrix(matrix.rows, 0)
+    try:
+        return mpmath.matrix(evaluate_matrix(matrix, point, _DIGITS))
+    except Undefined as undefined:
+        raise ElementError(f"{where}: {undefined}, at {_at(point)}") from None
+
+
+def _at(point: Numbers) -> str:
+    return ", ".join(f"{name} = {float(value):.3g}" for name, value in point.items())
 
 
 def _only_known_symbols(where: str, motion: HingeMotion) -> None:
     known = {*motion.q, *motion.p}
-    for what, matrix in (
-        ("rotation(q, p)", motion.rotation),
-        ("position(q, p)", motion.position),
+    for what, matrix, names in (
+        ("rotation(q, p)", motion.rotation, known),
+        ("position(q, p)", motion.position, known),
+        ("rates(q, u, p)", motion.rates, known | {*motion.u}),
     ):
-        strange = sorted(map(str, matrix.free_symbols - known))
-        if strange:
-            raise ElementError(
-                f"{where}: {what} contains {', '.join(strange)}; it may use q and p alone"
-            )
-        functions = {f.func for f in matrix.atoms(sp.core.function.AppliedUndef)}
-        if functions:
-            raise ElementError(
-                f"{where}: {what} contains the unknown function {sorted(map(str, functions))[0]}"
-            )
+        _refuse_strange(where, what, matrix, names)
     for speed in motion.u:
         if motion.rates.diff(speed).free_symbols & set(motion.u):
             raise ElementError(f"{where}: rates(q, u, p) must be linear in u: qdot = N(q) u")
+    if any(motion.rates.xreplace(dict.fromkeys(motion.u, sp.Integer(0)))):
+        raise ElementError(f"{where}: rates(q, u, p) must vanish with u: qdot = N(q) u")
+
+
+def _refuse_strange(where: str, what: str, matrix: sp.Basic, known: set[sp.Symbol]) -> None:
+    strange = sorted(map(str, matrix.free_symbols - known))
+    if strange:
+        allowed = what[what.find("(") + 1 : -1] if what.endswith(")") else "its arguments"
+        raise ElementError(
+            f"{where}: {what} contains {', '.join(strange)}; it may use {allowed} alone"
+        )
 
 
 def _is_rotation(where: str, motion: HingeMotion, point: Numbers) -> None:
     with mpmath.workdps(_DIGITS):
-        r = _numeric(motion.rotation, point)
+        r = _numeric(f"{where}: rotation(q, p)", motion.rotation, point)
         defect = mpmath.mnorm(r.T * r - mpmath.eye(3), "f")
         if defect > _TOLERANCE or mpmath.det(r) < 0:
             raise ElementError(
@@ -144,7 +199,9 @@ def _has_full_rank(where: str, motion: HingeMotion, point: Numbers) -> None:
     if motion.nu == 0:
         return
     with mpmath.workdps(_DIGITS):
-        singular = mpmath.svd_r(_numeric(motion.subspace, point), compute_uv=False)
+        singular = mpmath.svd_r(
+            _numeric(f"{where}: motion subspace H", motion.subspace, point), compute_uv=False
+        )
         rank = sum(1 for s in singular if s > singular[0] * mpmath.mpf(10) ** -12)
         if rank < motion.nu:
             raise ElementError(
@@ -156,24 +213,23 @@ def _has_full_rank(where: str, motion: HingeMotion, point: Numbers) -> None:
 
 
 def _agrees(
-    where: str, what: str, stated: sp.Matrix | None, derived: sp.Matrix, point: Numbers
+    where: str, what: str, given: sp.Matrix | None, derived: sp.Matrix, point: Numbers
 ) -> None:
-    if stated is None:
+    if given is None:
         return
-    stated = sp.Matrix(stated)
-    if stated.shape != derived.shape:
+    if given.shape != derived.shape:
         raise ElementError(
-            f"{where}: {what} is {stated.rows} x {stated.cols}, "
+            f"{where}: {what} is {given.rows} x {given.cols}, "
             f"expected {derived.rows} x {derived.cols}"
         )
     with mpmath.workdps(_DIGITS):
-        difference = _numeric(stated, point) - _numeric(derived, point)
+        difference = _numeric(f"{where}: {what}", given, point) - _numeric(where, derived, point)
         for i in range(difference.rows):
             for j in range(difference.cols):
                 if abs(difference[i, j]) > _TOLERANCE:
                     raise ElementError(
                         f"{where}: {what} disagrees with rotation and position in entry "
-                        f"({i + 1}, {j + 1}): stated {stated[i, j]}, derived {derived[i, j]}"
+                        f"({i + 1}, {j + 1}): stated {given[i, j]}, derived {derived[i, j]}"
                     )
 
 
@@ -214,54 +270,65 @@ def _expect(
 
 
 def check_body(body: Body) -> None:
-    """Residual linear in the accelerations, mass matrix symmetric and equal to that of the energy,
-    gyroscopic forces without power, units."""
+    """Residual linear in the accelerations, mass matrix that of the energy, gyroscopic forces
+    without power, units."""
     where = f"body {body.name}"
     p = Symbols("p", tuple(x.name for x in body.parameters))
     a, alpha, w, v = (
         sp.Matrix(sp.symbols(f"{n}_x {n}_y {n}_z", real=True)) for n in ("a", "alpha", "w", "v")
     )
-    residual = sp.Matrix(body.residual(a, alpha, w, p))
-    if residual.shape != (6, 1):
-        raise ElementError(
-            f"{where}: residual(a, alpha, w, p) must be 6 x 1, found {residual.shape}"
-        )
+    forces, energies = "residual(a, alpha, w, p)", "kinetic_energy(v, w, p)"
+    residual = stated.matrix(where, forces, body.residual, (6, 1), a, alpha, w, p)
+    _refuse_strange(where, forces, residual, {*a, *alpha, *w, *p})
     mass = residual.jacobian(sp.Matrix.vstack(a, alpha))
-    if mass.free_symbols & {*a, *alpha}:
-        raise ElementError(f"{where}: residual(a, alpha, w, p) is not linear in a and alpha")
-    energy = sp.sympify(body.kinetic_energy(v, w, p))
-    speeds = sp.Matrix.vstack(v, w)
-    if sp.simplify(sp.hessian(energy, list(speeds)) - mass) != sp.zeros(6, 6):
-        raise ElementError(
-            f"{where}: kinetic_energy(v, w, p) and residual(a, alpha, w, p) state different masses"
-        )
-    _energy_rate(where, residual, energy, (a, alpha, v, w))
-    _body_units(where, body, residual, p, (a, alpha, w))
+    if mass.applyfunc(sp.expand).free_symbols & {*a, *alpha}:
+        raise ElementError(f"{where}: {forces} is not linear in a and alpha")
+    energy = stated.scalar(where, energies, body.kinetic_energy, v, w, p)
+    _refuse_strange(where, energies, energy, {*v, *w, *p})
+    from_energy = sp.hessian(energy, list(sp.Matrix.vstack(v, w)))
+    rate = _energy_rate(residual, energy, (a, alpha, v, w))
+    numbers = random.Random(20261)
+    for _ in range(_POINTS):
+        point: Numbers = {s: numbers.uniform(-1, 1) for s in (*a, *alpha, *w, *v)}
+        point |= {s: _draw(x, numbers) for s, x in zip(p, body.parameters, strict=True)}
+        masses = _numeric(f"{where}: {forces}", mass, point)
+        if not _close(_numeric(f"{where}: {energies}", from_energy, point), masses):
+            raise ElementError(f"{where}: {energies} and {forces} state different masses")
+        power = _numeric(f"{where}: {forces}", rate, point)
+        if not _close(power[:1, :], power[1:, :]):
+            raise ElementError(f"{where}: the power of {forces} is not the rate of {energies}")
+    _body_units(where, body, (residual, energy), p, (a, alpha, w, v))
 
 
-def _energy_rate(
-    where: str, residual: sp.Matrix, energy: sp.Expr, names: tuple[sp.Matrix, ...]
-) -> None:
-    """dT/dt equals the power of the residual (classical acceleration a, velocity in body axes)."""
+def _close(one: mpmath.matrix, two: mpmath.matrix) -> bool:
+    with mpmath.workdps(_DIGITS):
+        size = 1 + max(abs(x) for x in (*one, *two))
+        return all(abs(x - y) <= _TOLERANCE * size for x, y in zip(one, two, strict=True))
+
+
+def _energy_rate(residual: sp.Matrix, energy: sp.Expr, names: tuple[sp.Matrix, ...]) -> sp.Matrix:
+    """[dT/dt; power of the residual] (classical acceleration a, velocity in body axes)."""
     a, alpha, v, w = names
     v_rate = a - w.cross(v)
     rate = sum(energy.diff(s) * r for s, r in zip((*v, *w), (*v_rate, *alpha), strict=True))
     power = residual[:3, :].dot(v) + residual[3:, :].dot(w)
-    if sp.simplify(sp.expand(rate - power)) != 0:
-        raise ElementError(
-            f"{where}: the power of residual(a, alpha, w, p) is not the rate of "
-            "kinetic_energy(v, w, p)"
-        )
+    return sp.Matrix([rate, power])
 
 
 def _body_units(
-    where: str, body: Body, residual: sp.Matrix, p: Symbols, names: tuple[sp.Matrix, ...]
+    where: str,
+    body: Body,
+    said: tuple[sp.Matrix, sp.Expr],
+    p: Symbols,
+    names: tuple[sp.Matrix, ...],
 ) -> None:
     known = _dimensions(p, body.parameters)
-    for symbols, unit in zip(names, ("m/s2", "rad/s2", "rad/s"), strict=True):
+    for symbols, unit in zip(names, ("m/s2", "rad/s2", "rad/s", "m/s"), strict=True):
         known |= {s: dimension(unit) for s in symbols}
+    residual, energy = said
     _expect(where, "the force of residual", sp.expand(residual[:3, :]), "N", known)
     _expect(where, "the moment of residual", sp.expand(residual[3:, :]), "N*m", known)
+    _expect(where, "kinetic_energy", sp.Matrix([energy]), "J", known)
 
 
 def check_force(force: ForceElement) -> None:
@@ -271,17 +338,15 @@ def check_force(force: ForceElement) -> None:
     x, v, w = (sp.Matrix(sp.symbols(f"{n}_1 {n}_2 {n}_3", real=True)) for n in ("x", "v", "w"))
     rotation = sp.Matrix(3, 3, sp.symbols("R_1:10", real=True))
     effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)
-    push, turn = (sp.Matrix(m) for m in force.wrench(x, v, rotation, w, p, effort, t))
-    if push.shape != (3, 1) or turn.shape != (3, 1):
-        raise ElementError(f"{where}: wrench must return two 3 x 1 matrices")
-    energy = sp.sympify(force.potential(x, p))
+    what = "wrench(x, v, rotation, w, p, effort, t)"
+    push, turn = stated.pair(where, what, force.wrench, x, v, rotation, w, p, effort, t)
+    energy = stated.scalar(where, "potential(x, p)", force.potential, x, p)
     known = _dimensions(p, force.parameters)
     for symbols, unit in ((x, "m"), (v, "m/s"), (w, "rad/s"), (rotation, "")):
         known |= {s: dimension(unit) for s in symbols}
     known |= {effort: dimension("N"), t: dimension("s")}
-    strange = (push.free_symbols | turn.free_symbols | energy.free_symbols) - set(known)
-    if strange:
-        raise ElementError(f"{where}: wrench contains {', '.join(sorted(map(str, strange)))}")
+    _refuse_strange(where, what, sp.Matrix.vstack(push, turn), set(known))
+    _refuse_strange(where, "potential(x, p)", energy, {*x, *p})
     _expect(where, "the force of wrench", push, "N", known)
     _expect(where, "the moment of wrench", turn, "N*m", known)
     _expect(where, "potential", sp.Matrix([energy]), "J", known)

@@ -233,6 +233,8 @@ class _Values:
             return self.matrix(e.parent)[int(e.i), int(e.j)]
         if isinstance(e, (sp.Rational, sp.Float, sp.NumberSymbol)):
             return mpmath.mpf(e._to_mpmath(mpmath.mp.prec))
+        if e is sp.I or e in (sp.nan, sp.zoo, sp.oo, -sp.oo):
+            raise Undefined(f"{e} is no real number")
         if isinstance(e, sp.Piecewise):
             return next(self.scalar(value) for value, when in e.args if self.truth(when))
         function = _FUNCTIONS.get(type(e)) or next(

@@ -18,6 +18,7 @@ import sympy as sp
 
 from mstmm.errors import ElementError
 
+from . import stated
 from .derivation import Derivation, Equation, Quantity, axial, vector
 from .element import Hinge, Param, Symbols
 
@@ -75,33 +76,22 @@ def motion_of(hinge: Hinge) -> HingeMotion:
     q = Symbols("q", tuple(c.name for c in hinge.coordinates))
     u = Symbols("u", tuple(s.name for s in speeds))
     p = Symbols("p", tuple(x.name for x in hinge.parameters))
-    rotation = _shaped(hinge, "rotation(q, p)", hinge.rotation(q, p), (3, 3))
-    position = _shaped(hinge, "position(q, p)", hinge.position(q, p), (3, 1))
-    stated_rates = hinge.rates(q, u, p)
-    if stated_rates is None and len(q) != len(u):
+    where = f"hinge {hinge.name}"
+    rotation = stated.matrix(where, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
+    position = stated.matrix(where, "position(q, p)", hinge.position, (3, 1), q, p)
+    rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, p)
+    if rates is None and len(q) != len(u):
         raise ElementError(
-            f"hinge {hinge.name}: {len(q)} coordinates but {len(u)} speeds; "
+            f"{where}: {len(q)} coordinates but {len(u)} speeds; "
             "state qdot = N(q) u in rates(q, u, p)"
         )
-    rates = sp.Matrix(list(u)) if stated_rates is None else stated_rates
-    rates = _shaped(hinge, "rates(q, u, p)", rates, (len(q), 1))
+    given = sp.Matrix(list(u)) if rates is None else rates
+    rates = stated.matrix(where, "rates(q, u, p)", lambda: given, (len(q), 1))
     subspace = _simplify(_subspace(rotation, position, rates, q, u))
     velocities = subspace * sp.Matrix(list(u)) if len(u) else sp.zeros(6, 1)
     v, w = velocities[:3, :], velocities[3:, :]
     bias = _simplify(_bias(v, w, rates, q))
     return HingeMotion(hinge, q, u, p, rotation, position, subspace, v, w, bias, rates)
-
-
-def _shaped(hinge: Hinge, what: str, value: object, shape: tuple[int, int]) -> sp.Matrix:
-    matrix = sp.Matrix(value) if value is not None else sp.zeros(*shape)
-    if 0 in shape:
-        return sp.zeros(*shape)
-    if matrix.shape != shape:
-        raise ElementError(
-            f"hinge {hinge.name}: {what} must be {shape[0]} x {shape[1]}, "
-            f"found {matrix.rows} x {matrix.cols}"
-        )
-    return matrix
 
 
 def _subspace(

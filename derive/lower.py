@@ -22,7 +22,7 @@ NodeMatrix = list[list[Node]]
 SINGULAR = 1
 RELATIVE_PIVOT = sp.Rational(1, 10**13)
 
-_FUNCTIONS: dict[type, str] = {
+FUNCTIONS: dict[type, str] = {
     sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "asin", sp.acos: "acos",
     sp.atan: "atan", sp.atan2: "atan2", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh",
     sp.exp: "exp", sp.log: "log", sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor",
@@ -284,8 +284,8 @@ class _Lowering:
             return self._relation(e)
         if isinstance(e, sp.Not):
             return graph.call("not", self.scalar(e.args[0]))
-        if type(e) in _FUNCTIONS:
-            return graph.call(_FUNCTIONS[type(e)], *(self.scalar(a) for a in e.args))
+        if type(e) in FUNCTIONS:
+            return graph.call(FUNCTIONS[type(e)], *(self.scalar(a) for a in e.args))
         raise NotImplementedError(f"cannot lower {e} ({type(e).__name__})")
 
     def _entry(self, e: sp.Basic) -> Node:

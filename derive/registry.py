@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +17,10 @@ from .element import Body, ForceElement, Hinge
 
 Element = Hinge | Body | ForceElement
 KINDS: tuple[tuple[str, type], ...] = (("hinge", Hinge), ("body", Body), ("force", ForceElement))
+_BASES = (Hinge, Body, ForceElement)
+
+#: Entry points in which installed packages name their elements: a class, or a module of them.
+ENTRY_POINTS = "mstmm.elements"
 
 
 def kind_of(element: Element) -> str:
@@ -24,15 +29,40 @@ def kind_of(element: Element) -> str:
 
 
 def elements_in(module: ModuleType) -> list[Element]:
-    """One instance of every element class that the module itself defines, in order of the text."""
-    return [
-        value()
+    """One instance of every element class that the module itself defines, in order of the text.
+
+    Raises ElementError for a class that cannot be made without arguments or whose name is no text.
+    """
+    classes = [
+        value
         for value in vars(module).values()
         if isinstance(value, type)
-        and issubclass(value, (Hinge, Body, ForceElement))
+        and issubclass(value, _BASES)
         and value.__module__ == module.__name__
-        and isinstance(vars(value).get("name"), str)
+        and "name" in vars(value)
     ]
+    return [instance(value) for value in dict.fromkeys(classes)]
+
+
+def instance(element: type[Element]) -> Element:
+    """An element of its class.  ElementError if the class is none, or cannot be made."""
+    if not (isinstance(element, type) and issubclass(element, _BASES)):
+        raise ElementError(
+            f"{element!r:.80} is no element; expected a subclass of mstmm.derive.Hinge, Body or "
+            "ForceElement"
+        )
+    if not isinstance(getattr(element, "name", None), str):
+        raise ElementError(
+            f'{element.__name__}: name: expected text such as "knee", '
+            f"found {getattr(element, 'name', None)!r:.40}"
+        )
+    try:
+        return element()
+    except Exception as error:
+        raise ElementError(
+            f"{element.__name__}: cannot be made ({type(error).__name__}: {error}); "
+            "a definition takes no arguments"
+        ) from error
 
 
 def builtin_elements() -> list[Element]:
@@ -55,25 +85,59 @@ def builtin_elements() -> list[Element]:
 def load_file(path: str | Path) -> list[Element]:
     """Elements of a Python file (trusted code: it is executed).
 
-    Raises ElementError if the file cannot be run or defines no element.
+    Raises ElementError if the file cannot be run, defines no element, or one twice.
     """
     path = Path(path)
+    if not path.is_file():
+        raise ElementError(f"{path}: no such file")
     name = f"mstmm_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
-    if not path.is_file() or spec is None or spec.loader is None:
-        raise ElementError(f"{path}: no such Python file")
+    if path.suffix != ".py" or spec is None or spec.loader is None:
+        raise ElementError(f"{path}: expected a Python file, ending in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise ElementError(
-            f"{path}: running the file failed with {type(error).__name__}: {error}"
-        ) from error
-    found = elements_in(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        said = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise ElementError(f"{path}: running the file failed with {said}") from error
+    try:
+        return _distinct(elements_in(module))
+    except ElementError as error:
+        raise ElementError(f"{path}: {error}") from error
+
+
+def _distinct(found: list[Element]) -> list[Element]:
     if not found:
         raise ElementError(
-            f"{path}: defines no element; subclass mstmm.derive.Hinge, Body or ForceElement "
+            "defines no element; subclass mstmm.derive.Hinge, Body or ForceElement "
             "and give it a name"
         )
+    keys = [(kind_of(e), e.name) for e in found]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ElementError(f"defines {key[0]} {key[1]!r} twice")
     return found
+
+
+def published() -> list[tuple[str, list[Element]]]:
+    """(distribution, its elements) of the packages that publish elements by entry points.
+
+    Their modules are imported.  Raises ElementError naming the package that fails.
+    """
+    found: dict[str, list[Element]] = {}
+    for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name):
+        owner = entry.dist.name if entry.dist is not None else entry.value
+        try:
+            value = entry.load()
+            made = elements_in(value) if isinstance(value, ModuleType) else [instance(value)]
+        except Exception as error:
+            said = (
+                f"{type(error).__name__}: {error}" if not isinstance(error, ElementError) else error
+            )
+            raise ElementError(
+                f"package {owner}: entry point {entry.name} = {entry.value}: {said}"
+            ) from error
+        found.setdefault(owner, []).extend(made)
+    return [(owner, _distinct(elements)) for owner, elements in found.items()]

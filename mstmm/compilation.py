@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import ElementError, SceneError
+from .hinge_types import HINGE_TYPES
 from .scene import Scene
 from .spec import ElementSpec
 
@@ -67,16 +68,18 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
     written.  A name that a built-in element has is refused.
     """
     from .derive.checks import check
+    from .derive.registry import kind_of
     from .derive.render import element_source, header
     from .derive.specs import spec_of
     from .runtime import prebuilt, store
 
     made = []
     for element in elements:
+        kind, name = kind_of(element), element.name
+        if (kind, name) in prebuilt.elements() or (kind == "hinge" and name in HINGE_TYPES):
+            raise ElementError(f"{kind} {name!r} is built in; choose another name")
         check(element)
         spec = spec_of(element)
-        if (spec.kind, spec.name) in prebuilt.elements():
-            raise ElementError(f"{spec.kind} {spec.name!r} is built in; choose another name")
         files = {"mstmm.h": header(), f"{spec.kind}_{spec.name}.c": element_source(spec)}
         place, how = store.keep(spec, files)
         made.append(Generated(spec, place, how))
@@ -90,6 +93,18 @@ def generate_file(path: str | Path) -> list[Generated]:
     return generate(load_file(path))
 
 
+def generate_published() -> list[Generated]:
+    """`generate` for every element that installed packages publish as entry points.
+
+    The group is "mstmm.elements"; an entry names a class or a module of classes.
+    """
+    from .derive.registry import published
+
+    return generate(element for _, elements in published() for element in elements)
+
+
 def register(element: type[Element]) -> Generated:
     """Make a hinge, body or force element of your own known to scenes by its name."""
-    return generate([element()])[0]
+    from .derive.registry import instance
+
+    return generate([instance(element)])[0]

@@ -87,8 +87,8 @@ def specs() -> dict[Key, ElementSpec]:
     found: dict[Key, ElementSpec] = {}
     for path in sorted(folder().glob("*/element.json")):
         try:
-            spec = element_from_json(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            spec = _read(path)
+        except ElementError:
             continue
         found[spec.kind, spec.name] = spec
     return found
@@ -99,11 +99,16 @@ def spec(key: Key) -> ElementSpec | None:
     path = _place(key) / "element.json"
     if not path.is_file():
         return None
+    return _read(path)
+
+
+def _read(path: Path) -> ElementSpec:
     try:
         return element_from_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        said = f"{type(error).__name__}: {error}"
         raise ElementError(
-            f"{path}: the stored element is damaged ({error}); "
+            f"{path}: the stored element is damaged ({said}); "
             "generate it again: mstmm generate FILE"
         ) from error
 
