@@ -50,7 +50,11 @@ class Packed:
         place = self.placements[name]
         body = self.scene.body[self.topology.order[self.positions[name]]]
         axes = place.axes(body.end_rotation(at))
-        return self.positions[name], (*axes[0], *axes[1], *axes[2]), place.point(body.end_position(at))
+        return (
+            self.positions[name],
+            (*axes[0], *axes[1], *axes[2]),
+            place.point(body.end_position(at)),
+        )
 
 
 def releasable(scene: Scene) -> list[str]:
@@ -69,9 +73,7 @@ def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
     return KERNEL_OF.get(hinge.type, hinge.type)
 
 
-def pack(
-    scene: Scene, known: Known | None = None, product_accuracy: float | None = None
-) -> Packed:
+def pack(scene: Scene, known: Known | None = None, product_accuracy: float | None = None) -> Packed:
     """Engine arrays of a scene; `known` are elements beyond the prebuilt ones.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
@@ -82,6 +84,7 @@ def pack(
     packed = _Packing(scene, known or {}).run()
     if product_accuracy is not None:
         attach(packed, product_accuracy)
+        resize(packed, int(packed.model.tape_slots))
     return packed
 
 
@@ -319,9 +322,7 @@ class _Packing:
         return breaks
 
 
-def user_parameters(
-    element: Element, given: Mapping[str, float], where: str
-) -> tuple[float, ...]:
+def user_parameters(element: Element, given: Mapping[str, float], where: str) -> tuple[float, ...]:
     """Numbers of a user's element in its order, defaults filled in.
 
     Raises SceneError naming the scene's element (`where`) for what is missing or out of bounds.

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
@@ -24,15 +22,14 @@ def attach(packed: Packed, accuracy: float) -> None:
     """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
     scene, lib, ffi = packed.scene, packed.lib, packed.ffi
     _refuse(packed)
-    kind = _KINDS[scene.hinge[0].type]
-    bodies = len(scene.body)
-    arrays = np.zeros(bodies * 406 + packed.layout.nu), np.zeros(1)
     record = ffi.new("mstmm_product *")
-    record.kind = getattr(lib, f"MSTMM_PRODUCT_{kind}")
+    record.kind = getattr(lib, f"MSTMM_PRODUCT_{_KINDS[scene.hinge[0].type]}")
     record.accuracy = accuracy
-    record.workspace, record.estimate = (ffi.from_buffer("real[]", a) for a in arrays)
+    # Its numbers stand between the blocks and what lies behind them: one workspace per thread.
+    record.place = packed.model.scratch
+    packed.model.scratch += len(scene.body) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
     packed.model.product = record
-    packed.kept += [*arrays, record]
+    packed.kept.append(record)
 
 
 def _refuse(packed: Packed) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,17 @@ def test_motions_agree(kind: str) -> None:
     assert product.success, product.message
     assert np.abs(product.q - riccati.q).max() < 1e-9
     assert np.abs(product.u - riccati.u).max() < 1e-8
+
+
+@pytest.mark.parametrize("sweep", ["riccati", "product"])
+def test_threads_share_a_model(sweep: str, rng: np.random.Generator) -> None:
+    scene = chain(["pin"] * 3, skew=0.4, inertia=(0.02, 0.09, 0.08))
+    model = compiled(scene, sweep=sweep, accuracy=1e-6)
+    states = rng.uniform(-1, 1, (2, 2, 5000, 3))
+    expected = [model.accelerations(q, u) for q, u in states]
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda state: model.accelerations(*state), states))
+    assert np.array_equal(found, expected)
 
 
 # --- what it refuses --------------------------------------------------------------------------
