@@ -15,10 +15,10 @@ from mstmm.topology import GROUND_INDEX, Topology, build
 
 from . import placement, prebuilt, values
 from .laws import pack_laws
-from .product import attach
 from .layout import HingeSlots, Layout
 from .placement import GROUND, KERNEL_OF, Placement
 from .prebuilt import Element
+from .product import attach
 
 Known = Mapping[tuple[str, str], Element]
 
@@ -258,7 +258,7 @@ class _Packing:
         records = self.ffi.new("mstmm_load[]", max(1, len(self.scene.load)))
         self.kept.append(records)
         for record, load in zip(records, self.scene.load, strict=False):
-            record.body, axes, offset = packed.end(load.on)
+            record.body, _, offset = packed.end(load.on)
             record.offset = list(offset)
             record.force = [self.values.place(e) for e in load.force]
             record.moment = [self.values.place(e) for e in load.moment]
