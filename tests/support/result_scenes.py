@@ -82,8 +82,8 @@ TREE = {
             "initial": {"q": [0.9, 0.2, -0.3, 0.1], "u": [0.3, 0.9, -0.4]},
         },
         {
-            "name": "slider", "type": "cylindrical", "inboard": "base.right", "outboard": "wheel.rim",
-            "axis": [0, 1, 1], "initial": {"q": [0.1, 0.2], "u": [0.4, -0.6]},
+            "name": "slider", "type": "cylindrical",
+            "inboard": "base.right", "outboard": "wheel.rim", "axis": [0, 1, 1], "initial": {"q": [0.1, 0.2], "u": [0.4, -0.6]},
             "law": {"effort": ["0.5*sin(3*t)", "0.2*cos(t)"]},
         },
     ],
