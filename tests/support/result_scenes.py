@@ -83,7 +83,8 @@ TREE = {
         },
         {
             "name": "slider", "type": "cylindrical",
-            "inboard": "base.right", "outboard": "wheel.rim", "axis": [0, 1, 1], "initial": {"q": [0.1, 0.2], "u": [0.4, -0.6]},
+            "inboard": "base.right", "outboard": "wheel.rim",
+            "axis": [0, 1, 1], "initial": {"q": [0.1, 0.2], "u": [0.4, -0.6]},
             "law": {"effort": ["0.5*sin(3*t)", "0.2*cos(t)"]},
         },
     ],
