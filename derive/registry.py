@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mstmm.errors import ElementError
+from mstmm.spec import ENTRY_POINTS
 
 from . import elements
 from .element import Body, ForceElement, Hinge
@@ -18,9 +19,6 @@ from .element import Body, ForceElement, Hinge
 Element = Hinge | Body | ForceElement
 KINDS: tuple[tuple[str, type], ...] = (("hinge", Hinge), ("body", Body), ("force", ForceElement))
 _BASES = (Hinge, Body, ForceElement)
-
-#: Entry points in which installed packages name their elements: a class, or a module of them.
-ENTRY_POINTS = "mstmm.elements"
 
 
 def kind_of(element: Element) -> str:

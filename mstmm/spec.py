@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from .ir import KernelIR
 
+#: Entry points in which installed packages name their elements: a class, or a module of them.
+ENTRY_POINTS = "mstmm.elements"
+
 
 @dataclass(frozen=True)
 class Param:

@@ -29,13 +29,21 @@ def generate(
             "--check", help="Derive afresh and compare with the committed C; write nothing."
         ),
     ] = False,
+    installed: Annotated[
+        bool,
+        typer.Option(
+            "--installed", help="Generate what installed packages publish (mstmm list installed)."
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Derive, generate and compile: your own elements, or generated/ of a checkout."""
     if files and check:
         raise MstmmError("--check compares the package's own C; to check a file: mstmm check FILE")
-    if files:
-        _own(files, json)
+    if installed and (files or check):
+        raise MstmmError("--installed takes no file and no --check")
+    if files or installed:
+        _own([python_file(file) for file in files or []], json)
     elif check:
         _compare(json)
     else:
@@ -46,14 +54,16 @@ def generate(
 
 
 def _own(files: list[str], json: bool) -> None:
+    """Generate the elements of files; without any, those of installed packages."""
     import mstmm
+    from mstmm.compilation import generate_published
 
     from .output import emit_json, say
 
     made: list[dict[str, Any]] = []
-    for file in files:
+    for file in files or [""]:
         begin = time.perf_counter()
-        elements = mstmm.generate_file(python_file(file))
+        elements = mstmm.generate_file(file) if file else generate_published()
         seconds = time.perf_counter() - begin
         for each in elements:
             spec = each.spec
@@ -63,8 +73,10 @@ def _own(files: list[str], json: bool) -> None:
                 say(f"{spec.kind} {spec.name}: {each.how}; kept in {each.folder} ({seconds:.1f} s)")
     if json:
         emit_json({"generated": made})
-    else:
+    elif made:
         say("Scenes name it by its type.")
+    else:
+        say("No installed package publishes elements.")
 
 
 # --- the package's own ----------------------------------------------------------------------------

@@ -137,6 +137,19 @@ def _user() -> Section:
     return Section(title, columns, rows, [e.to_json() for e in entries])
 
 
+def _installed() -> Section:
+    """Entry points only: nothing is imported for a list."""
+    from importlib.metadata import entry_points
+
+    from mstmm.spec import ENTRY_POINTS
+
+    found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
+    rows = [(e.name, e.dist.name if e.dist is not None else "", e.value) for e in found]
+    data = [dict(zip(("name", "package", "where"), row, strict=True)) for row in rows]
+    title = "published by installed packages; to use them: mstmm generate --installed"
+    return Section(title, ("name", "package", "where"), rows, data)
+
+
 def _joined(names: tuple[str, ...]) -> str:
     return ", ".join(names) or "none"
 
@@ -150,6 +163,7 @@ SECTIONS: dict[str, Callable[[], Section]] = {
     "sweep": _sweep,
     "methods": _methods,
     "user": _user,
+    "installed": _installed,
 }
 
 
