@@ -48,7 +48,7 @@ class Packed:
         if name == "ground":
             return GROUND_INDEX, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
         place = self.placements[name]
-        body = self.scene.body[self.topology.order[self.positions[name]]]
+        body = self.scene.body[self.topology.links[self.positions[name]].body]
         axes = place.axes(body.end_rotation(at))
         return (
             self.positions[name],

@@ -113,9 +113,8 @@ def test_pivot_ratio_bounds_the_error_of_the_accelerations(
         error = np.abs(model.accelerations(q, u) - exact).max() / np.abs(exact).max()
         pivot = model.simulate(1e-6, initial=(q, u)).certificate.pivot
         assert pivot is not None
-        assert error < 2e-15 * pivot.ratio
-        assert pivot.ratio < 1e3 * tip  # no alarm about what is harmless
-        assert pivot.ratio > 0.01 * tip
+        assert error < 3e-15 * pivot.ratio  # drawn 600 times: at most 5e-16, median 1e-16
+        assert 0.1 * tip < pivot.ratio < 30 * tip + 100  # no alarm about what is harmless
 
 
 def test_long_uniform_chains_are_no_reason_to_warn() -> None:
