@@ -22,5 +22,6 @@ chmod +x "$scratch/cc"
 export CC="$scratch/cc" PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks=0
 cd "$scratch/checkout"
 "$VENV/bin/python" setup.py -q build_ext --inplace
-LD_PRELOAD="$(gcc -print-file-name=libasan.so)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
+# libstdc++ as well: extensions of other packages throw C++ exceptions
+LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
     tests/generated tests/runtime tests/integrators
