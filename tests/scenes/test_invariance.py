@@ -12,7 +12,7 @@ from reference.algebra import attitude, orientation
 from reference.compare import fresh, worst
 from reference.jets import Array
 from reference.random_scenes import floating_tree, random_state
-from support.scene_changes import permuted, redescribed, rotated, split
+from support.scene_changes import heavier, permuted, redescribed, reordered, rotated, split
 
 import mstmm
 
@@ -56,6 +56,67 @@ def test_two_welded_halves_are_one_body(draw: int, rng: np.random.Generator) -> 
 def test_the_order_of_bodies_changes_nothing(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng)
     assert deviation(scene, permuted(scene, rng), q, u) < ACCURACY
+
+
+@pytest.mark.parametrize("draw", DRAWS)
+def test_the_order_of_hinges_is_the_order_of_coordinates(
+    draw: int, rng: np.random.Generator
+) -> None:
+    scene, q, u = fresh(rng)
+    other, q_places, u_places = reordered(scene, rng)
+    expected = compiled(scene).accelerations(q, u, TIME)[u_places]
+    found = compiled(other).accelerations(q[q_places], u[u_places], TIME)
+    assert worst(found, expected) < ACCURACY
+
+
+@pytest.mark.parametrize("draw", DRAWS)
+@pytest.mark.parametrize("factor", [2.0**40, 2.0**-40, 3e4])
+def test_the_unit_of_mass_changes_nothing(
+    factor: float, draw: int, rng: np.random.Generator
+) -> None:
+    """A power of two not even in the last bit."""
+    scene, q, u = fresh(rng)
+    expected = compiled(scene).accelerations(q, u, TIME)
+    found = compiled(heavier(scene, factor)).accelerations(q, u, TIME)
+    if factor == 3e4:
+        assert worst(found, expected) < ACCURACY
+    else:
+        assert np.array_equal(found, expected)
+
+
+def test_a_conservative_motion_runs_backwards() -> None:
+    """Speeds reversed at the end, the run leads back to its start."""
+    scene = floating_chain(False, {}, [(0.4, 0.7), (-0.6, -1.1)])
+    for hinge in scene["hinge"]:
+        hinge.get("law", {}).pop("damping", None)
+    model = compiled(scene)
+    q, u = model.initial_state()
+    u[:6] = [0.3, -0.2, 0.1, 0.5, 0.9, -0.4]
+    there = model.simulate(1.5, rtol=1e-12, atol=1e-13, initial=(q, u))
+    back = model.simulate(1.5, rtol=1e-12, atol=1e-13, initial=(there.q[-1], -there.u[-1]))
+    assert np.abs(back.q[-1] - q).max() < 1e-9
+    assert np.abs(back.u[-1] + u).max() < 1e-9
+
+
+def test_a_motion_in_a_moving_frame_is_the_same_motion() -> None:
+    """A constant velocity added to everything that floats without gravity."""
+    scene = floating_chain(False, {}, [(0.4, 0.7), (-0.6, -1.1)])
+    scene["gravity"] = [0.0, 0.0, 0.0]
+    model, drift = compiled(scene), np.array([3.0, -5.0, 2.0])
+    q, u = model.initial_state()
+    u[3:6] = [0.5, 0.9, -0.4]
+    moved = u.copy()
+    moved[:3] += drift  # the root's axes are the inertial ones at the start
+    options: dict[str, Any] = {
+        "rtol": 1e-12, "atol": 1e-13, "output_times": np.linspace(0, 1, 4),
+    }  # fmt: skip
+    here = model.simulate(1.0, initial=(q, u), **options)
+    there = model.simulate(1.0, initial=(q, moved), **options)
+    for i in range(3):
+        travelled = here.t[:, None] * drift
+        name = f"body{i}"
+        assert np.abs(there.position(name) - here.position(name) - travelled).max() < 1e-9
+    assert np.abs(there.u[:, 6:] - here.u[:, 6:]).max() < 1e-9
 
 
 def test_a_motion_in_a_rotated_scene_is_the_rotated_motion(rng: np.random.Generator) -> None:

@@ -133,3 +133,39 @@ def permuted(scene: Scene, rng: np.random.Generator) -> Scene:
     out = copy.deepcopy(scene)
     out["body"] = [out["body"][i] for i in rng.permutation(len(out["body"]))]
     return out
+
+
+def reordered(scene: Scene, rng: np.random.Generator) -> tuple[Scene, list[int], list[int]]:
+    """Hinges in another order, and where the new q and u stand in the old ones."""
+    out, tree = copy.deepcopy(scene), read(scene)
+    order = rng.permutation(len(scene["hinge"]))
+    out["hinge"] = [out["hinge"][i] for i in order]
+    places = [tree.hinges[i] for i in order]
+    q = [k for hinge in places for k in range(hinge.q.start, hinge.q.stop)]
+    u = [k for hinge in places for k in range(hinge.u.start, hinge.u.stop)]
+    return out, q, u
+
+
+def heavier(scene: Scene, factor: float) -> Scene:
+    """Masses, inertias, loads and laws all times `factor`: the same motion."""
+    out = copy.deepcopy(scene)
+    for body in out["body"]:
+        body["mass"] *= factor
+        body["inertia"] = [factor * value for value in body["inertia"]]
+    for hinge in out["hinge"]:
+        law = hinge.get("law", {})
+        for key in ("stiffness", "damping", "inertia"):
+            if key in law:
+                law[key] = [factor * value for value in law[key]]
+        if "effort" in law:
+            law["effort"] = [f"{factor!r}*({text})" for text in law["effort"]]
+        scaled = {"limits": ("stiffness", "damping"), "friction": ("coulomb", "static")}
+        for name, keys in scaled.items():
+            if name in law:
+                law[name] = [e | {key: factor * e[key] for key in keys} for e in law[name]]
+    for load in out.get("load", []):
+        for key in ("force", "moment"):
+            load[key] = [f"{factor!r}*({text})" for text in load[key]]
+    for spring in out.get("spring", []):
+        spring["law"] |= {key: factor * spring["law"][key] for key in ("stiffness", "damping")}
+    return out
