@@ -45,7 +45,7 @@ class Checkpoint:
         self.asked = {
             "scene": _hash(model.scene.to_toml()),
             "settings": _hash(json.dumps(asdict(settings)) + q.tobytes().hex() + u.tobytes().hex()),
-            "kernels": _hash(kernels_hash() + _known(model)),
+            "kernels": kernels_hash(model),
         }
 
     def exists(self) -> bool:
@@ -89,13 +89,3 @@ class Checkpoint:
 
 def _hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _known(model: Model) -> str:
-    """Hashes of the elements that are not prebuilt."""
-    ffi = model._engine.ffi
-    found = []
-    for (kind, name), element in sorted((model.known or {}).items()):
-        text = element.descriptor.hash
-        found.append(f"{kind} {name} {'' if text == ffi.NULL else ffi.string(text).decode()}")
-    return "\n".join(found)

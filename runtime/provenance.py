@@ -20,6 +20,7 @@ from .integrate import Statistics, Status
 from .simulate import Settings, Trajectory
 
 if TYPE_CHECKING:
+    from .model import Model
     from .result import Result
 
 #: Version of the layout of a saved result.
@@ -32,11 +33,18 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 @cache
-def kernels_hash() -> str:
-    """SHA-256 of the manifest of the generated kernels: names and hashes of everything derived."""
-    return hashlib.sha256(
-        files("mstmm.generated").joinpath("manifest.json").read_bytes()
-    ).hexdigest()
+def _manifest() -> bytes:
+    return files("mstmm.generated").joinpath("manifest.json").read_bytes()
+
+
+def kernels_hash(model: Model) -> str:
+    """SHA-256 of the hashes of all generated kernels, and of the elements that are not prebuilt."""
+    found, ffi = hashlib.sha256(_manifest()), model._engine.ffi
+    for (kind, name), element in sorted((model.known or {}).items()):
+        text = element.descriptor.hash
+        own = "" if text == ffi.NULL else ffi.string(text).decode()
+        found.update(f"{kind} {name} {own}\n".encode())
+    return found.hexdigest()
 
 
 def scene_hash(result: Result) -> str:
@@ -63,7 +71,7 @@ def attributes(result: Result) -> dict[str, Any]:
         "format": "mstmm result",
         "format_version": FORMAT,
         "scene_sha256": scene_hash(result),
-        "kernels_sha256": kernels_hash(),
+        "kernels_sha256": kernels_hash(result.model),
         "versions": json.dumps(versions()),
         "settings": json.dumps(settings),
         "status": "INTERRUPTED" if run.status is None else run.status.name,

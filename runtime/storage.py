@@ -6,15 +6,20 @@ import csv
 import shutil
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.scene import Scene
 
-from . import provenance
+from . import provenance, store
 from .dataset import dataset, extra
 from .files import replacing
+from .stability import check_step
+from .steppers import get
 
 if TYPE_CHECKING:
     from .result import Result
@@ -89,12 +94,22 @@ def load(path: Path) -> Result:
 
 
 def _rebuilt(data: Any, path: Path) -> Result:
+    """Scene and model as they were; what only the run knew comes from the file."""
     from .model import Model
     from .result import Result
 
     scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
-    run = provenance.trajectory(data)
-    model = Model(scene)
+    elements, definitions = store.known(store.needed(scene))
+    scene.check_types(definitions)
+    model, run = Model(scene, known=elements), provenance.trajectory(data)
     if run.q.shape[1] != model.nq or run.u.shape[1] != model.nu:
         raise SceneError(f'result file "{path}": its states do not fit its scene')
-    return Result(model, run, provenance.error(data))
+    if data.attrs["kernels_sha256"] != provenance.kernels_hash(model):
+        note = "saved with other kernels: quantities beyond q and u come from the present ones"
+        run = replace(run, notes=(*run.notes, note))
+    step = None
+    if run.settings.step is not None and len(run.t):
+        start = np.concatenate([run.q[0], run.u[0]])
+        tableau = get(run.settings.method)
+        step = check_step(model._engine, tableau, run.settings, start, run.memory[0])
+    return Result(model, run, provenance.error(data), step)

@@ -72,6 +72,19 @@ def test_events_and_interrupted_runs_survive(tmp_path: Path) -> None:
     assert not again.success and again.status == blown.status and again.message == blown.message
 
 
+def test_a_fixed_step_is_judged_again_and_other_kernels_are_noted(tmp_path: Path) -> None:
+    model = mstmm.compile(motor("0", damping=100.0))
+    run = model.simulate(1.0, method="rk4", step=0.02)
+    again = mstmm.load_result(run.save(tmp_path / "run.nc"))
+    assert again.certificate.step == run.certificate.step is not None
+    assert again.warnings == run.warnings
+    with xarray.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as file:
+        data = file.load()
+    data.attrs["kernels_sha256"] = "0" * 64
+    data.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    assert any("other kernels" in text for text in mstmm.load_result(tmp_path / "old.nc").warnings)
+
+
 def test_a_scene_longer_than_an_attribute_can_hold(tmp_path: Path) -> None:
     run = mstmm.compile(pins(150, [0.1] * 150)).simulate(0.01)
     assert len(run.model.scene.to_toml()) > 70_000
