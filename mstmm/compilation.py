@@ -49,6 +49,8 @@ def compile_scene(
         raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
     if sweep not in SWEEPS:
         raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
+    if not accuracy > 0:
+        raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
     from .runtime import store
     from .runtime.model import Model
 

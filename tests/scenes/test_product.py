@@ -196,3 +196,9 @@ def test_scenes_without_a_matrix_are_named(change: Any, named: str) -> None:
 def test_an_unknown_sweep_is_named() -> None:
     with pytest.raises(mstmm.SceneError, match=r"'plain'.*riccati, product"):
         compiled(chain(["pin"]), sweep="plain")
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1e-6, float("nan")])
+def test_an_accuracy_that_nothing_has_is_refused(accuracy: float) -> None:
+    with pytest.raises(mstmm.SceneError, match=r"accuracy = .*positive"):
+        compiled(chain(["pin"]), sweep="product", accuracy=accuracy)

@@ -149,6 +149,7 @@ def reordered(scene: Scene, rng: np.random.Generator) -> tuple[Scene, list[int],
 def heavier(scene: Scene, factor: float) -> Scene:
     """Masses, inertias, loads and laws all times `factor`: the same motion."""
     out = copy.deepcopy(scene)
+    exact = "({}/{})".format(*factor.as_integer_ratio())  # decimals are rounded powers of two
     for body in out["body"]:
         body["mass"] *= factor
         body["inertia"] = [factor * value for value in body["inertia"]]
@@ -158,14 +159,14 @@ def heavier(scene: Scene, factor: float) -> Scene:
             if key in law:
                 law[key] = [factor * value for value in law[key]]
         if "effort" in law:
-            law["effort"] = [f"{factor!r}*({text})" for text in law["effort"]]
+            law["effort"] = [f"{exact}*({text})" for text in law["effort"]]
         scaled = {"limits": ("stiffness", "damping"), "friction": ("coulomb", "static")}
         for name, keys in scaled.items():
             if name in law:
                 law[name] = [e | {key: factor * e[key] for key in keys} for e in law[name]]
     for load in out.get("load", []):
         for key in ("force", "moment"):
-            load[key] = [f"{factor!r}*({text})" for text in load[key]]
+            load[key] = [f"{exact}*({text})" for text in load[key]]
     for spring in out.get("spring", []):
         spring["law"] |= {key: factor * spring["law"][key] for key in ("stiffness", "damping")}
     return out
