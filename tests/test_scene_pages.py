@@ -26,7 +26,7 @@ from mstmm.scene_rules import Table
 PAGES = Path(__file__).parents[1] / "docs" / "use"
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}-{i}")
-    for page in sorted(PAGES.glob("**/*.md"))
+    for page in sorted(PAGES.glob("*.md"))
     for i, block in enumerate(
         re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
     )
