@@ -43,7 +43,7 @@ class StepCheck:
         rate: |lambda| of the fastest motion, 1/s.
         product: h |lambda|.
         amplification: |R(h lambda)|, the factor of that motion in one step.
-        hinge: whose speeds that motion moves most.
+        hinge: whose efforts drive that motion most.
         stable_step: the longest step that is stable for it and keeps h |lambda| <= LIMIT, s.
     """
 
@@ -76,20 +76,36 @@ def check_step(
     n = engine.nq + engine.nu
     try:
         value, vector = fastest(engine, settings.t_start, y[:n].copy(), memory)
+        shares = _shares(engine, settings.t_start, y, memory, vector[engine.nq :])
     except NumericalFailure:  # the run itself will say what is wrong
         return None
     value = complex(min(value.real, 0.0), value.imag)
     rate = abs(value)
     if not rate > 0.0 or not np.isfinite(rate):
         return None
-    weights = np.abs(vector[engine.nq :])
     layout = engine.packed.layout
-    hinge = max(layout.hinges.values(), key=lambda s: float(weights[s.u_slice].sum()))
+    hinge = max(layout.hinges.values(), key=lambda s: float(shares[s.u_slice].sum()))
     return StepCheck(
         settings.step, rate, settings.step * rate,
         float(abs(tableau.amplification(settings.step * value))), hinge.name,
         _longest(tableau, value),
     )  # fmt: skip
+
+
+def _shares(engine: Engine, t: float, y: Array, memory: Array, speeds: Array) -> Array:
+    """(nu,) how much each speed's own effort drives the motion v (nu, complex): |v_k (M v)_k|.
+
+    lambda M v is the effort behind a motion v exp(lambda t): zero along speeds without spring or
+    damper, however much these are moved along.
+    """
+    q, u = y[: engine.nq].copy(), y[engine.nq : engine.nq + engine.nu].copy()
+
+    def efforts(udot: Array) -> Array:
+        return engine.inverse_dynamics(t, q, u, np.ascontiguousarray(udot), memory)
+
+    rest = efforts(np.zeros(engine.nu))
+    moved = efforts(speeds.real) - rest + 1j * (efforts(speeds.imag) - rest)
+    return np.asarray(np.abs(speeds * moved))
 
 
 def _longest(tableau: Tableau, value: complex) -> float:

@@ -58,6 +58,20 @@ def test_a_step_near_the_limit_brings_a_warning(part: float, warns: bool) -> Non
     assert bool(named) == warns
 
 
+@pytest.mark.parametrize("stiff", [0, 1, 2])
+@pytest.mark.parametrize("law", ["stiffness", "damping"])
+def test_the_warning_names_the_stiff_hinge(law: str, stiff: int) -> None:
+    """Not a loose neighbour, though that moves more."""
+    scene = chain(["pin", "ball", "pin"], 0.4, masses=[3.0, 1.0, 0.2])
+    for number, hinge in enumerate(scene["hinge"]):
+        value = 1e6 if number == stiff else 10.0
+        hinge["law"] = {law: [value] * (3 if hinge["type"] == "ball" else 1)}
+    result = mstmm.compile(mstmm.Scene(**scene)).simulate(0.02, "rk4", step=0.01)
+    named = [text for text in result.warnings if "too long" in text]
+    assert named
+    assert f'hinge "hinge{stiff}"' in named[0]
+
+
 def test_an_adaptive_run_takes_the_stiff_spring() -> None:
     model = rod(1e6, 0.0)
     times = np.linspace(0, 0.05, 30)
