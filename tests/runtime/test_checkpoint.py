@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -51,14 +52,29 @@ def remembering() -> mstmm.Scene:
     return mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=hinges)
 
 
-def start(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *arguments], stdout=subprocess.PIPE, text=True
-    )
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Starts a run in a process of its own; none of them outlives the test."""
+    started: list[subprocess.Popen[str]] = []
+
+    def run(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", PROGRAM, *arguments]
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
 
 
 @pytest.mark.slow
-def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(tmp_path: Path) -> None:
+def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
+    tmp_path: Path, start: Start
+) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(remembering().to_toml())
     t_end = "80"
@@ -206,3 +222,16 @@ def test_a_progress_callback_that_raises_does_not_break_the_run(
 def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
     run = mstmm.compile(pins(1, [0.3])).simulate(1.0, output_times=np.linspace(0, 1, 3))
     assert json.dumps(run.settings.output_times) == "[0.0, 0.5, 1.0]"
+
+
+def test_ctrl_c_in_the_second_run_costs_the_estimate_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+
+    def look(self: execution.Watch, run: Run, earlier: object) -> None:
+        if self.run == 1 and run.t > 0.5:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(execution.Watch, "look", look)
+    run = mstmm.compile(pins(1, [0.3])).simulate(2.0, certify=True)
+    assert run.success and run.t[-1] == 2.0 and run.certificate.error is None
+    assert any("interrupted" in text for text in run.warnings)
