@@ -7,6 +7,7 @@ import json
 import os
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,7 +85,8 @@ class Checkpoint:
 
     def remove(self) -> None:
         """The run has ended by itself: nothing to continue."""
-        self.path.unlink(missing_ok=True)
+        with suppress(OSError):  # a file that stays is refused or continued, never wrong
+            self.path.unlink(missing_ok=True)
 
 
 def _hash(text: str) -> str:
