@@ -147,7 +147,7 @@ def hinge_properties(call: Call, generic: Call, source: Source, nu: int) -> tupl
     """
     worst, numbers = Worst(), random.Random(7)
     with mp.workdps(DIGITS):
-        for turn in (None, None, "rest", "quarter turn"):
+        for turn in (None, "rest", "quarter turn"):
             p = source.parameter_values(len(source.parameters), numbers)
             q: list[Any] = [mpmath.mpf(v) for v in source.coordinate_values(numbers, turn)]
             u, s = some(nu, numbers), some(nu, numbers)

@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -64,7 +65,15 @@ def instance(element: type[Element]) -> Element:
 
 
 def builtin_elements() -> list[Element]:
-    """All elements of `derive/elements/`, by file name; ElementError for a name used twice."""
+    """All elements of `derive/elements/`, by file name; the same instances at every call.
+
+    Raises ElementError for a name used twice.
+    """
+    return list(_builtin_elements())
+
+
+@cache
+def _builtin_elements() -> tuple[Element, ...]:
     found: dict[tuple[str, str], str] = {}
     result: list[Element] = []
     for info in sorted(pkgutil.iter_modules(elements.__path__), key=lambda i: i.name):
@@ -77,7 +86,7 @@ def builtin_elements() -> list[Element]:
                 )
             found[key] = info.name
             result.append(element)
-    return result
+    return tuple(result)
 
 
 def load_file(path: str | Path) -> list[Element]:

@@ -56,7 +56,7 @@ PLACES = (
 )
 
 #: Summands tried per place; more of them say the same.
-TRIED = 3
+TRIED = 2
 
 
 @pytest.mark.parametrize(("kind", "name", "kernel", "quantity"), PLACES)
@@ -76,13 +76,14 @@ def noticed(kind: str, name: str, altered: list[Kernel]) -> bool:
     if not all(s.passed for s in mechanics(kind, name, altered, definition(kind, name))):
         return True
     return any(
-        "symmetric" in p for p in crosscheck_kernels(kind, name, None, altered, None, 0).problems
+        "symmetric" in p
+        for p in crosscheck_kernels(kind, name, definition(kind, name), altered, None, 0).problems
     )
 
 
 def test_a_sign_of_the_swing_twist_torque_is_noticed() -> None:
     good = {k.name: k for k in kernels("sweep", "laws")}
-    for mutant in mutants(good["rotation"], "tau")[::7]:
+    for mutant in mutants(good["rotation"], "tau")[::11]:
         failed = {s.name for s in mechanics("sweep", "laws", [mutant]) if not s.passed}
         assert failed
 
