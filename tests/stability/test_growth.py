@@ -31,11 +31,16 @@ def rods(family: str, count: int, **options: Any) -> dict[str, Any]:
 
 
 def error(scene: dict[str, Any], rng: np.random.Generator, **options: Any) -> float:
-    """Worst of three states."""
+    """Worst of three states; infinite where the product has no answer at all."""
     model, found = mstmm.compile(mstmm.Scene(**scene), **options), 0.0
     for _ in range(3):
         q, u = drawn_state(scene, rng)
-        found = max(found, worst(model.accelerations(q, u), precise_accelerations(scene, q, u)))
+        try:
+            udot = model.accelerations(q, u)
+        except mstmm.NumericalFailure:
+            assert options.get("sweep") == "product"
+            return np.inf
+        found = max(found, worst(udot, precise_accelerations(scene, q, u)))
     return found
 
 
@@ -58,8 +63,8 @@ def test_oblique_planar_chain_keeps_its_digits(rng: np.random.Generator) -> None
 
 #: Family -> bodies, smallest and largest error of the product expected there.
 GROWTH = {
-    "planar": [(3, 0.0, 1e-12), (10, 1e-13, 1e-7), (20, 1e-8, 1e-1), (30, 1e-1, np.inf)],
-    "ball": [(3, 0.0, 1e-12), (10, 1e-13, 1e-6), (20, 1e-8, 1e1), (30, 1e-1, np.inf)],
+    "planar": [(3, 0.0, 1e-12), (10, 1e-13, 1e-7), (20, 1e-8, 1e-1), (40, 1.0, np.inf)],
+    "ball": [(3, 0.0, 1e-12), (10, 1e-13, 1e-6), (20, 1e-8, 1e1), (40, 1.0, np.inf)],
     "pins at 30": [(3, 0.0, 1e-11), (10, 1e-12, 1e-3), (30, 1.0, np.inf)],
     "pins at 60": [(3, 0.0, 1e-10), (10, 1e-11, np.inf), (30, 1.0, np.inf)],
 }
@@ -67,10 +72,11 @@ GROWTH = {
 
 @pytest.mark.parametrize("family", GROWTH)
 def test_error_of_the_product_grows_geometrically(family: str) -> None:
+    """By about 4 per body, 6 for pins at 30 degrees, 15 at 60: useless from N = 30 on."""
     rng = np.random.default_rng(20)
     for count, least, most in GROWTH[family]:
         found = error(rods(family, count), rng, sweep="product", accuracy=np.inf)
-        assert least <= found < most, (count, found)
+        assert least <= found <= most, (count, found)
 
 
 # --- vanishing pivots -------------------------------------------------------------------------

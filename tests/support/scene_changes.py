@@ -92,7 +92,11 @@ def split(scene: Scene, name: str, part: float, rng: np.random.Generator) -> Sce
     out = copy.deepcopy(scene)
     whole = next(b for b in read(scene).bodies if b.name == name)
     body = next(b for b in out["body"] if b["name"] == name)
-    apart = rng.uniform(-0.1, 0.1, 3)
+    # Apart as far as leaves a mass distribution: int x x^T dm stays positive definite.
+    spread = np.trace(whole.inertia) / 2 * np.eye(3) - whole.inertia
+    towards = rng.normal(size=3)
+    towards *= 0.6 / np.linalg.norm(towards)
+    apart = np.linalg.cholesky(spread) @ towards / np.sqrt(part * (1 - part) * whole.mass)
     centers = whole.center + (1 - part) * apart, whole.center - part * apart
     masses = part * whole.mass, (1 - part) * whole.mass
     rest = whole.inertia.copy()
