@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from .crosscheck_report import KernelCheck, Report, Statement
 from .errors import ElementError
 from .ir import KernelIR
 from .spec import ElementSpec
@@ -27,104 +28,8 @@ if TYPE_CHECKING:
     from .derive.registry import Element as Definition
     from .runtime.prebuilt import Element as Compiled
 
-#: Largest relative difference between the equations and the IR, both at 50 digits.
-EQUATIONS = 1e-30
 #: Largest relative difference between specialised and generic kernels in doubles.
 SPECIALISED = 1e-13
-
-
-@dataclass(frozen=True)
-class KernelCheck:
-    """One kernel: largest errors over its points.
-
-    `equations`: relative, IR against the stated equations at 50 digits; None if the definition is
-    not at hand.  `compiled`: error of the C as a share of its rounding bound; None if not compiled.
-    `stopped` counts points at which a guard stopped all ways alike.
-    """
-
-    kernel: str
-    points: int
-    stopped: int
-    equations: float | None
-    compiled: float | None
-    worst_point: str
-    problems: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        exact = self.equations is None or self.equations <= EQUATIONS
-        rounded = self.compiled is None or self.compiled <= 1.0
-        return exact and rounded and not self.problems and self.stopped < self.points
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A statement of mechanics about an element, its largest error, and the largest allowed."""
-
-    name: str
-    error: float
-    limit: float
-
-    @property
-    def passed(self) -> bool:
-        return self.error <= self.limit
-
-
-@dataclass(frozen=True)
-class Report:
-    """What was found for one element.  `str(report)` is a table."""
-
-    kind: str
-    name: str
-    kernels: tuple[KernelCheck, ...]
-    statements: tuple[Statement, ...]
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        return all(k.passed for k in self.kernels) and all(s.passed for s in self.statements)
-
-    @property
-    def problems(self) -> list[str]:
-        """One line for everything that failed; empty if all is well."""
-        found = [f"{s.name}: error {s.error:.1e} above {s.limit:.0e}" for s in self.statements
-                 if not s.passed]  # fmt: skip
-        for kernel in self.kernels:
-            found += [f"{kernel.kernel}: {problem}" for problem in kernel.problems]
-            if not (kernel.passed or kernel.problems):
-                found.append(f"{kernel.kernel}: {_errors(kernel)}, worst at {kernel.worst_point!r}")
-        return found
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "kind": self.kind, "name": self.name, "passed": self.passed,
-            "kernels": [{**vars(k), "problems": list(k.problems), "passed": k.passed}
-                        for k in self.kernels],
-            "statements": [{**vars(s), "passed": s.passed} for s in self.statements],
-            "remarks": list(self.remarks), "problems": self.problems,
-        }  # fmt: skip
-
-    def __str__(self) -> str:
-        lines = [f"{self.kind} {self.name}: {'agrees' if self.passed else 'DOES NOT AGREE'}"]
-        for k in self.kernels:
-            said = f"{k.points} points" + (f", {k.stopped} stopped by a guard" if k.stopped else "")
-            lines.append(f"  {k.kernel:12} {_errors(k)}; {said}")
-        width = max((len(s.name) for s in self.statements), default=0)
-        lines += [
-            f"  {s.name:{width}}  {s.error:.1e} (allowed {s.limit:.0e})" for s in self.statements
-        ]
-        lines += [f"  problem: {text}" for text in self.problems]
-        return "\n".join([*lines, *(f"  note: {text}" for text in self.remarks)])
-
-
-def _errors(kernel: KernelCheck) -> str:
-    parts = []
-    if kernel.equations is not None:
-        parts.append(f"equations - IR {kernel.equations:.1e}")
-    if kernel.compiled is not None:
-        parts.append(f"C {kernel.compiled:.2f} of its rounding bound")
-    return ", ".join(parts) or "not compared"
 
 
 # --- what is checked ------------------------------------------------------------------------------
@@ -359,28 +264,24 @@ class _Subject:
             yield each.name, each.error, each.limit
 
     def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
-        """The compiled specialised condense against the compiled generic one."""
+        """The compiled specialised kernels against the compiled generic ones."""
         from .derive.kernels import generic_kernels
         from .runtime import prebuilt
 
         if self.compiled is None or self.compiled.tape is not None:
             return
         generic = prebuilt.element("sweep", f"generic{self.nu}")
-        across = next(k for k in generic_kernels(self.nu) if k.name == "condense").ir()
-        worst = 0.0
-        for point in self.source.points(self.irs["condense"], 4):
-            own = dict(point.inputs)
-            relative = _call(self.compiled, self.irs["hinge"], own | {"u": [0.0] * self.nu})
-            code, one = _call(self.compiled, self.irs["condense"], own)
-            shared = own | {"H": relative[1]["H"], "J": [0.0] * self.nu}
-            other, two = _call(generic, across, shared)
-            if code or other:
-                continue
-            for name, row in one.items():
-                scale = max([abs(v) for v in two[name]] + _entering(name, own))
-                gaps = (abs(a - b) for a, b in zip(row, two[name], strict=True))
-                worst = max(worst, max(gaps, default=0.0) / scale)
-        yield "condense in C: specialised = generic", worst, SPECIALISED
+        shared = {kernel.name: kernel for kernel in generic_kernels(self.nu)}
+        for name in ("forward", "condense", "recover"):
+            worst, other = 0.0, shared[name].ir()
+            for point in self.source.points(self.irs[name], 3):
+                own = {"u": [0.0] * self.nu} | point.inputs
+                _, relative = _call(self.compiled, self.irs["hinge"], own)
+                code, one = _call(self.compiled, self.irs[name], own)
+                refused, two = _call(generic, other, relative | own | {"J": [0.0] * self.nu})
+                if not (code or refused):
+                    worst = max(worst, _deviation(one, two, own))
+            yield f"{name} in C: specialised = generic", worst, SPECIALISED
 
 
 # --- calls ----------------------------------------------------------------------------------------
@@ -444,6 +345,20 @@ def _interpret(
 
 def _size(inputs: Mapping[str, Sequence[float]]) -> float:
     return max((abs(v) for row in inputs.values() for v in row if abs(v) < 1e200), default=1.0)
+
+
+def _deviation(
+    one: Mapping[str, Sequence[float]],
+    two: Mapping[str, Sequence[float]],
+    inputs: Mapping[str, Sequence[float]],
+) -> float:
+    """Largest difference of the outputs of `two`, relative to their largest entries."""
+    worst = 0.0
+    for name, row in two.items():
+        scale = max([abs(v) for v in row] + _entering(name, inputs))
+        gaps = (abs(a - b) for a, b in zip(one[name], row, strict=True))
+        worst = max(worst, max(gaps, default=0.0) / scale)
+    return worst
 
 
 def _entering(name: str, inputs: Mapping[str, Sequence[float]]) -> list[float]:

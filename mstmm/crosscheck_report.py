@@ -1,0 +1,103 @@
+"""What a cross-check found: errors of kernels, statements of mechanics; a table or plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+#: Largest relative difference between the equations and the IR, both at 50 digits.
+EQUATIONS = 1e-30
+
+
+@dataclass(frozen=True)
+class KernelCheck:
+    """One kernel: largest errors over its points.
+
+    `equations`: relative, IR against the stated equations at 50 digits; None if the definition is
+    not at hand.  `compiled`: error of the C as a share of its rounding bound; None if not compiled.
+    `stopped` counts points at which a guard stopped all ways alike.
+    """
+
+    kernel: str
+    points: int
+    stopped: int
+    equations: float | None
+    compiled: float | None
+    worst_point: str
+    problems: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        exact = self.equations is None or self.equations <= EQUATIONS
+        rounded = self.compiled is None or self.compiled <= 1.0
+        return exact and rounded and not self.problems and self.stopped < self.points
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of mechanics about an element, its largest error, and the largest allowed."""
+
+    name: str
+    error: float
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        return self.error <= self.limit
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found for one element.  `str(report)` is a table."""
+
+    kind: str
+    name: str
+    kernels: tuple[KernelCheck, ...]
+    statements: tuple[Statement, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        return all(k.passed for k in self.kernels) and all(s.passed for s in self.statements)
+
+    @property
+    def problems(self) -> list[str]:
+        """One line for everything that failed; empty if all is well."""
+        found = [f"{s.name}: error {s.error:.1e} above {s.limit:.0e}" for s in self.statements
+                 if not s.passed]  # fmt: skip
+        for kernel in self.kernels:
+            found += [f"{kernel.kernel}: {problem}" for problem in kernel.problems]
+            if not (kernel.passed or kernel.problems):
+                found.append(f"{kernel.kernel}: {_errors(kernel)}, worst at {kernel.worst_point!r}")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "kind": self.kind, "name": self.name, "passed": self.passed,
+            "kernels": [{**vars(k), "problems": list(k.problems), "passed": k.passed}
+                        for k in self.kernels],
+            "statements": [{**vars(s), "passed": s.passed} for s in self.statements],
+            "remarks": list(self.remarks), "problems": self.problems,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        lines = [f"{self.kind} {self.name}: {'agrees' if self.passed else 'DOES NOT AGREE'}"]
+        for k in self.kernels:
+            said = f"{k.points} points" + (f", {k.stopped} stopped by a guard" if k.stopped else "")
+            lines.append(f"  {k.kernel:12} {_errors(k)}; {said}")
+        width = max((len(s.name) for s in self.statements), default=0)
+        lines += [
+            f"  {s.name:{width}}  {s.error:.1e} (allowed {s.limit:.0e})" for s in self.statements
+        ]
+        lines += [f"  problem: {text}" for text in self.problems]
+        return "\n".join([*lines, *(f"  note: {text}" for text in self.remarks)])
+
+
+def _errors(kernel: KernelCheck) -> str:
+    parts = []
+    if kernel.equations is not None:
+        parts.append(f"equations - IR {kernel.equations:.1e}")
+    if kernel.compiled is not None:
+        parts.append(f"C {kernel.compiled:.2f} of its rounding bound")
+    return ", ".join(parts) or "not compared"
