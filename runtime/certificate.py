@@ -191,16 +191,18 @@ def _passive(hinge: Hinge) -> bool:
 def _support(result: Result, reach: float) -> tuple[list[bool], list[bool]]:
     """Which components of force, and of moment about the origin, the ground never passes on."""
     scene = result.model.scene
+    roots = [hinge for hinge in scene.hinge if hinge.inboard_body == "ground"]
+    if all(hinge.type in ("free", "elastic") for hinge in roots):  # passive ones: rounding only
+        return [True] * 3, [True] * 3
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
     loads = result._observed.part("loads")
     largest = [_largest(loads[:, :, :3]), _largest(loads[:, :, 3:])]
     largest[1] += largest[0] * reach
-    for hinge in scene.hinge:
-        if hinge.inboard_body == "ground":
-            f = result.force(hinge.name)
-            force = force + f
-            place = result.position(hinge.outboard)
-            moment = moment + result.moment(hinge.name) + np.cross(place, f)
+    for hinge in roots:
+        f = result.force(hinge.name)
+        force = force + f
+        place = result.position(hinge.outboard)
+        moment = moment + result.moment(hinge.name) + np.cross(place, f)
     zero = [[_largest(x[:, k]) <= _ZERO * size for k in range(3)]
             for x, size in zip((force, moment), largest, strict=True)]  # fmt: skip
     return zero[0], zero[1]
