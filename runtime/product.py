@@ -47,7 +47,7 @@ def _refuse(packed: Packed) -> None:
             )
         if _KINDS[kind] != _KINDS[types[0]]:
             raise SceneError(
-                f'hinge "{name}": a {kind} behind a {types[0]} has no classical matrix, because '
+                f'hinge "{name}": type {kind} behind type {types[0]} has no classical matrix: '
                 f"its condition does not determine the free accelerations before it; {way_out}"
             )
     for body in scene.body:
