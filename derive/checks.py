@@ -5,6 +5,7 @@ Numbers are drawn from a fixed sequence within the declared bounds and evaluated
 
 from __future__ import annotations
 
+import difflib
 import math
 import random
 from collections.abc import Iterable
@@ -39,6 +40,21 @@ def check(element: Element) -> None:
         check_force(element)
 
 
+def _check_methods(where: str, element: Element) -> None:
+    """A method whose name is nearly one of the base class would silently do nothing."""
+    base = next(kind for kind in (Hinge, Body, ForceElement) if isinstance(element, kind))
+    known = [name for name in dir(base) if not name.startswith("_")]
+    for name, value in vars(type(element)).items():
+        if name.startswith("_") or name in known or not callable(value):
+            continue
+        near = difflib.get_close_matches(name, known, 1, 0.75)
+        if near:
+            raise ElementError(
+                f"{where}: {name} is no method of a {kind_of(element)}; did you mean {near[0]}? "
+                "(begin the names of your own methods with _)"
+            )
+
+
 #: Longest name of an element: it becomes part of file names.
 _LONGEST = 60
 
@@ -51,6 +67,7 @@ def _check_names(element: Element) -> None:
             "starting with a letter"
         )
     where = f"{kind_of(element)} {name}"
+    _check_methods(where, element)
     groups = {"parameters": element.parameters}
     if isinstance(element, Hinge):
         groups["coordinates"] = element.coordinates

@@ -107,7 +107,9 @@ def _toml(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{where}: not valid TOML: {error}") from None
+        once = "Cannot overwrite a value" in str(error)
+        hint = "; tables that repeat take two brackets, as in [[hinge]]" if once else ""
+        raise SceneError(f"{where}: not valid TOML: {error}{hint}") from None
     except RecursionError:
         raise SceneError(f"{where}: lists or tables are nested too deeply") from None
     except ValueError as error:

@@ -95,7 +95,8 @@ class Certificate:
     def __str__(self) -> str:
         rows = [("run", self.end), ("energy balance", str(self.energy))]
         rows += [(f"{d.name}", str(d)) for d in self.momentum]
-        rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
+        if self.quaternion_residual:
+            rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
         if self.pivot is not None:
             rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
         if self.singular is not None:

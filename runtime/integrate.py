@@ -168,6 +168,7 @@ class Run:
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
+        self.kept_bytes = 0  # of all samples so far
         self._run = run = ffi.new("mstmm_run *")
         run.system = system
         run.tableau = self._tableau(tableau)
@@ -253,6 +254,7 @@ class Run:
         if m:
             rows = (self._t, self._y, self._memory, self._event)
             t, y, memory, event = (x[:m].copy() for x in rows)
+            self.kept_bytes += t.nbytes + y.nbytes + memory.nbytes + event.nbytes
             self._samples.append(Samples(t, y, memory, event))
 
     @property

@@ -216,7 +216,7 @@ class Model:
         times = None
         if output_times is not None:
             times = tuple(float(x) for x in np.atleast_1d(np.asarray(output_times, dtype=float)))
-        if not np.isfinite(t_end) or t_end < t_start:
+        if not isinstance(t_end, (int, float)) or not np.isfinite(t_end) or t_end < t_start:
             raise SceneError(f"t_end = {t_end!r}: expected a time in s, not before t_start")
         settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step, max_steps)
         q, u = self.initial_state() if initial is None else initial

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 #: Seconds between looks at progress, Ctrl-C and checkpoints.
 SLICE = 0.1
 
+#: Bytes of samples at which a run stops and asks for output times.
+LARGEST = 2**30
+
 #: The work is a by-product of a run: it may err by this many times rtol of the energy.
 _WORK_TOLERANCE = 10.0
 
@@ -208,7 +211,10 @@ def interruptible() -> Iterator[list[bool]]:
 
 
 def advance(run: Run, observe: Callable[[Run], None] | None = None) -> Status | None:
-    """Run to the end; None if Ctrl-C came first.  `observe` is called between slices."""
+    """Run to the end; None if Ctrl-C came first or the samples fill the memory they may take.
+
+    `observe` is called between slices.
+    """
     with interruptible() as interrupted:
         while True:
             status = run.advance(SLICE)
@@ -216,7 +222,7 @@ def advance(run: Run, observe: Callable[[Run], None] | None = None) -> Status | 
                 return status
             if observe is not None:
                 observe(run)
-            if interrupted[0]:
+            if interrupted[0] or run.kept_bytes > LARGEST:
                 return None
 
 
@@ -230,11 +236,20 @@ def trajectory(
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    message = f"interrupted at t = {run.t:.9g} s" if status is None else _message(system, run)
+    message = _interrupted(run) if status is None else _message(system, run)
     return split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
+
+
+def _interrupted(run: Run) -> str:
+    if run.kept_bytes <= LARGEST:
+        return f"interrupted at t = {run.t:.9g} s"
+    return (
+        f"interrupted at t = {run.t:.9g} s, because the samples of all steps fill "
+        f"{run.kept_bytes / 2**30:.1f} GiB; ask for output times, or see whether the scene is stiff"
+    )
 
 
 def split(

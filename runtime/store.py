@@ -47,6 +47,7 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
     cannot be written, or if a body or force element cannot be compiled.
     """
     place = _place((spec.kind, spec.name))
+    replaced = _replaces(place, spec)
     try:
         place.mkdir(parents=True, exist_ok=True)
         for name, text in {**files, "element.json": element_to_json(spec)}.items():
@@ -65,11 +66,22 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
             source = place / f"{spec.kind}_{spec.name}.c"
             toolchain.build([source], library)
             _remove_old(place, library)
-        return place, "compiled"
+        return place, f"compiled{replaced}"
     except EnvironmentFailure as error:
         if spec.kind != "hinge":
             raise
-        return place, f"interpreted, several times slower than compiled: {error}"
+        return place, f"interpreted, several times slower than compiled: {error}{replaced}"
+
+
+def _replaces(place: Path, spec: ElementSpec) -> str:
+    """A remark if another definition of this name is in the store."""
+    try:
+        earlier = element_from_json((place / "element.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    if earlier.hash() == spec.hash():
+        return ""
+    return f", replacing another definition of {spec.kind} {spec.name}"
 
 
 def _library(spec: ElementSpec) -> str:

@@ -204,7 +204,9 @@ def compiled(path: str, scene: Scene, sweep: str = "riccati") -> Model:
         model = mstmm.compile(scene, sweep=sweep)
         udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
-        raise SceneError(f"{path}: " + str(error).removeprefix("scene: ")) from None
+        lines = str(error).splitlines()
+        named = (f"{path}: " + line.removeprefix("scene: ") for line in lines)
+        raise SceneError("\n".join(named)) from None
     if not np.isfinite(udot).all():
         raise SceneError(f"{path}: the accelerations at the start are not finite")
     return model

@@ -62,5 +62,8 @@ def get(name: str) -> Tableau:
     if name in BUILT_IN:
         return _built_in(name)
     if name not in _registered:
-        raise SceneError(f"method {name!r} is not known; there are: {', '.join(names())}")
+        raise SceneError(
+            f"method {name!r} is not known; there are: {', '.join(names())}, and SciPy's as "
+            "scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA"
+        )
     return _registered[name]

@@ -80,13 +80,13 @@ def test_a_state_in_which_a_motion_is_undetermined(method: str) -> None:
 
 
 def test_a_run_into_a_state_in_which_a_motion_is_undetermined() -> None:
-    """The rod is driven along x at t = 0.5 exactly."""
+    """The rod is driven along x at t = 0.5, slowing down towards it."""
     data = singular().model_dump(by_alias=True, exclude_unset=True)
     data["hinge"][1].pop("initial")
-    data["hinge"][1]["drive"] = ["0.5*max(1 - 2*t, 0)"]
+    data["hinge"][1]["drive"] = ["0.5*max(1 - 2*t, 0)^2"]
     run = mstmm.compile(mstmm.Scene.from_data(data)).simulate(1.0)
     assert run.status is Status.RHS_FAILED and 'hinge "roll"' in run.message
-    assert run.last_state[0] == pytest.approx(0.5, abs=1e-6)
+    assert run.last_state[0] == pytest.approx(0.5, abs=1e-3)
     assert not run.success and len(run.t) > 2 and np.isfinite(run.u).all()
 
 

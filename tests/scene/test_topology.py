@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from typing import Any
 
 import pytest
@@ -151,22 +150,13 @@ def test_a_copy_that_lost_its_hinges_is_refused_too() -> None:
         topology.build(scene.model_copy(update={"hinge": scene.hinge[:1]}))
 
 
-def test_twenty_thousand_bodies_take_no_stack_and_linear_time() -> None:
-    def seconds(n: int) -> float:
-        """Time of `build` alone, for a chain put together without validation."""
-        bodies = tuple(Body.model_construct(name=f"b{i}") for i in range(n))
-        held = ("ground", *(f"b{i}.tip" for i in range(n)))
-        hinges = tuple(
-            Hinge.model_construct(name=f"h{i}", type="pin", inboard=held[i], outboard=f"b{i}")
-            for i in range(n)
-        )
-        scene = Scene.model_construct(gravity=(0, 0, 0), body=bodies, hinge=hinges)
-        started = time.process_time()
-        tree = topology.build(scene)
-        taken = time.process_time() - started
-        assert tree.is_chain and len(tree.links) == n
-        return taken
-
-    small, large = seconds(2_000), seconds(20_000)
-    assert large < 60 * small  # ten times the bodies
-    assert large < 10
+def test_twenty_thousand_bodies_take_no_stack() -> None:
+    n = 20_000  # put together without validation
+    bodies = tuple(Body.model_construct(name=f"b{i}") for i in range(n))
+    held = ("ground", *(f"b{i}.tip" for i in range(n)))
+    hinges = tuple(
+        Hinge.model_construct(name=f"h{i}", type="pin", inboard=held[i], outboard=f"b{i}")
+        for i in range(n)
+    )
+    tree = topology.build(Scene.model_construct(gravity=(0, 0, 0), body=bodies, hinge=hinges))
+    assert tree.is_chain and len(tree.links) == n

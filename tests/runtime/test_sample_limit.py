@@ -1,0 +1,20 @@
+"""A run that would fill the memory with its samples stops, keeps them and says why."""
+
+from __future__ import annotations
+
+import pytest
+from support.result_scenes import pins
+
+import mstmm
+from mstmm.runtime import simulate
+
+
+def test_a_run_stops_before_its_samples_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulate, "LARGEST", 2**20)
+    monkeypatch.setattr(simulate, "SLICE", 0.01)
+    model = mstmm.compile(pins(2, [0.3, 0.4]))
+    run = model.simulate(1e6, "rk4", 1e-4)
+    assert not run.success and "ask for output times" in run.message
+    assert len(run.t) > 1000 and run.t[-1] < 1e6
+    thin = model.simulate(20.0, "rk4", 1e-3, output_times=[0.0, 20.0])
+    assert thin.success and len(thin.t) == 2
