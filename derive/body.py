@@ -18,7 +18,7 @@ import sympy as sp
 from mstmm.errors import ElementError
 
 from .derivation import Derivation, Equation, Quantity, tilde, vector
-from .element import Body, Symbols
+from .element import Body, Symbols, described
 from .sweep import MOTION, E, S
 
 #: Numbers of R_u and r_u.
@@ -28,8 +28,8 @@ FRAME = 12
 def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
     p = Symbols("p", tuple(x.name for x in body.parameters))
     array = vector("p", len(p) + (0 if body.in_hinge_axes else FRAME))
-    meaning = "parameters of the body"
-    meaning += ", body axes, about its input end" if body.in_hinge_axes else ", then R_u and r_u"
+    meaning = described("parameters", body.parameters)
+    meaning += "; body axes, about its input end" if body.in_hinge_axes else "; then R_u and r_u"
     return p, array, Quantity(array, "", meaning)
 
 

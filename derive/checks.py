@@ -20,7 +20,7 @@ from . import stated
 from .direct import Undefined, evaluate_matrix
 from .element import Body, ForceElement, Hinge, Symbols
 from .hinge import HingeMotion, motion_of, speeds_of
-from .registry import Element, kind_of
+from .registry import Element, builtin_elements, kind_of
 from .units import Dimension, Misfit, dimension, dimension_of, text
 
 _DIGITS = 40
@@ -67,6 +67,10 @@ def _check_names(element: Element) -> None:
             "starting with a letter"
         )
     where = f"{kind_of(element)} {name}"
+    for other in builtin_elements():
+        taken = (kind_of(other), other.name) == (kind_of(element), name)
+        if taken and type(other) is not type(element):
+            raise ElementError(f"{where}: this name is built in; choose another name")
     _check_methods(where, element)
     groups = {"parameters": element.parameters}
     if isinstance(element, Hinge):

@@ -41,6 +41,12 @@ class Symbols:
         raise AttributeError(f"no {name!r} here; declared are {', '.join(self._names) or 'none'}")
 
 
+def described(what: str, declared: tuple[Param, ...]) -> str:
+    """Meaning of an array that holds declared numbers, by their names and units in order."""
+    entries = ", ".join(f"{p.name} [{p.unit}]" if p.unit else p.name for p in declared)
+    return f"{what}: {entries}" if entries else what
+
+
 class Hinge:
     """Motion of the outboard point P against the inboard point Q (design: one hinge for all).
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from .derivation import Derivation, Equation, Quantity, tilde, vector
-from .element import ForceElement, Symbols
+from .element import ForceElement, Symbols, described
 
 #: Failure code of a force element whose direction is undefined (`defined_when`).
 UNDEFINED = 2
@@ -73,7 +73,7 @@ def wrench(element: ForceElement) -> Derivation:
         element.name,
         f"load of the {element.title}",
         (
-            Quantity(parameters, "", "parameters"),
+            Quantity(parameters, "", described("parameters", element.parameters)),
             Quantity(vector("t", 1), "s", "time"),
             Quantity(vector("effort", 1), "", "given effort"),
             *(

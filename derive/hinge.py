@@ -20,7 +20,7 @@ from mstmm.errors import ElementError
 
 from . import stated
 from .derivation import Derivation, Equation, Quantity, axial, vector
-from .element import Hinge, Param, Symbols
+from .element import Hinge, Param, Symbols, described
 
 #: Trigonometric entries with more operations than this are left as differentiation gave them.
 SIMPLIFY_LIMIT = 400
@@ -138,12 +138,15 @@ def simplify_entry(entry: sp.Expr) -> sp.Expr:
 
 def hinge_quantities(hinge: Hinge) -> tuple[Quantity, ...]:
     """Inputs p, q, u of every hinge kernel (arrays of length zero are left out)."""
-    sizes = (
-        ("p", len(hinge.parameters), "parameters"),
-        ("q", len(hinge.coordinates), "coordinates"),
-        ("u", len(speeds_of(hinge)), "speeds"),
+    groups = (
+        ("p", "parameters", hinge.parameters),
+        ("q", "coordinates", hinge.coordinates),
+        ("u", "speeds", speeds_of(hinge)),
     )
-    return tuple(Quantity(sp.MatrixSymbol(n, k, 1), "", text) for n, k, text in sizes)
+    return tuple(
+        Quantity(sp.MatrixSymbol(name, len(declared), 1), "", described(what, declared))
+        for name, what, declared in groups
+    )
 
 
 def hinge_derivation(motion: HingeMotion) -> Derivation:

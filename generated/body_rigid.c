@@ -17,7 +17,7 @@ int mstmm_body_rigid_energy(const real *restrict p, const real *restrict v, cons
 
 /* mass matrix of the rigid body
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
- * in  p[10] parameters of the body, body axes, about its input end
+ * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * out S[21] f = S a + e of everything outboard, at P
  */
 int mstmm_body_rigid_inertia(const real *restrict p, real *restrict S)
@@ -65,7 +65,7 @@ static const mstmm_port mstmm_body_rigid_inertia_outputs[] = {
 
 /* load that the bias motion of the rigid body needs
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
- * in  p[10] parameters of the body, body axes, about its input end
+ * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
@@ -188,7 +188,7 @@ static const mstmm_port mstmm_body_rigid_bias_load_outputs[] = {
 
 /* kinetic energy of the rigid body
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
- * in  p[10] parameters of the body, body axes, about its input end
+ * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  v[3] (m/s) velocity of P
  * in  w[3] (rad/s) angular velocity
  * out T[1] (J) kinetic energy
@@ -279,7 +279,7 @@ static const mstmm_kernel mstmm_body_rigid_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_body_rigid_inertia_inputs,
         .outputs = mstmm_body_rigid_inertia_outputs,
-        .ir_hash = "3ca3bc8202bb2c647f8afb78a8080b7b77a4cdf5a565f96476c980bbd85ce6c2",
+        .ir_hash = "2dcb24e040f4147b102370c47eccc8dcc0e62343bb54001595c25efd1ac0dad9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -291,7 +291,7 @@ static const mstmm_kernel mstmm_body_rigid_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_body_rigid_bias_load_inputs,
         .outputs = mstmm_body_rigid_bias_load_outputs,
-        .ir_hash = "a2d7285879b6184dac02d60739f535e51b60bcc4e7b56d9dbc34fbe1acbd8579",
+        .ir_hash = "77bd0b3d8c098908a29bdf530413bc334f4786bd67a219ec3470e990ca8be19f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -303,7 +303,7 @@ static const mstmm_kernel mstmm_body_rigid_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_body_rigid_energy_inputs,
         .outputs = mstmm_body_rigid_energy_outputs,
-        .ir_hash = "2e9f4a4105fc6c3b5b11c1899189424878297aa4e7202fca73b47d7ff5600b35",
+        .ir_hash = "db089443d2953deb6d07e6bd92feb353a6c4b4bc573541ddbed84165dd7e8a76",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -313,7 +313,7 @@ const mstmm_element mstmm_body_rigid = {
     .abi = MSTMM_ABI,
     .kind = "body",
     .name = "rigid",
-    .hash = "07121f2944a717810302e777794c89c3ae44492a7643833701ba3d758d038095",
+    .hash = "39d0991fdf10ce3057f5ab5d32dbda749250607607bccce69e5c08d6e6f5fa2d",
     .nq = 0,
     .nu = 0,
     .np = 10,

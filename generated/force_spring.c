@@ -15,7 +15,7 @@ int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     real *restrict M, real *restrict V, real *restrict P);
 
 /* load of the spring-damper-actuator
- * in  p[3] parameters
+ * in  p[3] parameters: stiffness [N/m], rest [m], damping [N*s/m]
  * in  t[1] (s) time
  * in  effort[1] given effort
  * in  A_F[3][3] rotation, end axes to inertial axes
@@ -233,7 +233,7 @@ static const mstmm_kernel mstmm_force_spring_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_spring_wrench_inputs,
         .outputs = mstmm_force_spring_wrench_outputs,
-        .ir_hash = "a3dbd5db32c9f60ade000601af828a56f39363841945e473cb077e5118d93726",
+        .ir_hash = "fa88ac1b1a2a68d0707e9e080a74b1de095fa218b687eab0b486102ce311c267",
         .n_guards = 1,
         .guards = mstmm_force_spring_wrench_guards,
     },
@@ -243,7 +243,7 @@ const mstmm_element mstmm_force_spring = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "spring",
-    .hash = "b31e0eb3e3e825d78801322d357d434713793fcf2224e1e92c53d82683651752",
+    .hash = "b8a98a0e630e041a5955cdd7cf74b4c93fcaa44177a9b4d99789d03406bb55e9",
     .nq = 0,
     .nu = 0,
     .np = 3,

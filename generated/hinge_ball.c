@@ -27,8 +27,8 @@ int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
- * in  q[4] coordinates
- * in  u[3] speeds
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][3] motion subspace, rows v then w, P axes
@@ -196,8 +196,8 @@ static const mstmm_port mstmm_hinge_ball_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[4] coordinates
- * in  u[3] speeds
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
  * in  s[3] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -486,7 +486,7 @@ static const mstmm_port mstmm_hinge_ball_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[4] coordinates
+ * in  q[4] coordinates: w, x, y, z
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
@@ -1009,7 +1009,7 @@ static const mstmm_guard mstmm_hinge_ball_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[4] coordinates
+ * in  q[4] coordinates: w, x, y, z
  * in  G[3][6] udot = g - G a_Q
  * in  g[3] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1161,7 +1161,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_ball_hinge_inputs,
         .outputs = mstmm_hinge_ball_hinge_outputs,
-        .ir_hash = "62801d0b9bc8dd305441c4f65883d8be2ec23ee10c896cffbc4077fba6ea1e8d",
+        .ir_hash = "f7e34f635512d768ee3ce89a9f229e2305053c02c5148c4e3d97bcd46b213bad",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1173,7 +1173,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_ball_forward_inputs,
         .outputs = mstmm_hinge_ball_forward_outputs,
-        .ir_hash = "6620b4db10addf788982d3c9c349f0ba5f29b96518d367b763c466344b97a95f",
+        .ir_hash = "af93b33a6955983fb43dfbeb5cb6345b83646b1b60fb49fff821cabe5958b83d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1185,7 +1185,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_ball_condense_inputs,
         .outputs = mstmm_hinge_ball_condense_outputs,
-        .ir_hash = "ffe41acbb260cd28336321cb4a861241eaa7d7b11c62c8e98e0119ee976e37f1",
+        .ir_hash = "37d043e7aa94db253e9b37aa471844821eeca4d2e8e8cc1a925c391354746588",
         .n_guards = 9,
         .guards = mstmm_hinge_ball_condense_guards,
     },
@@ -1197,7 +1197,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_ball_recover_inputs,
         .outputs = mstmm_hinge_ball_recover_outputs,
-        .ir_hash = "f2acb79e00f59808aa44be1432169be1529b044fca8a50d8d459f50bb14472dc",
+        .ir_hash = "04c1da75a12821fbb28b521392f0116d40fd4a72e4cc3b54c4534011d72da072",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1207,7 +1207,7 @@ const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "2d6a5c0279ef046a086aff39ab5a7b274abb61a8e2261db486cdfadfa3d08b83",
+    .hash = "5376e8f14005fb345a354169f67135f393a96e32d39183685467437c49647dd3",
     .nq = 4,
     .nu = 3,
     .np = 0,

@@ -25,8 +25,8 @@ int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restric
 
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
- * in  q[2] coordinates
- * in  u[2] speeds
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][2] motion subspace, rows v then w, P axes
@@ -112,8 +112,8 @@ static const mstmm_port mstmm_hinge_cylindrical_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[2] coordinates
- * in  u[2] speeds
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * in  s[2] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -298,7 +298,7 @@ static const mstmm_port mstmm_hinge_cylindrical_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[2] coordinates
+ * in  q[2] coordinates: displacement [m], angle [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
@@ -812,7 +812,7 @@ static const mstmm_guard mstmm_hinge_cylindrical_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[2] coordinates
+ * in  q[2] coordinates: displacement [m], angle [rad]
  * in  G[2][6] udot = g - G a_Q
  * in  g[2] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -950,7 +950,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_cylindrical_hinge_inputs,
         .outputs = mstmm_hinge_cylindrical_hinge_outputs,
-        .ir_hash = "f20df015d2b3868bc9c694c97f278ac78a049ac30992b1b96134c2da1cbeddec",
+        .ir_hash = "65ef8b0fe9897697e4c345cab86ba799a002908027b15ef4ea4fb607123ed7eb",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -962,7 +962,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_cylindrical_forward_inputs,
         .outputs = mstmm_hinge_cylindrical_forward_outputs,
-        .ir_hash = "06adb14f4fc61a26bd149ed8375902c601fbebd36069175829dfa9925dc29305",
+        .ir_hash = "68e4f6d6a75b581294aa9d0cf31b0fe5f5c10e259c3d63c5af62475648981f7b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -974,7 +974,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_cylindrical_condense_inputs,
         .outputs = mstmm_hinge_cylindrical_condense_outputs,
-        .ir_hash = "2e47ea945f92ef9a4a079a76b527c7ed17b3e932c28c2b61e3e1b6072161d6a6",
+        .ir_hash = "267b82585219bc4452682c7a9b37b3853acc196f1bc49f4c8740f24e10812eb4",
         .n_guards = 6,
         .guards = mstmm_hinge_cylindrical_condense_guards,
     },
@@ -986,7 +986,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_cylindrical_recover_inputs,
         .outputs = mstmm_hinge_cylindrical_recover_outputs,
-        .ir_hash = "3c6f0728d415adac27f1fa415831e95959b2a0d893c4007298c18a3decb6965f",
+        .ir_hash = "2d2fc08b216dc8d03045dc3307caf6086dc61fd49efe8bbfab1cbde1d009a8e1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -996,7 +996,7 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "91ec5590f58b2d1d2b658e0b56978b43a0f644c8c94a452f71aa6e07394efc05",
+    .hash = "276de0ea0b743bc7c54367d80dad52dacecbecd8718b5c104301c7721fcad4c5",
     .nq = 2,
     .nu = 2,
     .np = 0,

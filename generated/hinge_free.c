@@ -25,8 +25,8 @@ int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
 
 /* relative motion of the free hinge
  * in  p[0] parameters
- * in  q[7] coordinates
- * in  u[6] speeds
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][6] motion subspace, rows v then w, P axes
@@ -245,8 +245,8 @@ static const mstmm_port mstmm_hinge_free_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[7] coordinates
- * in  u[6] speeds
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * in  s[6] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -607,7 +607,7 @@ static const mstmm_port mstmm_hinge_free_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[7] coordinates
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[6] (N, N*m) efforts on the free coordinates
@@ -1339,7 +1339,7 @@ static const mstmm_guard mstmm_hinge_free_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[7] coordinates
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
  * in  G[6][6] udot = g - G a_Q
  * in  g[6] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1533,7 +1533,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_free_hinge_inputs,
         .outputs = mstmm_hinge_free_hinge_outputs,
-        .ir_hash = "29f0b46864e0695c3692a96346b00e88f1a87f6435b7e9cf7e118e6a65fd9e82",
+        .ir_hash = "59a42ccf74992bcd234a0b58163a5b4d4a75a3951e6642780a2ca691ed10805f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1545,7 +1545,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_free_forward_inputs,
         .outputs = mstmm_hinge_free_forward_outputs,
-        .ir_hash = "0d697192a20477cda331ed62c731ffc072506752abdd32853b7ffccc61d76115",
+        .ir_hash = "ce4ab98773efb5089d2b3f02f9a66b608c48a4ff14a8248c42d228e430a3a01a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1557,7 +1557,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_free_condense_inputs,
         .outputs = mstmm_hinge_free_condense_outputs,
-        .ir_hash = "3236aead81cb0b4e9ba5a713fa265c6ad900385088e68c8087894ca36f913bc7",
+        .ir_hash = "640494187fa52b6eeabf7f52a267e6f0d824e9bcbe8a203c577d4a00681aff58",
         .n_guards = 18,
         .guards = mstmm_hinge_free_condense_guards,
     },
@@ -1569,7 +1569,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_free_recover_inputs,
         .outputs = mstmm_hinge_free_recover_outputs,
-        .ir_hash = "971140d70ad6aa167146a37135c1986006ae1e7fb9a1956a27fedef3e3b71690",
+        .ir_hash = "257bdfa5a5fc5cad8c7887121ffc61c67d566c74911859aeacf58225606f3f46",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1579,7 +1579,7 @@ const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "14d1d61b4c0897252910f84a64dbb093b6f051c8b7258c261e640378367a7e58",
+    .hash = "8021fd13b1d13bbd399e6598e6c1e873f4cdaeaef497c9f56d34ab6f5af3ba1e",
     .nq = 7,
     .nu = 6,
     .np = 0,

@@ -27,8 +27,8 @@ int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict 
 
 /* relative motion of the gimbal hinge (three angles)
  * in  p[0] parameters
- * in  q[3] coordinates
- * in  u[3] speeds
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][3] motion subspace, rows v then w, P axes
@@ -165,8 +165,8 @@ static const mstmm_port mstmm_hinge_gimbal_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
- * in  u[3] speeds
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
  * in  s[3] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -433,7 +433,7 @@ static const mstmm_port mstmm_hinge_gimbal_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
@@ -1261,7 +1261,7 @@ static const mstmm_guard mstmm_hinge_gimbal_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
  * in  G[3][6] udot = g - G a_Q
  * in  g[3] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1403,7 +1403,7 @@ static const mstmm_port mstmm_hinge_gimbal_recover_outputs[] = {
 
 /* distance from the singular configuration
  * in  p[0] parameters
- * in  q[3] coordinates
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
  * out measure[1] tends to zero where the coordinates fail
  */
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
@@ -1455,7 +1455,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_gimbal_hinge_inputs,
         .outputs = mstmm_hinge_gimbal_hinge_outputs,
-        .ir_hash = "4507ece43806e3a86f9b255c5de75fa9053b331ea5a0a94e66501214f7921baf",
+        .ir_hash = "08e2e4f238112e9ca51c7cdfc6de7703fe54f97b846f952cfdf0c51da60768d1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1467,7 +1467,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_gimbal_forward_inputs,
         .outputs = mstmm_hinge_gimbal_forward_outputs,
-        .ir_hash = "84772221847b0e9e5f6b75fa420cd82cc0be527b19235726325e2bf938dd8ac0",
+        .ir_hash = "8d3592854ec2736e1d3e100f887e54c9861b065185a954f6060ae5c032f90813",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1479,7 +1479,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_gimbal_condense_inputs,
         .outputs = mstmm_hinge_gimbal_condense_outputs,
-        .ir_hash = "9a50712c4214a36ee795aa12cb050de8fe5eb6dd4f33c25bd68a2059101cb930",
+        .ir_hash = "3115239a344af35abe5f66eebd40a3f2cdc2ca03d55f44d257bd4f937b6ba303",
         .n_guards = 9,
         .guards = mstmm_hinge_gimbal_condense_guards,
     },
@@ -1491,7 +1491,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_gimbal_recover_inputs,
         .outputs = mstmm_hinge_gimbal_recover_outputs,
-        .ir_hash = "a74ad93a98a056ca4e17d2b674376166546c8ccadc56d7ec20a0a3a995639cdc",
+        .ir_hash = "45a8dc21ecfe8852232780a99f45c759d6b9fa4221a59b6e47590e52b4376685",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1503,7 +1503,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_hinge_gimbal_singularity_inputs,
         .outputs = mstmm_hinge_gimbal_singularity_outputs,
-        .ir_hash = "90531eea67af266b04c4366a225e96281c3a96abacb5aa75cdae4ea080956f8e",
+        .ir_hash = "d5750e1067ccdd6a42036ac4618ccb23f9035a8c6ae3f2f163bfcf54081edbb5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1513,7 +1513,7 @@ const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "3541345b5899f4dfb1e76d8df29333aaa59b0679407a21876ea20824623f2192",
+    .hash = "6fdb4190d2751a2062f45074c9878aefa53b6c6f5dde760c2e354b8548e3bba7",
     .nq = 3,
     .nu = 3,
     .np = 0,

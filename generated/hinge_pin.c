@@ -27,8 +27,8 @@ int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, con
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6] motion subspace, rows v then w, P axes
@@ -107,8 +107,8 @@ static const mstmm_port mstmm_hinge_pin_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
  * in  s[1] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -280,7 +280,7 @@ static const mstmm_port mstmm_hinge_pin_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
+ * in  q[1] coordinates: angle [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
@@ -777,7 +777,7 @@ static const mstmm_guard mstmm_hinge_pin_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
+ * in  q[1] coordinates: angle [rad]
  * in  G[1][6] udot = g - G a_Q
  * in  g[1] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -901,7 +901,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_pin_hinge_inputs,
         .outputs = mstmm_hinge_pin_hinge_outputs,
-        .ir_hash = "77fbe54910452f427b87ab459739404e55c548ce6175bee12898d16b523a7349",
+        .ir_hash = "0d03f7790d259a43a3bfa19d01815b0f37df96e964ebf81adf24e7e3c32cf69c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -913,7 +913,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_pin_forward_inputs,
         .outputs = mstmm_hinge_pin_forward_outputs,
-        .ir_hash = "5aa2b3116f8e288bbecaf4e5c414dadc2161058b49749f4f1a8750799d41ef29",
+        .ir_hash = "a670a29652ee1cb4d567aaa204b75e1cba574962bb89390557abe6703276dd4d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -925,7 +925,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_pin_condense_inputs,
         .outputs = mstmm_hinge_pin_condense_outputs,
-        .ir_hash = "b5d9b27e929dd0d5310a16d96febf2ecbee5018a32f3c6ab633348537e8bee63",
+        .ir_hash = "d48915361ed268e6c55d091d28ef1fd929cb8a5cd9df615cdabe44285ff49686",
         .n_guards = 3,
         .guards = mstmm_hinge_pin_condense_guards,
     },
@@ -937,7 +937,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_pin_recover_inputs,
         .outputs = mstmm_hinge_pin_recover_outputs,
-        .ir_hash = "852a66043c4eef6743aafbabfa0c7a80eeb8b96ed02e27d9407139b9b69cd755",
+        .ir_hash = "cbf6e99ca785286b046ad59e858198dcda62af58fca85713c63b4b0bcc3d9638",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -947,7 +947,7 @@ const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "fe9aeece20a2aaf7780571f9ad1bdf0ceaaebaf901d4447808ba4c10dc8220ad",
+    .hash = "ad4bc642881f734a9172aa54c6daa159b44a708616ea057de2bd767ad8cc2709",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -25,8 +25,8 @@ int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
 
 /* relative motion of the planar hinge
  * in  p[0] parameters
- * in  q[3] coordinates
- * in  u[3] speeds
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][3] motion subspace, rows v then w, P axes
@@ -125,8 +125,8 @@ static const mstmm_port mstmm_hinge_planar_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
- * in  u[3] speeds
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
  * in  s[3] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -336,7 +336,7 @@ static const mstmm_port mstmm_hinge_planar_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
@@ -1126,7 +1126,7 @@ static const mstmm_guard mstmm_hinge_planar_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[3] coordinates
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
  * in  G[3][6] udot = g - G a_Q
  * in  g[3] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1285,7 +1285,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_planar_hinge_inputs,
         .outputs = mstmm_hinge_planar_hinge_outputs,
-        .ir_hash = "7b67195bc2e7637c4c269c9bd3821a7b2b8508f10737764f7f9b6145cbffdf11",
+        .ir_hash = "363276a9aa527332b06a431ba677eef0b585df9dcd2615fd5b37b4fb90e02fa7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1297,7 +1297,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_planar_forward_inputs,
         .outputs = mstmm_hinge_planar_forward_outputs,
-        .ir_hash = "3b2f1cd70ab1f395e6b2ef3b03dcf1998f1f092b836e4c0c16271ea16b3e3bb3",
+        .ir_hash = "e8cbe1d901e315dc21656a0d382467d82a5cdfa698da81d77f792530eb707e23",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1309,7 +1309,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_planar_condense_inputs,
         .outputs = mstmm_hinge_planar_condense_outputs,
-        .ir_hash = "b4148b8fb9a16306804001728d327822d36e5dd38b267e3aae665cc14945e8e9",
+        .ir_hash = "0d88c8e9f2ce68831c1f4404b65e67eb3d37366fd0f927b1cd287390fa8e3bdc",
         .n_guards = 9,
         .guards = mstmm_hinge_planar_condense_guards,
     },
@@ -1321,7 +1321,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_planar_recover_inputs,
         .outputs = mstmm_hinge_planar_recover_outputs,
-        .ir_hash = "a4e2efe336f0d0976fc8fce1299a1b3e81056abd1a656d47701d31f828821c91",
+        .ir_hash = "39b525c12493098521f00ba39eef73c0cb06ab82e6abeb70f1310322c4a31452",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1331,7 +1331,7 @@ const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "622a9d95f002aa26706888f3693b8ecdf1950dcd9ebc2db6d3ea13aa50a318ff",
+    .hash = "645794febe954c4533fef7fd20196301533b7b4278da90ead5275f51d7ade127",
     .nq = 3,
     .nu = 3,
     .np = 0,

@@ -25,8 +25,8 @@ int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict 
 
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6] motion subspace, rows v then w, P axes
@@ -102,8 +102,8 @@ static const mstmm_port mstmm_hinge_prismatic_hinge_outputs[] = {
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
  * in  s[1] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -261,7 +261,7 @@ static const mstmm_port mstmm_hinge_prismatic_forward_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
+ * in  q[1] coordinates: displacement [m]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
@@ -767,7 +767,7 @@ static const mstmm_guard mstmm_hinge_prismatic_condense_guards[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
- * in  q[1] coordinates
+ * in  q[1] coordinates: displacement [m]
  * in  G[1][6] udot = g - G a_Q
  * in  g[1] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -891,7 +891,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_prismatic_hinge_inputs,
         .outputs = mstmm_hinge_prismatic_hinge_outputs,
-        .ir_hash = "4291fb34fafafb7f2ee184f2f6a7c33c729fadd0a533f9477d0371603139fd4b",
+        .ir_hash = "7b78708789a2d53c3d6a6208323e19a5f268609ac24cb7a1512913a448564fc4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -903,7 +903,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_prismatic_forward_inputs,
         .outputs = mstmm_hinge_prismatic_forward_outputs,
-        .ir_hash = "2af506d98e9eb666e1c62ac50d1ae14a4c03c9391a4ce6d4c8ce6ab666f40260",
+        .ir_hash = "6b3c7ea1b891c988f8b7a5a17d9e47d3f72cda278828689a7c5da974a8fa4bc6",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -915,7 +915,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_prismatic_condense_inputs,
         .outputs = mstmm_hinge_prismatic_condense_outputs,
-        .ir_hash = "5d46f5f8bdec7d54357740e6bc106847d351dcac22266b4752b6fbe450571148",
+        .ir_hash = "bc168f2140a392c7bafda46c0ca1d45ae00a8f7060fc246e14c30d9c1a1c0d05",
         .n_guards = 3,
         .guards = mstmm_hinge_prismatic_condense_guards,
     },
@@ -927,7 +927,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_prismatic_recover_inputs,
         .outputs = mstmm_hinge_prismatic_recover_outputs,
-        .ir_hash = "94310bf6f066758cfcbc6c2391541ffd989ed05db35c839a401160f2d05af017",
+        .ir_hash = "066341a34c3a5b9c3c744848aa2b67512ad9347811298faa882399e4cc60a0f8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -937,7 +937,7 @@ const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "0a8cc8eb99174d8673066ff738496d9098463ea6aa3b291ab287163f2b2d67e3",
+    .hash = "e2ffac2554c63ec3fa477750d0a3320908711a92aa956c5be26167db4b680eb3",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -24,9 +24,9 @@ int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* relative motion of the screw hinge
- * in  p[1] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6] motion subspace, rows v then w, P axes
@@ -110,9 +110,9 @@ static const mstmm_port mstmm_hinge_screw_hinge_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
- * in  p[1] parameters
- * in  q[1] coordinates
- * in  u[1] speeds
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
  * in  s[1] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -303,8 +303,8 @@ static const mstmm_port mstmm_hinge_screw_forward_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  p[1] parameters
- * in  q[1] coordinates
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
@@ -920,8 +920,8 @@ static const mstmm_guard mstmm_hinge_screw_condense_guards[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  p[1] parameters
- * in  q[1] coordinates
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
  * in  G[1][6] udot = g - G a_Q
  * in  g[1] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1057,7 +1057,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_screw_hinge_inputs,
         .outputs = mstmm_hinge_screw_hinge_outputs,
-        .ir_hash = "e7d3a9e418ef12af4651ceb540e128b6838eda2f1a0c53d773d04b4c94c470b5",
+        .ir_hash = "37c53725edeb8f7c1684691540dcae6bd4e32c053a80be296d8ca7b095ca28d9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1069,7 +1069,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_screw_forward_inputs,
         .outputs = mstmm_hinge_screw_forward_outputs,
-        .ir_hash = "ad60bfaa177d98125b70fd21e4c1c69b70fa5a7bea40dbf105c3ab424d7d967a",
+        .ir_hash = "b3ce21e4b1876dc0f3fbd221d78866e6ef9eb6c52e0b1607174bec34e76461cf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1081,7 +1081,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_screw_condense_inputs,
         .outputs = mstmm_hinge_screw_condense_outputs,
-        .ir_hash = "a043bb72cc7deda664c87eaca73ac0c35ad9050ac743d1850bbf00fb7694d0ff",
+        .ir_hash = "43f6b8032b5ffdbfb628ea9051f790c5edfa5ec91f49524f18d4c9db1db08b62",
         .n_guards = 3,
         .guards = mstmm_hinge_screw_condense_guards,
     },
@@ -1093,7 +1093,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_screw_recover_inputs,
         .outputs = mstmm_hinge_screw_recover_outputs,
-        .ir_hash = "f2a92872b5b928c7f560038d1a2868a35ecb108259ccbce72a3e7af6bbf2d619",
+        .ir_hash = "4f264de50beadadf07437e89d927cd61f726f5f3819ce5d8b9313cb4f52d8170",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1103,7 +1103,7 @@ const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "7f50f06abddb54ff415a423bf80b8ff00ab8b1c781d922bb935316cbf57fc1e3",
+    .hash = "24176423d828688cfa82b7d1e64a40efba5a5eb5dcca3f8351dc7d3b81e16e5f",
     .nq = 1,
     .nu = 1,
     .np = 1,

@@ -24,9 +24,9 @@ int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict 
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* relative motion of the universal hinge
- * in  p[1] parameters
- * in  q[2] coordinates
- * in  u[2] speeds
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * out R[3][3] rotation, P axes to Q axes
  * out d[3] (m) position of P from Q, Q axes
  * out H[6][2] motion subspace, rows v then w, P axes
@@ -141,9 +141,9 @@ static const mstmm_port mstmm_hinge_universal_hinge_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
- * in  p[1] parameters
- * in  q[2] coordinates
- * in  u[2] speeds
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * in  s[2] prescribed part of udot (zero where free)
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
  * out Rc[3][3] rotation, body axes to parent axes
@@ -388,8 +388,8 @@ static const mstmm_port mstmm_hinge_universal_forward_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  p[1] parameters
- * in  q[2] coordinates
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
@@ -1045,8 +1045,8 @@ static const mstmm_guard mstmm_hinge_universal_condense_guards[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  p[1] parameters
- * in  q[2] coordinates
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
  * in  G[2][6] udot = g - G a_Q
  * in  g[2] udot = g - G a_Q
  * in  delta_I[6] deviation of the parent's acceleration
@@ -1201,7 +1201,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 7,
         .inputs = mstmm_hinge_universal_hinge_inputs,
         .outputs = mstmm_hinge_universal_hinge_outputs,
-        .ir_hash = "1a19fd160f55ac0b416ba935d6b0b947b34359cb0b5ca802a4ae8bbfedf88f89",
+        .ir_hash = "b88348cb25b75d4181745ab96370add5f49d15ac3f6c26be88784631d2467a9a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1213,7 +1213,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_universal_forward_inputs,
         .outputs = mstmm_hinge_universal_forward_outputs,
-        .ir_hash = "bf78a7853c125462db05996a4ef1d1e534c4eb1aeebb1f0b77e6513758290015",
+        .ir_hash = "83041adfabc42d0636cb116249179eb761419b116273417157dbfa39eeecfe92",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1225,7 +1225,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_universal_condense_inputs,
         .outputs = mstmm_hinge_universal_condense_outputs,
-        .ir_hash = "bf4b82f59d28677d0bea62f76c9c7cd6633c86bb1cf81d87480a1a4a9765afac",
+        .ir_hash = "00fc145b1aae51e351297826a75661a7534993c91f6d0b9552cee1a30a8685eb",
         .n_guards = 6,
         .guards = mstmm_hinge_universal_condense_guards,
     },
@@ -1237,7 +1237,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_hinge_universal_recover_inputs,
         .outputs = mstmm_hinge_universal_recover_outputs,
-        .ir_hash = "e9a5b1496cdbc6db55eba37fa374ad7d512155b43547856323c13f8379138900",
+        .ir_hash = "cc00a7f59082a982ef9fe9a5d3bd1a3f07607febeb5c934205b312f2ad2cace7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1247,7 +1247,7 @@ const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "f8b1a164711d662099909f192950db4b1286623dc6cf3f5d13f775e0552038e1",
+    .hash = "2cccd99d319357a865dc953afb391f8ab603dd7718a1f9fe3b68c6287d23a271",
     .nq = 2,
     .nu = 2,
     .np = 1,
