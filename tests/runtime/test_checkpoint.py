@@ -77,7 +77,7 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
 ) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(remembering().to_toml())
-    t_end = "80"
+    t_end = "800"  # some seconds of work, so that Ctrl-C comes in the midst of it
     full = start(str(scene), str(tmp_path / "full.npz"), "full", t_end)
     cut = start(str(scene), str(tmp_path / "cut.npz"), "cut", t_end)
     assert cut.stdout is not None
