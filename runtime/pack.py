@@ -217,10 +217,11 @@ class _Packing:
 
     def _imposed(self, record: Any, hinge: Hinge, slots: HingeSlots) -> None:
         held = hinge.type == "fixed" and slots.nu > 0
-        drive = hinge.drive or (None,) * slots.nu
-        mask = [1 if held else int(entry is not None) for entry in drive[: slots.nu]]
-        mask = mask or [1] * slots.nu if held else mask
-        rotor = [hinge.law.entry(k).inertia for k in range(slots.nu)] if not held else [0.0] * 6
+        if held:
+            mask, rotor = [1] * slots.nu, [0.0] * slots.nu
+        else:
+            mask = [int(entry is not None) for entry in hinge.drive or (None,) * slots.nu]
+            rotor = [hinge.law.entry(k).inertia for k in range(slots.nu)]
         record.release = self.releases.get(hinge.name, -1)
         record.n_imposed = sum(mask)
         record.imposed_mask = self.ints(mask)
@@ -303,12 +304,7 @@ class _Packing:
     def _sizes(self, packed: Packed) -> None:
         model, layout = packed.model, self.layout
         model.nq, model.nu, model.n_memory = layout.nq, layout.nu, packed.n_memory
-        # Event tapes are laid out later: they hold the state, twice the probes and some terms.
-        model.tape_slots = self.slots
-        self._resize(packed, self.slots)
-
-    def _resize(self, packed: Packed, slots: int) -> None:
-        resize(packed, slots)
+        resize(packed, self.slots)  # tapes of events are laid out later and may need more
 
     def _breaks(self) -> set[float]:
         breaks = set(self.values.breaks)
