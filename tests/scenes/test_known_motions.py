@@ -107,3 +107,16 @@ def test_steady_precession_keeps_its_angle(branch: int) -> None:
     turned = np.unwrap(np.arctan2(axes[:, 1], axes[:, 0]))
     assert axes[:, 2] == pytest.approx(np.cos(theta), abs=1e-10)
     assert turned - turned[0] == pytest.approx(rate * times, abs=1e-9)
+
+
+def test_a_weld_that_lets_go_falls_freely() -> None:
+    """Held to t = 0.5 with its weight and the moment of it, then y = -g (t - 1/2)^2 / 2."""
+    g, arm = 9.81, 0.5
+    body = {"name": "a", "mass": 2.0, "center_of_mass": [arm, 0, 0], "inertia": [0.1, 0.1, 0.1]}
+    weld = {"name": "weld", "type": "fixed", "inboard": "ground", "outboard": "a"}
+    scene = mstmm.Scene(gravity=[0, -g, 0], body=[body], hinge=[weld | {"release": "t >= 0.5"}])
+    run = mstmm.compile(scene).simulate(1.0, output_times=[0.25, 0.75, 1.0])
+    assert run.success
+    assert run.position("a")[:, 1] == pytest.approx([0, -g / 32, -g / 8], abs=1e-12)
+    assert run.force("weld")[:, 1] == pytest.approx([2 * g, 0, 0], abs=1e-11)
+    assert run.moment("weld")[:, 2] == pytest.approx([2 * g * arm, 0, 0], abs=1e-11)
