@@ -16,6 +16,7 @@ from . import frames, laws, sweep
 from .classical import CLASSICAL, classical_guards
 from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
+from .eliminate import eliminate
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from .lower import lower
 from .registry import Element, builtin_elements, kind_of
@@ -76,6 +77,8 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
         ),
         Kernel("recover", sweep.recover(nu, subspace, inputs[:2], hinge.name)),
     ]
+    if nu:
+        kernels.append(Kernel("eliminate", eliminate(nu, subspace, inputs[:2], hinge.name)))
     measure = hinge.singular_when(motion.q, motion.p)
     if measure is not None:
         kernels.append(Kernel("singularity", _singularity(motion, measure)))
@@ -101,6 +104,7 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("recover", sweep.recover(nu)),
         Kernel("effort", sweep.effort(nu)),
         Kernel("project", sweep.project(nu)),
+        *((Kernel("eliminate", eliminate(nu)),) if nu else ()),
     )
 
 

@@ -71,6 +71,9 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_cylindrical;
 int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
@@ -87,6 +90,9 @@ int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restri
 int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_fixed;
 int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -119,6 +125,9 @@ int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_gimbal;
 int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -135,6 +144,9 @@ int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_gimbal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
 
@@ -153,6 +165,9 @@ int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_planar;
 int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -169,6 +184,9 @@ int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_planar_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_prismatic;
 int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
@@ -185,6 +203,9 @@ int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_screw;
 int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -201,6 +222,9 @@ int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_universal;
 int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
@@ -217,6 +241,9 @@ int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
@@ -292,6 +319,9 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -309,6 +339,9 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -326,6 +359,9 @@ int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -343,6 +379,9 @@ int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic4_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -360,6 +399,9 @@ int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic5_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -377,6 +419,9 @@ int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic6_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,

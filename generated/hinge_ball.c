@@ -23,6 +23,9 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1136,6 +1139,253 @@ static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[3] (N, N*m) efforts on the free coordinates
+ * out G[3][6] udot = g - G a_Q
+ * out g[3] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[3] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)p;
+    (void)q;
+    const real t0 = 0.0 < S[15];
+    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t1 = S[18] * ((real)1 / (real)10000000000000);
+    const real t2 = 1.0 / S[15];
+    const real t3 = S[16] * t2;
+    const real t4 = S[16] * t3;
+    const real t5 = S[18] - t4;
+    const real t6 = t1 < t5;
+    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t7 = S[20] * ((real)1 / (real)10000000000000);
+    const real t8 = S[17] * t2;
+    const real t9 = S[17] * t8;
+    const real t10 = S[20] - t9;
+    const real t11 = S[17] * t3;
+    const real t12 = S[19] - t11;
+    const real t13 = 1.0 / t5;
+    const real t14 = t13 * t12;
+    const real t15 = t12 * t14;
+    const real t16 = t10 - t15;
+    const real t17 = t7 < t16;
+    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t18 = S[3] * t2;
+    const real t19 = S[3] * t3;
+    const real t20 = S[4] - t19;
+    const real t21 = t13 * t20;
+    const real t22 = 1.0 / t16;
+    const real t23 = S[3] * t8;
+    const real t24 = S[5] - t23;
+    const real t25 = t14 * t20;
+    const real t26 = t24 - t25;
+    const real t27 = t22 * t26;
+    const real t28 = t14 * t27;
+    const real t29 = t21 - t28;
+    const real t30 = t3 * t29;
+    const real t31 = t18 - t30;
+    const real t32 = t8 * t27;
+    const real t33 = t31 - t32;
+    G[0] = t33;
+    const real t34 = S[8] * t2;
+    const real t35 = S[8] * t3;
+    const real t36 = S[9] - t35;
+    const real t37 = t13 * t36;
+    const real t38 = S[8] * t8;
+    const real t39 = S[10] - t38;
+    const real t40 = t14 * t36;
+    const real t41 = t39 - t40;
+    const real t42 = t22 * t41;
+    const real t43 = t14 * t42;
+    const real t44 = t37 - t43;
+    const real t45 = t3 * t44;
+    const real t46 = t34 - t45;
+    const real t47 = t8 * t42;
+    const real t48 = t46 - t47;
+    G[1] = t48;
+    const real t49 = S[12] * t2;
+    const real t50 = S[12] * t3;
+    const real t51 = S[13] - t50;
+    const real t52 = t13 * t51;
+    const real t53 = S[12] * t8;
+    const real t54 = S[14] - t53;
+    const real t55 = t14 * t51;
+    const real t56 = t54 - t55;
+    const real t57 = t22 * t56;
+    const real t58 = t14 * t57;
+    const real t59 = t52 - t58;
+    const real t60 = t3 * t59;
+    const real t61 = t49 - t60;
+    const real t62 = t8 * t57;
+    const real t63 = t61 - t62;
+    G[2] = t63;
+    G[3] = 1.0;
+    G[4] = 0.0;
+    G[5] = 0.0;
+    G[6] = t29;
+    G[7] = t44;
+    G[8] = t59;
+    G[9] = 0.0;
+    G[10] = 1.0;
+    G[11] = 0.0;
+    G[12] = t27;
+    G[13] = t42;
+    G[14] = t57;
+    G[15] = 0.0;
+    G[16] = 0.0;
+    G[17] = 1.0;
+    const real t64 = tau[0] - e[3];
+    const real t65 = t2 * t64;
+    const real t66 = tau[1] - e[4];
+    const real t67 = t3 * t64;
+    const real t68 = t66 - t67;
+    const real t69 = t13 * t68;
+    const real t70 = tau[2] - e[5];
+    const real t71 = t8 * t64;
+    const real t72 = t70 - t71;
+    const real t73 = t14 * t68;
+    const real t74 = t72 - t73;
+    const real t75 = t22 * t74;
+    const real t76 = t14 * t75;
+    const real t77 = t69 - t76;
+    const real t78 = t3 * t77;
+    const real t79 = t65 - t78;
+    const real t80 = t8 * t75;
+    const real t81 = t79 - t80;
+    g[0] = t81;
+    g[1] = t77;
+    g[2] = t75;
+    const real t82 = S[3] * t33;
+    const real t83 = S[4] * t29;
+    const real t84 = t82 + t83;
+    const real t85 = S[5] * t27;
+    const real t86 = t84 + t85;
+    const real t87 = S[0] - t86;
+    S_Q[0] = t87;
+    const real t88 = S[3] * t48;
+    const real t89 = S[4] * t44;
+    const real t90 = t88 + t89;
+    const real t91 = S[5] * t42;
+    const real t92 = t90 + t91;
+    const real t93 = S[1] - t92;
+    S_Q[1] = t93;
+    const real t94 = S[3] * t63;
+    const real t95 = S[4] * t59;
+    const real t96 = t94 + t95;
+    const real t97 = S[5] * t57;
+    const real t98 = t96 + t97;
+    const real t99 = S[2] - t98;
+    S_Q[2] = t99;
+    S_Q[3] = 0.0;
+    S_Q[4] = 0.0;
+    S_Q[5] = 0.0;
+    const real t100 = S[8] * t48;
+    const real t101 = S[9] * t44;
+    const real t102 = t100 + t101;
+    const real t103 = S[10] * t42;
+    const real t104 = t102 + t103;
+    const real t105 = S[6] - t104;
+    S_Q[6] = t105;
+    const real t106 = S[8] * t63;
+    const real t107 = S[9] * t59;
+    const real t108 = t106 + t107;
+    const real t109 = S[10] * t57;
+    const real t110 = t108 + t109;
+    const real t111 = S[7] - t110;
+    S_Q[7] = t111;
+    S_Q[8] = 0.0;
+    S_Q[9] = 0.0;
+    S_Q[10] = 0.0;
+    const real t112 = S[12] * t63;
+    const real t113 = S[13] * t59;
+    const real t114 = t112 + t113;
+    const real t115 = S[14] * t57;
+    const real t116 = t114 + t115;
+    const real t117 = S[11] - t116;
+    S_Q[11] = t117;
+    S_Q[12] = 0.0;
+    S_Q[13] = 0.0;
+    S_Q[14] = 0.0;
+    S_Q[15] = 0.0;
+    S_Q[16] = 0.0;
+    S_Q[17] = 0.0;
+    S_Q[18] = 0.0;
+    S_Q[19] = 0.0;
+    S_Q[20] = 0.0;
+    const real t118 = S[3] * t81;
+    const real t119 = S[4] * t77;
+    const real t120 = t118 + t119;
+    const real t121 = S[5] * t75;
+    const real t122 = t120 + t121;
+    const real t123 = e[0] + t122;
+    e_Q[0] = t123;
+    const real t124 = S[8] * t81;
+    const real t125 = S[9] * t77;
+    const real t126 = t124 + t125;
+    const real t127 = S[10] * t75;
+    const real t128 = t126 + t127;
+    const real t129 = e[1] + t128;
+    e_Q[1] = t129;
+    const real t130 = S[12] * t81;
+    const real t131 = S[13] * t77;
+    const real t132 = t130 + t131;
+    const real t133 = S[14] * t75;
+    const real t134 = t132 + t133;
+    const real t135 = e[2] + t134;
+    e_Q[2] = t135;
+    e_Q[3] = tau[0];
+    e_Q[4] = tau[1];
+    e_Q[5] = tau[2];
+    D_ii[0] = S[15];
+    D_ii[1] = S[18];
+    D_ii[2] = S[20];
+    return 0;
+}
+
+static int mstmm_hinge_ball_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_ball_eliminate_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 3, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_eliminate_outputs[] = {
+    {"G", 18, "", 0, 0},
+    {"g", 3, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 3, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_ball_eliminate_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
 };
@@ -1201,13 +1451,25 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_ball_eliminate,
+        .call = mstmm_hinge_ball_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_ball_eliminate_inputs,
+        .outputs = mstmm_hinge_ball_eliminate_outputs,
+        .ir_hash = "9f6374ba7b9c70b9e18c479dd2fe097a00bee45791699c4295ddf54f3a9a3bce",
+        .n_guards = 6,
+        .guards = mstmm_hinge_ball_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "5376e8f14005fb345a354169f67135f393a96e32d39183685467437c49647dd3",
+    .hash = "d220c387706c251690354a58126482e0893f220ad326c0e0f767025876800f38",
     .nq = 4,
     .nu = 3,
     .np = 0,
@@ -1217,6 +1479,6 @@ const mstmm_element mstmm_hinge_ball = {
     .u_units = mstmm_hinge_ball_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_ball_kernels,
 };

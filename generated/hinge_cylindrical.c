@@ -22,6 +22,9 @@ int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restri
 int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
@@ -925,6 +928,201 @@ static const mstmm_port mstmm_hinge_cylindrical_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[0] parameters
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) efforts on the free coordinates
+ * out G[2][6] udot = g - G a_Q
+ * out g[2] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[2] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)p;
+    (void)q;
+    const real t0 = 0.0 < S[11];
+    if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t1 = S[20] * ((real)1 / (real)10000000000000);
+    const real t2 = 1.0 / S[11];
+    const real t3 = S[14] * t2;
+    const real t4 = S[14] * t3;
+    const real t5 = S[20] - t4;
+    const real t6 = t1 < t5;
+    if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t7 = S[2] * t2;
+    const real t8 = 1.0 / t5;
+    const real t9 = S[2] * t3;
+    const real t10 = S[5] - t9;
+    const real t11 = t8 * t10;
+    const real t12 = t3 * t11;
+    const real t13 = t7 - t12;
+    G[0] = t13;
+    const real t14 = S[7] * t2;
+    const real t15 = S[7] * t3;
+    const real t16 = S[10] - t15;
+    const real t17 = t8 * t16;
+    const real t18 = t3 * t17;
+    const real t19 = t14 - t18;
+    G[1] = t19;
+    G[2] = 1.0;
+    const real t20 = S[12] * t2;
+    const real t21 = S[12] * t3;
+    const real t22 = S[17] - t21;
+    const real t23 = t8 * t22;
+    const real t24 = t3 * t23;
+    const real t25 = t20 - t24;
+    G[3] = t25;
+    const real t26 = S[13] * t2;
+    const real t27 = S[13] * t3;
+    const real t28 = S[19] - t27;
+    const real t29 = t8 * t28;
+    const real t30 = t3 * t29;
+    const real t31 = t26 - t30;
+    G[4] = t31;
+    G[5] = 0.0;
+    G[6] = t11;
+    G[7] = t17;
+    G[8] = 0.0;
+    G[9] = t23;
+    G[10] = t29;
+    G[11] = 1.0;
+    const real t32 = tau[0] - e[2];
+    const real t33 = t2 * t32;
+    const real t34 = tau[1] - e[5];
+    const real t35 = t3 * t32;
+    const real t36 = t34 - t35;
+    const real t37 = t8 * t36;
+    const real t38 = t3 * t37;
+    const real t39 = t33 - t38;
+    g[0] = t39;
+    g[1] = t37;
+    const real t40 = S[2] * t13;
+    const real t41 = S[5] * t11;
+    const real t42 = t40 + t41;
+    const real t43 = S[0] - t42;
+    S_Q[0] = t43;
+    const real t44 = S[2] * t19;
+    const real t45 = S[5] * t17;
+    const real t46 = t44 + t45;
+    const real t47 = S[1] - t46;
+    S_Q[1] = t47;
+    S_Q[2] = 0.0;
+    const real t48 = S[2] * t25;
+    const real t49 = S[5] * t23;
+    const real t50 = t48 + t49;
+    const real t51 = S[3] - t50;
+    S_Q[3] = t51;
+    const real t52 = S[2] * t31;
+    const real t53 = S[5] * t29;
+    const real t54 = t52 + t53;
+    const real t55 = S[4] - t54;
+    S_Q[4] = t55;
+    S_Q[5] = 0.0;
+    const real t56 = S[7] * t19;
+    const real t57 = S[10] * t17;
+    const real t58 = t56 + t57;
+    const real t59 = S[6] - t58;
+    S_Q[6] = t59;
+    S_Q[7] = 0.0;
+    const real t60 = S[7] * t25;
+    const real t61 = S[10] * t23;
+    const real t62 = t60 + t61;
+    const real t63 = S[8] - t62;
+    S_Q[8] = t63;
+    const real t64 = S[7] * t31;
+    const real t65 = S[10] * t29;
+    const real t66 = t64 + t65;
+    const real t67 = S[9] - t66;
+    S_Q[9] = t67;
+    S_Q[10] = 0.0;
+    S_Q[11] = 0.0;
+    S_Q[12] = 0.0;
+    S_Q[13] = 0.0;
+    S_Q[14] = 0.0;
+    const real t68 = S[12] * t25;
+    const real t69 = S[17] * t23;
+    const real t70 = t68 + t69;
+    const real t71 = S[15] - t70;
+    S_Q[15] = t71;
+    const real t72 = S[12] * t31;
+    const real t73 = S[17] * t29;
+    const real t74 = t72 + t73;
+    const real t75 = S[16] - t74;
+    S_Q[16] = t75;
+    S_Q[17] = 0.0;
+    const real t76 = S[13] * t31;
+    const real t77 = S[19] * t29;
+    const real t78 = t76 + t77;
+    const real t79 = S[18] - t78;
+    S_Q[18] = t79;
+    S_Q[19] = 0.0;
+    S_Q[20] = 0.0;
+    const real t80 = S[2] * t39;
+    const real t81 = S[5] * t37;
+    const real t82 = t80 + t81;
+    const real t83 = e[0] + t82;
+    e_Q[0] = t83;
+    const real t84 = S[7] * t39;
+    const real t85 = S[10] * t37;
+    const real t86 = t84 + t85;
+    const real t87 = e[1] + t86;
+    e_Q[1] = t87;
+    e_Q[2] = tau[0];
+    const real t88 = S[12] * t39;
+    const real t89 = S[17] * t37;
+    const real t90 = t88 + t89;
+    const real t91 = e[3] + t90;
+    e_Q[3] = t91;
+    const real t92 = S[13] * t39;
+    const real t93 = S[19] * t37;
+    const real t94 = t92 + t93;
+    const real t95 = e[4] + t94;
+    e_Q[4] = t95;
+    e_Q[5] = tau[1];
+    D_ii[0] = S[11];
+    D_ii[1] = S[20];
+    return 0;
+}
+
+static int mstmm_hinge_cylindrical_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_cylindrical_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_cylindrical_eliminate_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_cylindrical_eliminate_outputs[] = {
+    {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 2, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_cylindrical_eliminate_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_cylindrical_q_names[] = {
     "displacement", "angle",
 };
@@ -990,13 +1188,25 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_eliminate,
+        .call = mstmm_hinge_cylindrical_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_cylindrical_eliminate_inputs,
+        .outputs = mstmm_hinge_cylindrical_eliminate_outputs,
+        .ir_hash = "61613b7b821e497bb0012e9776ad5a1b5832a57816959e8743328ea45cb7678b",
+        .n_guards = 4,
+        .guards = mstmm_hinge_cylindrical_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "276de0ea0b743bc7c54367d80dad52dacecbecd8718b5c104301c7721fcad4c5",
+    .hash = "b338880de7e5cba4ba0538f62be6fca365e2823a468102e07fc59efbd957368a",
     .nq = 2,
     .nu = 2,
     .np = 0,
@@ -1006,6 +1216,6 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .u_units = mstmm_hinge_cylindrical_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_cylindrical_kernels,
 };

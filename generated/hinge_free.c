@@ -22,6 +22,9 @@ int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the free hinge
  * in  p[0] parameters
@@ -1508,6 +1511,327 @@ static const mstmm_port mstmm_hinge_free_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 6 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[0] parameters
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[6] (N, N*m) efforts on the free coordinates
+ * out G[6][6] udot = g - G a_Q
+ * out g[6] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[6] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)p;
+    (void)q;
+    const real t0 = 0.0 < S[0];
+    if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t1 = S[6] * ((real)1 / (real)10000000000000);
+    const real t2 = 1.0 / S[0];
+    const real t3 = S[1] * t2;
+    const real t4 = S[1] * t3;
+    const real t5 = S[6] - t4;
+    const real t6 = t1 < t5;
+    if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t7 = S[11] * ((real)1 / (real)10000000000000);
+    const real t8 = S[2] * t2;
+    const real t9 = S[2] * t8;
+    const real t10 = S[11] - t9;
+    const real t11 = S[2] * t3;
+    const real t12 = S[7] - t11;
+    const real t13 = 1.0 / t5;
+    const real t14 = t13 * t12;
+    const real t15 = t12 * t14;
+    const real t16 = t10 - t15;
+    const real t17 = t7 < t16;
+    if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t18 = S[15] * ((real)1 / (real)10000000000000);
+    const real t19 = S[3] * t2;
+    const real t20 = S[3] * t19;
+    const real t21 = S[15] - t20;
+    const real t22 = S[3] * t3;
+    const real t23 = S[8] - t22;
+    const real t24 = t13 * t23;
+    const real t25 = t23 * t24;
+    const real t26 = t21 - t25;
+    const real t27 = S[3] * t8;
+    const real t28 = S[12] - t27;
+    const real t29 = t14 * t23;
+    const real t30 = t28 - t29;
+    const real t31 = 1.0 / t16;
+    const real t32 = t31 * t30;
+    const real t33 = t30 * t32;
+    const real t34 = t26 - t33;
+    const real t35 = t18 < t34;
+    if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t36 = S[18] * ((real)1 / (real)10000000000000);
+    const real t37 = S[4] * t2;
+    const real t38 = S[4] * t37;
+    const real t39 = S[18] - t38;
+    const real t40 = S[4] * t3;
+    const real t41 = S[9] - t40;
+    const real t42 = t13 * t41;
+    const real t43 = t41 * t42;
+    const real t44 = t39 - t43;
+    const real t45 = S[4] * t8;
+    const real t46 = S[13] - t45;
+    const real t47 = t14 * t41;
+    const real t48 = t46 - t47;
+    const real t49 = t31 * t48;
+    const real t50 = t48 * t49;
+    const real t51 = t44 - t50;
+    const real t52 = S[4] * t19;
+    const real t53 = S[16] - t52;
+    const real t54 = t24 * t41;
+    const real t55 = t53 - t54;
+    const real t56 = t32 * t48;
+    const real t57 = t55 - t56;
+    const real t58 = 1.0 / t34;
+    const real t59 = t58 * t57;
+    const real t60 = t57 * t59;
+    const real t61 = t51 - t60;
+    const real t62 = t36 < t61;
+    if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t63 = S[20] * ((real)1 / (real)10000000000000);
+    const real t64 = S[5] * t2;
+    const real t65 = S[5] * t64;
+    const real t66 = S[20] - t65;
+    const real t67 = S[5] * t3;
+    const real t68 = S[10] - t67;
+    const real t69 = t13 * t68;
+    const real t70 = t68 * t69;
+    const real t71 = t66 - t70;
+    const real t72 = S[5] * t8;
+    const real t73 = S[14] - t72;
+    const real t74 = t14 * t68;
+    const real t75 = t73 - t74;
+    const real t76 = t31 * t75;
+    const real t77 = t75 * t76;
+    const real t78 = t71 - t77;
+    const real t79 = S[5] * t19;
+    const real t80 = S[17] - t79;
+    const real t81 = t24 * t68;
+    const real t82 = t80 - t81;
+    const real t83 = t32 * t75;
+    const real t84 = t82 - t83;
+    const real t85 = t58 * t84;
+    const real t86 = t84 * t85;
+    const real t87 = t78 - t86;
+    const real t88 = S[5] * t37;
+    const real t89 = S[19] - t88;
+    const real t90 = t42 * t68;
+    const real t91 = t89 - t90;
+    const real t92 = t49 * t75;
+    const real t93 = t91 - t92;
+    const real t94 = t59 * t84;
+    const real t95 = t93 - t94;
+    const real t96 = 1.0 / t61;
+    const real t97 = t96 * t95;
+    const real t98 = t95 * t97;
+    const real t99 = t87 - t98;
+    const real t100 = t63 < t99;
+    if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+    if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+    G[0] = 1.0;
+    G[1] = 0.0;
+    G[2] = 0.0;
+    G[3] = 0.0;
+    G[4] = 0.0;
+    G[5] = 0.0;
+    G[6] = 0.0;
+    G[7] = 1.0;
+    G[8] = 0.0;
+    G[9] = 0.0;
+    G[10] = 0.0;
+    G[11] = 0.0;
+    G[12] = 0.0;
+    G[13] = 0.0;
+    G[14] = 1.0;
+    G[15] = 0.0;
+    G[16] = 0.0;
+    G[17] = 0.0;
+    G[18] = 0.0;
+    G[19] = 0.0;
+    G[20] = 0.0;
+    G[21] = 1.0;
+    G[22] = 0.0;
+    G[23] = 0.0;
+    G[24] = 0.0;
+    G[25] = 0.0;
+    G[26] = 0.0;
+    G[27] = 0.0;
+    G[28] = 1.0;
+    G[29] = 0.0;
+    G[30] = 0.0;
+    G[31] = 0.0;
+    G[32] = 0.0;
+    G[33] = 0.0;
+    G[34] = 0.0;
+    G[35] = 1.0;
+    const real t101 = tau[0] - e[0];
+    const real t102 = t2 * t101;
+    const real t103 = tau[1] - e[1];
+    const real t104 = t3 * t101;
+    const real t105 = t103 - t104;
+    const real t106 = t13 * t105;
+    const real t107 = tau[2] - e[2];
+    const real t108 = t8 * t101;
+    const real t109 = t107 - t108;
+    const real t110 = t14 * t105;
+    const real t111 = t109 - t110;
+    const real t112 = t31 * t111;
+    const real t113 = tau[3] - e[3];
+    const real t114 = t19 * t101;
+    const real t115 = t113 - t114;
+    const real t116 = t24 * t105;
+    const real t117 = t115 - t116;
+    const real t118 = t32 * t111;
+    const real t119 = t117 - t118;
+    const real t120 = t58 * t119;
+    const real t121 = tau[4] - e[4];
+    const real t122 = t37 * t101;
+    const real t123 = t121 - t122;
+    const real t124 = t42 * t105;
+    const real t125 = t123 - t124;
+    const real t126 = t49 * t111;
+    const real t127 = t125 - t126;
+    const real t128 = t59 * t119;
+    const real t129 = t127 - t128;
+    const real t130 = t96 * t129;
+    const real t131 = 1.0 / t99;
+    const real t132 = tau[5] - e[5];
+    const real t133 = t64 * t101;
+    const real t134 = t132 - t133;
+    const real t135 = t69 * t105;
+    const real t136 = t134 - t135;
+    const real t137 = t76 * t111;
+    const real t138 = t136 - t137;
+    const real t139 = t85 * t119;
+    const real t140 = t138 - t139;
+    const real t141 = t97 * t129;
+    const real t142 = t140 - t141;
+    const real t143 = t131 * t142;
+    const real t144 = t97 * t143;
+    const real t145 = t130 - t144;
+    const real t146 = t59 * t145;
+    const real t147 = t120 - t146;
+    const real t148 = t85 * t143;
+    const real t149 = t147 - t148;
+    const real t150 = t32 * t149;
+    const real t151 = t112 - t150;
+    const real t152 = t49 * t145;
+    const real t153 = t151 - t152;
+    const real t154 = t76 * t143;
+    const real t155 = t153 - t154;
+    const real t156 = t14 * t155;
+    const real t157 = t106 - t156;
+    const real t158 = t24 * t149;
+    const real t159 = t157 - t158;
+    const real t160 = t42 * t145;
+    const real t161 = t159 - t160;
+    const real t162 = t69 * t143;
+    const real t163 = t161 - t162;
+    const real t164 = t3 * t163;
+    const real t165 = t102 - t164;
+    const real t166 = t8 * t155;
+    const real t167 = t165 - t166;
+    const real t168 = t19 * t149;
+    const real t169 = t167 - t168;
+    const real t170 = t37 * t145;
+    const real t171 = t169 - t170;
+    const real t172 = t64 * t143;
+    const real t173 = t171 - t172;
+    g[0] = t173;
+    g[1] = t163;
+    g[2] = t155;
+    g[3] = t149;
+    g[4] = t145;
+    g[5] = t143;
+    S_Q[0] = 0.0;
+    S_Q[1] = 0.0;
+    S_Q[2] = 0.0;
+    S_Q[3] = 0.0;
+    S_Q[4] = 0.0;
+    S_Q[5] = 0.0;
+    S_Q[6] = 0.0;
+    S_Q[7] = 0.0;
+    S_Q[8] = 0.0;
+    S_Q[9] = 0.0;
+    S_Q[10] = 0.0;
+    S_Q[11] = 0.0;
+    S_Q[12] = 0.0;
+    S_Q[13] = 0.0;
+    S_Q[14] = 0.0;
+    S_Q[15] = 0.0;
+    S_Q[16] = 0.0;
+    S_Q[17] = 0.0;
+    S_Q[18] = 0.0;
+    S_Q[19] = 0.0;
+    S_Q[20] = 0.0;
+    e_Q[0] = tau[0];
+    e_Q[1] = tau[1];
+    e_Q[2] = tau[2];
+    e_Q[3] = tau[3];
+    e_Q[4] = tau[4];
+    e_Q[5] = tau[5];
+    D_ii[0] = S[0];
+    D_ii[1] = S[6];
+    D_ii[2] = S[11];
+    D_ii[3] = S[15];
+    D_ii[4] = S[18];
+    D_ii[5] = S[20];
+    return 0;
+}
+
+static int mstmm_hinge_free_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_free_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_free_eliminate_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 7, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_free_eliminate_outputs[] = {
+    {"G", 36, "", 0, 0},
+    {"g", 6, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 6, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_free_eliminate_guards[] = {
+    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_free_q_names[] = {
     "x", "y", "z", "qw", "qx", "qy", "qz",
 };
@@ -1573,13 +1897,25 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_free_eliminate,
+        .call = mstmm_hinge_free_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_free_eliminate_inputs,
+        .outputs = mstmm_hinge_free_eliminate_outputs,
+        .ir_hash = "57cac09900eb78ec301ec657c7d5999bc28e97ba60612a8c8891fdef1ad88286",
+        .n_guards = 12,
+        .guards = mstmm_hinge_free_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "8021fd13b1d13bbd399e6598e6c1e873f4cdaeaef497c9f56d34ab6f5af3ba1e",
+    .hash = "c609d0f2a1678a568a5dd25832b490fd7528df9a1161806f6c60ee6c7afaf626",
     .nq = 7,
     .nu = 6,
     .np = 0,
@@ -1589,6 +1925,6 @@ const mstmm_element mstmm_hinge_free = {
     .u_units = mstmm_hinge_free_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_free_kernels,
 };

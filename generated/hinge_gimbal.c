@@ -22,6 +22,9 @@ int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_gimbal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
 
@@ -1401,6 +1404,421 @@ static const mstmm_port mstmm_hinge_gimbal_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[3] (N, N*m) efforts on the free coordinates
+ * out G[3][6] udot = g - G a_Q
+ * out g[3] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[3] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_gimbal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)p;
+    const real t0 = 0.0 < S[15];
+    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t1 = cos(q[0]);
+    const real t2 = S[18] * t1;
+    const real t3 = sin(q[0]);
+    const real t4 = S[19] * t3;
+    const real t5 = t2 - t4;
+    const real t6 = t1 * t5;
+    const real t7 = S[19] * t1;
+    const real t8 = S[20] * t3;
+    const real t9 = t7 - t8;
+    const real t10 = t3 * t9;
+    const real t11 = t6 - t10;
+    const real t12 = t11 * ((real)1 / (real)10000000000000);
+    const real t13 = S[16] * t1;
+    const real t14 = S[17] * t3;
+    const real t15 = t13 - t14;
+    const real t16 = 1.0 / S[15];
+    const real t17 = t15 * t16;
+    const real t18 = t15 * t17;
+    const real t19 = t11 - t18;
+    const real t20 = t12 < t19;
+    if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t21 = cos(q[1]);
+    const real t22 = t3 * t21;
+    const real t23 = S[18] * t22;
+    const real t24 = sin(q[1]);
+    const real t25 = S[16] * t24;
+    const real t26 = t23 - t25;
+    const real t27 = t1 * t21;
+    const real t28 = S[19] * t27;
+    const real t29 = t26 + t28;
+    const real t30 = t22 * t29;
+    const real t31 = S[16] * t22;
+    const real t32 = S[15] * t24;
+    const real t33 = t31 - t32;
+    const real t34 = S[17] * t27;
+    const real t35 = t33 + t34;
+    const real t36 = t24 * t35;
+    const real t37 = t30 - t36;
+    const real t38 = S[19] * t22;
+    const real t39 = S[17] * t24;
+    const real t40 = t38 - t39;
+    const real t41 = S[20] * t27;
+    const real t42 = t40 + t41;
+    const real t43 = t27 * t42;
+    const real t44 = t37 + t43;
+    const real t45 = t44 * ((real)1 / (real)10000000000000);
+    const real t46 = t35 * t16;
+    const real t47 = t35 * t46;
+    const real t48 = t44 - t47;
+    const real t49 = t1 * t29;
+    const real t50 = t3 * t42;
+    const real t51 = t49 - t50;
+    const real t52 = t35 * t17;
+    const real t53 = t51 - t52;
+    const real t54 = 1.0 / t19;
+    const real t55 = t54 * t53;
+    const real t56 = t53 * t55;
+    const real t57 = t48 - t56;
+    const real t58 = t45 < t57;
+    if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t59 = S[3] * t16;
+    const real t60 = S[4] * t1;
+    const real t61 = S[5] * t3;
+    const real t62 = t60 - t61;
+    const real t63 = S[3] * t17;
+    const real t64 = t62 - t63;
+    const real t65 = t54 * t64;
+    const real t66 = 1.0 / t57;
+    const real t67 = S[4] * t22;
+    const real t68 = S[3] * t24;
+    const real t69 = t67 - t68;
+    const real t70 = S[5] * t27;
+    const real t71 = t69 + t70;
+    const real t72 = S[3] * t46;
+    const real t73 = t71 - t72;
+    const real t74 = t55 * t64;
+    const real t75 = t73 - t74;
+    const real t76 = t66 * t75;
+    const real t77 = t55 * t76;
+    const real t78 = t65 - t77;
+    const real t79 = t17 * t78;
+    const real t80 = t59 - t79;
+    const real t81 = t46 * t76;
+    const real t82 = t80 - t81;
+    G[0] = t82;
+    const real t83 = S[8] * t16;
+    const real t84 = S[9] * t1;
+    const real t85 = S[10] * t3;
+    const real t86 = t84 - t85;
+    const real t87 = S[8] * t17;
+    const real t88 = t86 - t87;
+    const real t89 = t54 * t88;
+    const real t90 = S[9] * t22;
+    const real t91 = S[8] * t24;
+    const real t92 = t90 - t91;
+    const real t93 = S[10] * t27;
+    const real t94 = t92 + t93;
+    const real t95 = S[8] * t46;
+    const real t96 = t94 - t95;
+    const real t97 = t55 * t88;
+    const real t98 = t96 - t97;
+    const real t99 = t66 * t98;
+    const real t100 = t55 * t99;
+    const real t101 = t89 - t100;
+    const real t102 = t17 * t101;
+    const real t103 = t83 - t102;
+    const real t104 = t46 * t99;
+    const real t105 = t103 - t104;
+    G[1] = t105;
+    const real t106 = S[12] * t16;
+    const real t107 = S[13] * t1;
+    const real t108 = S[14] * t3;
+    const real t109 = t107 - t108;
+    const real t110 = S[12] * t17;
+    const real t111 = t109 - t110;
+    const real t112 = t54 * t111;
+    const real t113 = S[13] * t22;
+    const real t114 = S[12] * t24;
+    const real t115 = t113 - t114;
+    const real t116 = S[14] * t27;
+    const real t117 = t115 + t116;
+    const real t118 = S[12] * t46;
+    const real t119 = t117 - t118;
+    const real t120 = t55 * t111;
+    const real t121 = t119 - t120;
+    const real t122 = t66 * t121;
+    const real t123 = t55 * t122;
+    const real t124 = t112 - t123;
+    const real t125 = t17 * t124;
+    const real t126 = t106 - t125;
+    const real t127 = t46 * t122;
+    const real t128 = t126 - t127;
+    G[2] = t128;
+    G[3] = 1.0;
+    const real t129 = S[16] * t16;
+    const real t130 = S[16] * t17;
+    const real t131 = t5 - t130;
+    const real t132 = t54 * t131;
+    const real t133 = S[16] * t46;
+    const real t134 = t29 - t133;
+    const real t135 = t55 * t131;
+    const real t136 = t134 - t135;
+    const real t137 = t66 * t136;
+    const real t138 = t55 * t137;
+    const real t139 = t132 - t138;
+    const real t140 = t17 * t139;
+    const real t141 = t129 - t140;
+    const real t142 = t46 * t137;
+    const real t143 = t141 - t142;
+    G[4] = t143;
+    const real t144 = S[17] * t16;
+    const real t145 = S[17] * t17;
+    const real t146 = t9 - t145;
+    const real t147 = t54 * t146;
+    const real t148 = S[17] * t46;
+    const real t149 = t42 - t148;
+    const real t150 = t55 * t146;
+    const real t151 = t149 - t150;
+    const real t152 = t66 * t151;
+    const real t153 = t55 * t152;
+    const real t154 = t147 - t153;
+    const real t155 = t17 * t154;
+    const real t156 = t144 - t155;
+    const real t157 = t46 * t152;
+    const real t158 = t156 - t157;
+    G[5] = t158;
+    G[6] = t78;
+    G[7] = t101;
+    G[8] = t124;
+    G[9] = 0.0;
+    G[10] = t139;
+    G[11] = t154;
+    G[12] = t76;
+    G[13] = t99;
+    G[14] = t122;
+    G[15] = 0.0;
+    G[16] = t137;
+    G[17] = t152;
+    const real t159 = tau[0] - e[3];
+    const real t160 = t16 * t159;
+    const real t161 = e[5] * t3;
+    const real t162 = e[4] * t1;
+    const real t163 = t161 - t162;
+    const real t164 = tau[1] + t163;
+    const real t165 = t17 * t159;
+    const real t166 = t164 - t165;
+    const real t167 = t54 * t166;
+    const real t168 = e[3] * t24;
+    const real t169 = e[4] * t22;
+    const real t170 = t168 - t169;
+    const real t171 = e[5] * t27;
+    const real t172 = t170 - t171;
+    const real t173 = tau[2] + t172;
+    const real t174 = t46 * t159;
+    const real t175 = t173 - t174;
+    const real t176 = t55 * t166;
+    const real t177 = t175 - t176;
+    const real t178 = t66 * t177;
+    const real t179 = t55 * t178;
+    const real t180 = t167 - t179;
+    const real t181 = t17 * t180;
+    const real t182 = t160 - t181;
+    const real t183 = t46 * t178;
+    const real t184 = t182 - t183;
+    g[0] = t184;
+    g[1] = t180;
+    g[2] = t178;
+    const real t185 = S[3] * t82;
+    const real t186 = t62 * t78;
+    const real t187 = t185 + t186;
+    const real t188 = t71 * t76;
+    const real t189 = t187 + t188;
+    const real t190 = S[0] - t189;
+    S_Q[0] = t190;
+    const real t191 = S[3] * t105;
+    const real t192 = t62 * t101;
+    const real t193 = t191 + t192;
+    const real t194 = t71 * t99;
+    const real t195 = t193 + t194;
+    const real t196 = S[1] - t195;
+    S_Q[1] = t196;
+    const real t197 = S[3] * t128;
+    const real t198 = t62 * t124;
+    const real t199 = t197 + t198;
+    const real t200 = t71 * t122;
+    const real t201 = t199 + t200;
+    const real t202 = S[2] - t201;
+    S_Q[2] = t202;
+    S_Q[3] = 0.0;
+    const real t203 = S[3] * t143;
+    const real t204 = t62 * t139;
+    const real t205 = t203 + t204;
+    const real t206 = t71 * t137;
+    const real t207 = t205 + t206;
+    const real t208 = S[4] - t207;
+    S_Q[4] = t208;
+    const real t209 = S[3] * t158;
+    const real t210 = t62 * t154;
+    const real t211 = t209 + t210;
+    const real t212 = t71 * t152;
+    const real t213 = t211 + t212;
+    const real t214 = S[5] - t213;
+    S_Q[5] = t214;
+    const real t215 = S[8] * t105;
+    const real t216 = t86 * t101;
+    const real t217 = t215 + t216;
+    const real t218 = t94 * t99;
+    const real t219 = t217 + t218;
+    const real t220 = S[6] - t219;
+    S_Q[6] = t220;
+    const real t221 = S[8] * t128;
+    const real t222 = t86 * t124;
+    const real t223 = t221 + t222;
+    const real t224 = t94 * t122;
+    const real t225 = t223 + t224;
+    const real t226 = S[7] - t225;
+    S_Q[7] = t226;
+    S_Q[8] = 0.0;
+    const real t227 = S[8] * t143;
+    const real t228 = t86 * t139;
+    const real t229 = t227 + t228;
+    const real t230 = t94 * t137;
+    const real t231 = t229 + t230;
+    const real t232 = S[9] - t231;
+    S_Q[9] = t232;
+    const real t233 = S[8] * t158;
+    const real t234 = t86 * t154;
+    const real t235 = t233 + t234;
+    const real t236 = t94 * t152;
+    const real t237 = t235 + t236;
+    const real t238 = S[10] - t237;
+    S_Q[10] = t238;
+    const real t239 = S[12] * t128;
+    const real t240 = t109 * t124;
+    const real t241 = t239 + t240;
+    const real t242 = t117 * t122;
+    const real t243 = t241 + t242;
+    const real t244 = S[11] - t243;
+    S_Q[11] = t244;
+    S_Q[12] = 0.0;
+    const real t245 = S[12] * t143;
+    const real t246 = t109 * t139;
+    const real t247 = t245 + t246;
+    const real t248 = t117 * t137;
+    const real t249 = t247 + t248;
+    const real t250 = S[13] - t249;
+    S_Q[13] = t250;
+    const real t251 = S[12] * t158;
+    const real t252 = t109 * t154;
+    const real t253 = t251 + t252;
+    const real t254 = t117 * t152;
+    const real t255 = t253 + t254;
+    const real t256 = S[14] - t255;
+    S_Q[14] = t256;
+    S_Q[15] = 0.0;
+    S_Q[16] = 0.0;
+    S_Q[17] = 0.0;
+    const real t257 = S[16] * t143;
+    const real t258 = t5 * t139;
+    const real t259 = t257 + t258;
+    const real t260 = t29 * t137;
+    const real t261 = t259 + t260;
+    const real t262 = S[18] - t261;
+    S_Q[18] = t262;
+    const real t263 = S[16] * t158;
+    const real t264 = t5 * t154;
+    const real t265 = t263 + t264;
+    const real t266 = t29 * t152;
+    const real t267 = t265 + t266;
+    const real t268 = S[19] - t267;
+    S_Q[19] = t268;
+    const real t269 = S[17] * t158;
+    const real t270 = t9 * t154;
+    const real t271 = t269 + t270;
+    const real t272 = t42 * t152;
+    const real t273 = t271 + t272;
+    const real t274 = S[20] - t273;
+    S_Q[20] = t274;
+    const real t275 = S[3] * t184;
+    const real t276 = t62 * t180;
+    const real t277 = t275 + t276;
+    const real t278 = t71 * t178;
+    const real t279 = t277 + t278;
+    const real t280 = e[0] + t279;
+    e_Q[0] = t280;
+    const real t281 = S[8] * t184;
+    const real t282 = t86 * t180;
+    const real t283 = t281 + t282;
+    const real t284 = t94 * t178;
+    const real t285 = t283 + t284;
+    const real t286 = e[1] + t285;
+    e_Q[1] = t286;
+    const real t287 = S[12] * t184;
+    const real t288 = t109 * t180;
+    const real t289 = t287 + t288;
+    const real t290 = t117 * t178;
+    const real t291 = t289 + t290;
+    const real t292 = e[2] + t291;
+    e_Q[2] = t292;
+    e_Q[3] = tau[0];
+    const real t293 = S[16] * t184;
+    const real t294 = t5 * t180;
+    const real t295 = t293 + t294;
+    const real t296 = t29 * t178;
+    const real t297 = t295 + t296;
+    const real t298 = e[4] + t297;
+    e_Q[4] = t298;
+    const real t299 = S[17] * t184;
+    const real t300 = t9 * t180;
+    const real t301 = t299 + t300;
+    const real t302 = t42 * t178;
+    const real t303 = t301 + t302;
+    const real t304 = e[5] + t303;
+    e_Q[5] = t304;
+    D_ii[0] = S[15];
+    D_ii[1] = t11;
+    D_ii[2] = t44;
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_eliminate_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 3, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_eliminate_outputs[] = {
+    {"G", 18, "", 0, 0},
+    {"g", 3, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 3, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_gimbal_eliminate_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
 /* distance from the singular configuration
  * in  p[0] parameters
  * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
@@ -1496,6 +1914,18 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_gimbal_eliminate,
+        .call = mstmm_hinge_gimbal_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_gimbal_eliminate_inputs,
+        .outputs = mstmm_hinge_gimbal_eliminate_outputs,
+        .ir_hash = "b41dff160162ca0321a582f184866efbce0175e218922a9f2367ef0193e12c05",
+        .n_guards = 6,
+        .guards = mstmm_hinge_gimbal_eliminate_guards,
+    },
+    {
         .name = "singularity",
         .function = (void (*)(void))mstmm_hinge_gimbal_singularity,
         .call = mstmm_hinge_gimbal_singularity_call,
@@ -1513,7 +1943,7 @@ const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "6fdb4190d2751a2062f45074c9878aefa53b6c6f5dde760c2e354b8548e3bba7",
+    .hash = "114fc30adf06ce4d14ea65a4e17c6a53d868547a40134cbb87c15abb7a86574e",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1523,6 +1953,6 @@ const mstmm_element mstmm_hinge_gimbal = {
     .u_units = mstmm_hinge_gimbal_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 6,
     .kernels = mstmm_hinge_gimbal_kernels,
 };

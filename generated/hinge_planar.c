@@ -22,6 +22,9 @@ int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_planar_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the planar hinge
  * in  p[0] parameters
@@ -1260,6 +1263,399 @@ static const mstmm_port mstmm_hinge_planar_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[3] (N, N*m) efforts on the free coordinates
+ * out G[3][6] udot = g - G a_Q
+ * out g[3] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[3] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_planar_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)p;
+    const real t0 = cos(q[2]);
+    const real t1 = S[0] * t0;
+    const real t2 = sin(q[2]);
+    const real t3 = S[1] * t2;
+    const real t4 = t1 - t3;
+    const real t5 = t0 * t4;
+    const real t6 = S[1] * t0;
+    const real t7 = S[6] * t2;
+    const real t8 = t6 - t7;
+    const real t9 = t2 * t8;
+    const real t10 = t5 - t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t12 = S[0] * t2;
+    const real t13 = t12 + t6;
+    const real t14 = t2 * t13;
+    const real t15 = S[6] * t0;
+    const real t16 = t3 + t15;
+    const real t17 = t0 * t16;
+    const real t18 = t14 + t17;
+    const real t19 = t18 * ((real)1 / (real)10000000000000);
+    const real t20 = t0 * t13;
+    const real t21 = t2 * t16;
+    const real t22 = t20 - t21;
+    const real t23 = 1.0 / t10;
+    const real t24 = t22 * t23;
+    const real t25 = t22 * t24;
+    const real t26 = t18 - t25;
+    const real t27 = t19 < t26;
+    if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t28 = S[20] * ((real)1 / (real)10000000000000);
+    const real t29 = S[5] * t0;
+    const real t30 = S[10] * t2;
+    const real t31 = t29 - t30;
+    const real t32 = t31 * t23;
+    const real t33 = t31 * t32;
+    const real t34 = S[20] - t33;
+    const real t35 = S[5] * t2;
+    const real t36 = S[10] * t0;
+    const real t37 = t35 + t36;
+    const real t38 = t31 * t24;
+    const real t39 = t37 - t38;
+    const real t40 = 1.0 / t26;
+    const real t41 = t40 * t39;
+    const real t42 = t39 * t41;
+    const real t43 = t34 - t42;
+    const real t44 = t28 < t43;
+    if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t45 = t4 * t23;
+    const real t46 = t4 * t24;
+    const real t47 = t13 - t46;
+    const real t48 = t40 * t47;
+    const real t49 = 1.0 / t43;
+    const real t50 = t4 * t32;
+    const real t51 = S[5] - t50;
+    const real t52 = t41 * t47;
+    const real t53 = t51 - t52;
+    const real t54 = t49 * t53;
+    const real t55 = t41 * t54;
+    const real t56 = t48 - t55;
+    const real t57 = t24 * t56;
+    const real t58 = t45 - t57;
+    const real t59 = t32 * t54;
+    const real t60 = t58 - t59;
+    G[0] = t60;
+    const real t61 = t8 * t23;
+    const real t62 = t8 * t24;
+    const real t63 = t16 - t62;
+    const real t64 = t40 * t63;
+    const real t65 = t8 * t32;
+    const real t66 = S[10] - t65;
+    const real t67 = t41 * t63;
+    const real t68 = t66 - t67;
+    const real t69 = t49 * t68;
+    const real t70 = t41 * t69;
+    const real t71 = t64 - t70;
+    const real t72 = t24 * t71;
+    const real t73 = t61 - t72;
+    const real t74 = t32 * t69;
+    const real t75 = t73 - t74;
+    G[1] = t75;
+    const real t76 = S[2] * t0;
+    const real t77 = S[7] * t2;
+    const real t78 = t76 - t77;
+    const real t79 = t78 * t23;
+    const real t80 = S[2] * t2;
+    const real t81 = S[7] * t0;
+    const real t82 = t80 + t81;
+    const real t83 = t78 * t24;
+    const real t84 = t82 - t83;
+    const real t85 = t40 * t84;
+    const real t86 = t78 * t32;
+    const real t87 = S[14] - t86;
+    const real t88 = t41 * t84;
+    const real t89 = t87 - t88;
+    const real t90 = t49 * t89;
+    const real t91 = t41 * t90;
+    const real t92 = t85 - t91;
+    const real t93 = t24 * t92;
+    const real t94 = t79 - t93;
+    const real t95 = t32 * t90;
+    const real t96 = t94 - t95;
+    G[2] = t96;
+    const real t97 = S[3] * t0;
+    const real t98 = S[8] * t2;
+    const real t99 = t97 - t98;
+    const real t100 = t99 * t23;
+    const real t101 = S[3] * t2;
+    const real t102 = S[8] * t0;
+    const real t103 = t101 + t102;
+    const real t104 = t99 * t24;
+    const real t105 = t103 - t104;
+    const real t106 = t40 * t105;
+    const real t107 = t99 * t32;
+    const real t108 = S[17] - t107;
+    const real t109 = t41 * t105;
+    const real t110 = t108 - t109;
+    const real t111 = t49 * t110;
+    const real t112 = t41 * t111;
+    const real t113 = t106 - t112;
+    const real t114 = t24 * t113;
+    const real t115 = t100 - t114;
+    const real t116 = t32 * t111;
+    const real t117 = t115 - t116;
+    G[3] = t117;
+    const real t118 = S[4] * t0;
+    const real t119 = S[9] * t2;
+    const real t120 = t118 - t119;
+    const real t121 = t120 * t23;
+    const real t122 = S[4] * t2;
+    const real t123 = S[9] * t0;
+    const real t124 = t122 + t123;
+    const real t125 = t120 * t24;
+    const real t126 = t124 - t125;
+    const real t127 = t40 * t126;
+    const real t128 = t120 * t32;
+    const real t129 = S[19] - t128;
+    const real t130 = t41 * t126;
+    const real t131 = t129 - t130;
+    const real t132 = t49 * t131;
+    const real t133 = t41 * t132;
+    const real t134 = t127 - t133;
+    const real t135 = t24 * t134;
+    const real t136 = t121 - t135;
+    const real t137 = t32 * t132;
+    const real t138 = t136 - t137;
+    G[4] = t138;
+    G[5] = 0.0;
+    G[6] = t56;
+    G[7] = t71;
+    G[8] = t92;
+    G[9] = t113;
+    G[10] = t134;
+    G[11] = 0.0;
+    G[12] = t54;
+    G[13] = t69;
+    G[14] = t90;
+    G[15] = t111;
+    G[16] = t132;
+    G[17] = 1.0;
+    const real t139 = e[1] * t2;
+    const real t140 = e[0] * t0;
+    const real t141 = t139 - t140;
+    const real t142 = tau[0] + t141;
+    const real t143 = t23 * t142;
+    const real t144 = e[0] * t2;
+    const real t145 = e[1] * t0;
+    const real t146 = t144 + t145;
+    const real t147 = tau[1] - t146;
+    const real t148 = t24 * t142;
+    const real t149 = t147 - t148;
+    const real t150 = t40 * t149;
+    const real t151 = tau[2] - e[5];
+    const real t152 = t32 * t142;
+    const real t153 = t151 - t152;
+    const real t154 = t41 * t149;
+    const real t155 = t153 - t154;
+    const real t156 = t49 * t155;
+    const real t157 = t41 * t156;
+    const real t158 = t150 - t157;
+    const real t159 = t24 * t158;
+    const real t160 = t143 - t159;
+    const real t161 = t32 * t156;
+    const real t162 = t160 - t161;
+    g[0] = t162;
+    g[1] = t158;
+    g[2] = t156;
+    const real t163 = t4 * t60;
+    const real t164 = t13 * t56;
+    const real t165 = t163 + t164;
+    const real t166 = S[5] * t54;
+    const real t167 = t165 + t166;
+    const real t168 = S[0] - t167;
+    S_Q[0] = t168;
+    const real t169 = t4 * t75;
+    const real t170 = t13 * t71;
+    const real t171 = t169 + t170;
+    const real t172 = S[5] * t69;
+    const real t173 = t171 + t172;
+    const real t174 = S[1] - t173;
+    S_Q[1] = t174;
+    const real t175 = t4 * t96;
+    const real t176 = t13 * t92;
+    const real t177 = t175 + t176;
+    const real t178 = S[5] * t90;
+    const real t179 = t177 + t178;
+    const real t180 = S[2] - t179;
+    S_Q[2] = t180;
+    const real t181 = t4 * t117;
+    const real t182 = t13 * t113;
+    const real t183 = t181 + t182;
+    const real t184 = S[5] * t111;
+    const real t185 = t183 + t184;
+    const real t186 = S[3] - t185;
+    S_Q[3] = t186;
+    const real t187 = t4 * t138;
+    const real t188 = t13 * t134;
+    const real t189 = t187 + t188;
+    const real t190 = S[5] * t132;
+    const real t191 = t189 + t190;
+    const real t192 = S[4] - t191;
+    S_Q[4] = t192;
+    S_Q[5] = 0.0;
+    const real t193 = t8 * t75;
+    const real t194 = t16 * t71;
+    const real t195 = t193 + t194;
+    const real t196 = S[10] * t69;
+    const real t197 = t195 + t196;
+    const real t198 = S[6] - t197;
+    S_Q[6] = t198;
+    const real t199 = t8 * t96;
+    const real t200 = t16 * t92;
+    const real t201 = t199 + t200;
+    const real t202 = S[10] * t90;
+    const real t203 = t201 + t202;
+    const real t204 = S[7] - t203;
+    S_Q[7] = t204;
+    const real t205 = t8 * t117;
+    const real t206 = t16 * t113;
+    const real t207 = t205 + t206;
+    const real t208 = S[10] * t111;
+    const real t209 = t207 + t208;
+    const real t210 = S[8] - t209;
+    S_Q[8] = t210;
+    const real t211 = t8 * t138;
+    const real t212 = t16 * t134;
+    const real t213 = t211 + t212;
+    const real t214 = S[10] * t132;
+    const real t215 = t213 + t214;
+    const real t216 = S[9] - t215;
+    S_Q[9] = t216;
+    S_Q[10] = 0.0;
+    const real t217 = t78 * t96;
+    const real t218 = t82 * t92;
+    const real t219 = t217 + t218;
+    const real t220 = S[14] * t90;
+    const real t221 = t219 + t220;
+    const real t222 = S[11] - t221;
+    S_Q[11] = t222;
+    const real t223 = t78 * t117;
+    const real t224 = t82 * t113;
+    const real t225 = t223 + t224;
+    const real t226 = S[14] * t111;
+    const real t227 = t225 + t226;
+    const real t228 = S[12] - t227;
+    S_Q[12] = t228;
+    const real t229 = t78 * t138;
+    const real t230 = t82 * t134;
+    const real t231 = t229 + t230;
+    const real t232 = S[14] * t132;
+    const real t233 = t231 + t232;
+    const real t234 = S[13] - t233;
+    S_Q[13] = t234;
+    S_Q[14] = 0.0;
+    const real t235 = t99 * t117;
+    const real t236 = t103 * t113;
+    const real t237 = t235 + t236;
+    const real t238 = S[17] * t111;
+    const real t239 = t237 + t238;
+    const real t240 = S[15] - t239;
+    S_Q[15] = t240;
+    const real t241 = t99 * t138;
+    const real t242 = t103 * t134;
+    const real t243 = t241 + t242;
+    const real t244 = S[17] * t132;
+    const real t245 = t243 + t244;
+    const real t246 = S[16] - t245;
+    S_Q[16] = t246;
+    S_Q[17] = 0.0;
+    const real t247 = t120 * t138;
+    const real t248 = t124 * t134;
+    const real t249 = t247 + t248;
+    const real t250 = S[19] * t132;
+    const real t251 = t249 + t250;
+    const real t252 = S[18] - t251;
+    S_Q[18] = t252;
+    S_Q[19] = 0.0;
+    S_Q[20] = 0.0;
+    const real t253 = t4 * t162;
+    const real t254 = t13 * t158;
+    const real t255 = t253 + t254;
+    const real t256 = S[5] * t156;
+    const real t257 = t255 + t256;
+    const real t258 = e[0] + t257;
+    e_Q[0] = t258;
+    const real t259 = t8 * t162;
+    const real t260 = t16 * t158;
+    const real t261 = t259 + t260;
+    const real t262 = S[10] * t156;
+    const real t263 = t261 + t262;
+    const real t264 = e[1] + t263;
+    e_Q[1] = t264;
+    const real t265 = t78 * t162;
+    const real t266 = t82 * t158;
+    const real t267 = t265 + t266;
+    const real t268 = S[14] * t156;
+    const real t269 = t267 + t268;
+    const real t270 = e[2] + t269;
+    e_Q[2] = t270;
+    const real t271 = t99 * t162;
+    const real t272 = t103 * t158;
+    const real t273 = t271 + t272;
+    const real t274 = S[17] * t156;
+    const real t275 = t273 + t274;
+    const real t276 = e[3] + t275;
+    e_Q[3] = t276;
+    const real t277 = t120 * t162;
+    const real t278 = t124 * t158;
+    const real t279 = t277 + t278;
+    const real t280 = S[19] * t156;
+    const real t281 = t279 + t280;
+    const real t282 = e[4] + t281;
+    e_Q[4] = t282;
+    e_Q[5] = tau[2];
+    D_ii[0] = t10;
+    D_ii[1] = t18;
+    D_ii[2] = S[20];
+    return 0;
+}
+
+static int mstmm_hinge_planar_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_planar_eliminate_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 3, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_eliminate_outputs[] = {
+    {"G", 18, "", 0, 0},
+    {"g", 3, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 3, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_planar_eliminate_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_planar_q_names[] = {
     "x", "y", "angle",
 };
@@ -1325,13 +1721,25 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_planar_eliminate,
+        .call = mstmm_hinge_planar_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_planar_eliminate_inputs,
+        .outputs = mstmm_hinge_planar_eliminate_outputs,
+        .ir_hash = "61317bfd0d713d9eb4dfe2da4cdc3eefca1f528be1ba268e74fdd0b40320c483",
+        .n_guards = 6,
+        .guards = mstmm_hinge_planar_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "645794febe954c4533fef7fd20196301533b7b4278da90ead5275f51d7ade127",
+    .hash = "7601e0b0052db7cccf02d86e9ff1f46f608c4d609249ff7683b4f7e4b11fddb0",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1341,6 +1749,6 @@ const mstmm_element mstmm_hinge_planar = {
     .u_units = mstmm_hinge_planar_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_planar_kernels,
 };

@@ -22,6 +22,9 @@ int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the screw hinge
  * in  p[1] parameters: lead [m]
@@ -1024,6 +1027,175 @@ static const mstmm_port mstmm_hinge_screw_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[1] (N, N*m) efforts on the free coordinates
+ * out G[1][6] udot = g - G a_Q
+ * out g[1] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[1] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    (void)q;
+    const real t0 = 2.0 * MSTMM_PI;
+    const real t1 = 1.0 / t0;
+    const real t2 = p[0] * t1;
+    const real t3 = S[14] * t2;
+    const real t4 = S[20] + t3;
+    const real t5 = S[11] * t2;
+    const real t6 = S[14] + t5;
+    const real t7 = t2 * t6;
+    const real t8 = t4 + t7;
+    const real t9 = 0.0 < t8;
+    if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t10 = S[2] * t2;
+    const real t11 = S[5] + t10;
+    const real t12 = 1.0 / t8;
+    const real t13 = t11 * t12;
+    G[0] = t13;
+    const real t14 = S[7] * t2;
+    const real t15 = S[10] + t14;
+    const real t16 = t15 * t12;
+    G[1] = t16;
+    const real t17 = t6 * t12;
+    G[2] = t17;
+    const real t18 = S[12] * t2;
+    const real t19 = S[17] + t18;
+    const real t20 = t19 * t12;
+    G[3] = t20;
+    const real t21 = S[13] * t2;
+    const real t22 = S[19] + t21;
+    const real t23 = t22 * t12;
+    G[4] = t23;
+    const real t24 = t4 * t12;
+    G[5] = t24;
+    const real t25 = e[2] * t2;
+    const real t26 = e[5] + t25;
+    const real t27 = tau[0] - t26;
+    const real t28 = t12 * t27;
+    g[0] = t28;
+    const real t29 = t11 * t13;
+    const real t30 = S[0] - t29;
+    S_Q[0] = t30;
+    const real t31 = t11 * t16;
+    const real t32 = S[1] - t31;
+    S_Q[1] = t32;
+    const real t33 = t11 * t17;
+    const real t34 = S[2] - t33;
+    S_Q[2] = t34;
+    const real t35 = t11 * t20;
+    const real t36 = S[3] - t35;
+    S_Q[3] = t36;
+    const real t37 = t11 * t23;
+    const real t38 = S[4] - t37;
+    S_Q[4] = t38;
+    const real t39 = t11 * t24;
+    const real t40 = S[5] - t39;
+    S_Q[5] = t40;
+    const real t41 = t15 * t16;
+    const real t42 = S[6] - t41;
+    S_Q[6] = t42;
+    const real t43 = t15 * t17;
+    const real t44 = S[7] - t43;
+    S_Q[7] = t44;
+    const real t45 = t15 * t20;
+    const real t46 = S[8] - t45;
+    S_Q[8] = t46;
+    const real t47 = t15 * t23;
+    const real t48 = S[9] - t47;
+    S_Q[9] = t48;
+    const real t49 = t15 * t24;
+    const real t50 = S[10] - t49;
+    S_Q[10] = t50;
+    const real t51 = t6 * t17;
+    const real t52 = S[11] - t51;
+    S_Q[11] = t52;
+    const real t53 = t6 * t20;
+    const real t54 = S[12] - t53;
+    S_Q[12] = t54;
+    const real t55 = t6 * t23;
+    const real t56 = S[13] - t55;
+    S_Q[13] = t56;
+    const real t57 = t6 * t24;
+    const real t58 = S[14] - t57;
+    S_Q[14] = t58;
+    const real t59 = t19 * t20;
+    const real t60 = S[15] - t59;
+    S_Q[15] = t60;
+    const real t61 = t19 * t23;
+    const real t62 = S[16] - t61;
+    S_Q[16] = t62;
+    const real t63 = t19 * t24;
+    const real t64 = S[17] - t63;
+    S_Q[17] = t64;
+    const real t65 = t22 * t23;
+    const real t66 = S[18] - t65;
+    S_Q[18] = t66;
+    const real t67 = t22 * t24;
+    const real t68 = S[19] - t67;
+    S_Q[19] = t68;
+    const real t69 = t4 * t24;
+    const real t70 = S[20] - t69;
+    S_Q[20] = t70;
+    const real t71 = t11 * t28;
+    const real t72 = e[0] + t71;
+    e_Q[0] = t72;
+    const real t73 = t15 * t28;
+    const real t74 = e[1] + t73;
+    e_Q[1] = t74;
+    const real t75 = t6 * t28;
+    const real t76 = e[2] + t75;
+    e_Q[2] = t76;
+    const real t77 = t19 * t28;
+    const real t78 = e[3] + t77;
+    e_Q[3] = t78;
+    const real t79 = t22 * t28;
+    const real t80 = e[4] + t79;
+    e_Q[4] = t80;
+    const real t81 = t4 * t28;
+    const real t82 = e[5] + t81;
+    e_Q[5] = t82;
+    D_ii[0] = t8;
+    return 0;
+}
+
+static int mstmm_hinge_screw_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_screw_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_screw_eliminate_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_screw_eliminate_outputs[] = {
+    {"G", 6, "", 0, 0},
+    {"g", 1, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 1, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_screw_eliminate_guards[] = {
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_screw_q_names[] = {
     "angle",
 };
@@ -1097,13 +1269,25 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_screw_eliminate,
+        .call = mstmm_hinge_screw_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_screw_eliminate_inputs,
+        .outputs = mstmm_hinge_screw_eliminate_outputs,
+        .ir_hash = "996bb5dba3cf6e963a59c780360b5cd9a8e41e0c395b3c0bad2df728b789e875",
+        .n_guards = 2,
+        .guards = mstmm_hinge_screw_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "24176423d828688cfa82b7d1e64a40efba5a5eb5dcca3f8351dc7d3b81e16e5f",
+    .hash = "9097896a62bb4e28f3cc3f063741863b072d2ab5d08b15b78970a4ef4cc4edcb",
     .nq = 1,
     .nu = 1,
     .np = 1,
@@ -1113,6 +1297,6 @@ const mstmm_element mstmm_hinge_screw = {
     .u_units = mstmm_hinge_screw_u_units,
     .p_names = mstmm_hinge_screw_p_names,
     .p_units = mstmm_hinge_screw_p_units,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_screw_kernels,
 };

@@ -22,6 +22,9 @@ int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
@@ -1168,6 +1171,275 @@ static const mstmm_port mstmm_hinge_universal_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* elimination of a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) efforts on the free coordinates
+ * out G[2][6] udot = g - G a_Q
+ * out g[2] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[2] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    const real t0 = sin(p[0]);
+    const real t1 = sin(q[1]);
+    const real t2 = t0 * t1;
+    const real t3 = S[15] * t2;
+    const real t4 = cos(q[1]);
+    const real t5 = t0 * t4;
+    const real t6 = S[16] * t5;
+    const real t7 = t3 + t6;
+    const real t8 = cos(p[0]);
+    const real t9 = S[17] * t8;
+    const real t10 = t7 + t9;
+    const real t11 = t2 * t10;
+    const real t12 = S[16] * t2;
+    const real t13 = S[18] * t5;
+    const real t14 = t12 + t13;
+    const real t15 = S[19] * t8;
+    const real t16 = t14 + t15;
+    const real t17 = t5 * t16;
+    const real t18 = t11 + t17;
+    const real t19 = S[17] * t2;
+    const real t20 = S[19] * t5;
+    const real t21 = t19 + t20;
+    const real t22 = S[20] * t8;
+    const real t23 = t21 + t22;
+    const real t24 = t8 * t23;
+    const real t25 = t18 + t24;
+    const real t26 = 0.0 < t25;
+    if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t27 = S[20] * ((real)1 / (real)10000000000000);
+    const real t28 = 1.0 / t25;
+    const real t29 = t23 * t28;
+    const real t30 = t23 * t29;
+    const real t31 = S[20] - t30;
+    const real t32 = t27 < t31;
+    if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t33 = S[3] * t2;
+    const real t34 = S[4] * t5;
+    const real t35 = t33 + t34;
+    const real t36 = S[5] * t8;
+    const real t37 = t35 + t36;
+    const real t38 = t37 * t28;
+    const real t39 = 1.0 / t31;
+    const real t40 = t37 * t29;
+    const real t41 = S[5] - t40;
+    const real t42 = t39 * t41;
+    const real t43 = t29 * t42;
+    const real t44 = t38 - t43;
+    G[0] = t44;
+    const real t45 = S[8] * t2;
+    const real t46 = S[9] * t5;
+    const real t47 = t45 + t46;
+    const real t48 = S[10] * t8;
+    const real t49 = t47 + t48;
+    const real t50 = t49 * t28;
+    const real t51 = t49 * t29;
+    const real t52 = S[10] - t51;
+    const real t53 = t39 * t52;
+    const real t54 = t29 * t53;
+    const real t55 = t50 - t54;
+    G[1] = t55;
+    const real t56 = S[12] * t2;
+    const real t57 = S[13] * t5;
+    const real t58 = t56 + t57;
+    const real t59 = S[14] * t8;
+    const real t60 = t58 + t59;
+    const real t61 = t60 * t28;
+    const real t62 = t60 * t29;
+    const real t63 = S[14] - t62;
+    const real t64 = t39 * t63;
+    const real t65 = t29 * t64;
+    const real t66 = t61 - t65;
+    G[2] = t66;
+    const real t67 = t10 * t28;
+    const real t68 = t10 * t29;
+    const real t69 = S[17] - t68;
+    const real t70 = t39 * t69;
+    const real t71 = t29 * t70;
+    const real t72 = t67 - t71;
+    G[3] = t72;
+    const real t73 = t16 * t28;
+    const real t74 = t16 * t29;
+    const real t75 = S[19] - t74;
+    const real t76 = t39 * t75;
+    const real t77 = t29 * t76;
+    const real t78 = t73 - t77;
+    G[4] = t78;
+    G[5] = 0.0;
+    G[6] = t42;
+    G[7] = t53;
+    G[8] = t64;
+    G[9] = t70;
+    G[10] = t76;
+    G[11] = 1.0;
+    const real t79 = e[3] * t2;
+    const real t80 = e[4] * t5;
+    const real t81 = t79 + t80;
+    const real t82 = e[5] * t8;
+    const real t83 = t81 + t82;
+    const real t84 = tau[0] - t83;
+    const real t85 = t28 * t84;
+    const real t86 = tau[1] - e[5];
+    const real t87 = t29 * t84;
+    const real t88 = t86 - t87;
+    const real t89 = t39 * t88;
+    const real t90 = t29 * t89;
+    const real t91 = t85 - t90;
+    g[0] = t91;
+    g[1] = t89;
+    const real t92 = t37 * t44;
+    const real t93 = S[5] * t42;
+    const real t94 = t92 + t93;
+    const real t95 = S[0] - t94;
+    S_Q[0] = t95;
+    const real t96 = t37 * t55;
+    const real t97 = S[5] * t53;
+    const real t98 = t96 + t97;
+    const real t99 = S[1] - t98;
+    S_Q[1] = t99;
+    const real t100 = t37 * t66;
+    const real t101 = S[5] * t64;
+    const real t102 = t100 + t101;
+    const real t103 = S[2] - t102;
+    S_Q[2] = t103;
+    const real t104 = t37 * t72;
+    const real t105 = S[5] * t70;
+    const real t106 = t104 + t105;
+    const real t107 = S[3] - t106;
+    S_Q[3] = t107;
+    const real t108 = t37 * t78;
+    const real t109 = S[5] * t76;
+    const real t110 = t108 + t109;
+    const real t111 = S[4] - t110;
+    S_Q[4] = t111;
+    S_Q[5] = 0.0;
+    const real t112 = t49 * t55;
+    const real t113 = S[10] * t53;
+    const real t114 = t112 + t113;
+    const real t115 = S[6] - t114;
+    S_Q[6] = t115;
+    const real t116 = t49 * t66;
+    const real t117 = S[10] * t64;
+    const real t118 = t116 + t117;
+    const real t119 = S[7] - t118;
+    S_Q[7] = t119;
+    const real t120 = t49 * t72;
+    const real t121 = S[10] * t70;
+    const real t122 = t120 + t121;
+    const real t123 = S[8] - t122;
+    S_Q[8] = t123;
+    const real t124 = t49 * t78;
+    const real t125 = S[10] * t76;
+    const real t126 = t124 + t125;
+    const real t127 = S[9] - t126;
+    S_Q[9] = t127;
+    S_Q[10] = 0.0;
+    const real t128 = t60 * t66;
+    const real t129 = S[14] * t64;
+    const real t130 = t128 + t129;
+    const real t131 = S[11] - t130;
+    S_Q[11] = t131;
+    const real t132 = t60 * t72;
+    const real t133 = S[14] * t70;
+    const real t134 = t132 + t133;
+    const real t135 = S[12] - t134;
+    S_Q[12] = t135;
+    const real t136 = t60 * t78;
+    const real t137 = S[14] * t76;
+    const real t138 = t136 + t137;
+    const real t139 = S[13] - t138;
+    S_Q[13] = t139;
+    S_Q[14] = 0.0;
+    const real t140 = t10 * t72;
+    const real t141 = S[17] * t70;
+    const real t142 = t140 + t141;
+    const real t143 = S[15] - t142;
+    S_Q[15] = t143;
+    const real t144 = t10 * t78;
+    const real t145 = S[17] * t76;
+    const real t146 = t144 + t145;
+    const real t147 = S[16] - t146;
+    S_Q[16] = t147;
+    S_Q[17] = 0.0;
+    const real t148 = t16 * t78;
+    const real t149 = S[19] * t76;
+    const real t150 = t148 + t149;
+    const real t151 = S[18] - t150;
+    S_Q[18] = t151;
+    S_Q[19] = 0.0;
+    S_Q[20] = 0.0;
+    const real t152 = t37 * t91;
+    const real t153 = S[5] * t89;
+    const real t154 = t152 + t153;
+    const real t155 = e[0] + t154;
+    e_Q[0] = t155;
+    const real t156 = t49 * t91;
+    const real t157 = S[10] * t89;
+    const real t158 = t156 + t157;
+    const real t159 = e[1] + t158;
+    e_Q[1] = t159;
+    const real t160 = t60 * t91;
+    const real t161 = S[14] * t89;
+    const real t162 = t160 + t161;
+    const real t163 = e[2] + t162;
+    e_Q[2] = t163;
+    const real t164 = t10 * t91;
+    const real t165 = S[17] * t89;
+    const real t166 = t164 + t165;
+    const real t167 = e[3] + t166;
+    e_Q[3] = t167;
+    const real t168 = t16 * t91;
+    const real t169 = S[19] * t89;
+    const real t170 = t168 + t169;
+    const real t171 = e[4] + t170;
+    e_Q[4] = t171;
+    e_Q[5] = tau[1];
+    D_ii[0] = t25;
+    D_ii[1] = S[20];
+    return 0;
+}
+
+static int mstmm_hinge_universal_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_hinge_universal_eliminate_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_eliminate_outputs[] = {
+    {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 2, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_hinge_universal_eliminate_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const char *const mstmm_hinge_universal_q_names[] = {
     "angle1", "angle2",
 };
@@ -1241,13 +1513,25 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_hinge_universal_eliminate,
+        .call = mstmm_hinge_universal_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_hinge_universal_eliminate_inputs,
+        .outputs = mstmm_hinge_universal_eliminate_outputs,
+        .ir_hash = "1af5b7033a9d8ce53ce27c3b322fb60cffc0853b76c7fe438c39f916f909eb51",
+        .n_guards = 4,
+        .guards = mstmm_hinge_universal_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "2cccd99d319357a865dc953afb391f8ab603dd7718a1f9fe3b68c6287d23a271",
+    .hash = "064b38c633091f77dec801bb42e0a2ceaea90f72c38dfc0ca3a15b4c7b2a652a",
     .nq = 2,
     .nu = 2,
     .np = 1,
@@ -1257,6 +1541,6 @@ const mstmm_element mstmm_hinge_universal = {
     .u_units = mstmm_hinge_universal_u_units,
     .p_names = mstmm_hinge_universal_p_names,
     .p_units = mstmm_hinge_universal_p_units,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_universal_kernels,
 };

@@ -25,6 +25,9 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1241,6 +1244,244 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* elimination of a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6] motion subspace of the free coordinates
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[1] (N, N*m) efforts on the free coordinates
+ * out G[1][6] udot = g - G a_Q
+ * out g[1] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[1] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[1] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[1] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[2] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[3] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[4] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[5] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[1] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[1] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[2] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[3] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[4] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[5] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[2] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[1] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[2] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[3] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[4] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[5] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[3] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[1] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[2] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[3] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[4] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[5] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[4] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[1] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[2] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[3] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[4] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[5] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[5] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t79 = 1.0 / t77;
+    const real t80 = t10 * t79;
+    G[0] = t80;
+    const real t81 = t22 * t79;
+    G[1] = t81;
+    const real t82 = t35 * t79;
+    G[2] = t82;
+    const real t83 = t48 * t79;
+    G[3] = t83;
+    const real t84 = t61 * t79;
+    G[4] = t84;
+    const real t85 = t74 * t79;
+    G[5] = t85;
+    const real t86 = H[0] * e[0];
+    const real t87 = H[1] * e[1];
+    const real t88 = t86 + t87;
+    const real t89 = H[2] * e[2];
+    const real t90 = t88 + t89;
+    const real t91 = H[3] * e[3];
+    const real t92 = t90 + t91;
+    const real t93 = H[4] * e[4];
+    const real t94 = t92 + t93;
+    const real t95 = H[5] * e[5];
+    const real t96 = t94 + t95;
+    const real t97 = tau[0] - t96;
+    const real t98 = t79 * t97;
+    g[0] = t98;
+    const real t99 = t10 * t80;
+    const real t100 = S[0] - t99;
+    S_Q[0] = t100;
+    const real t101 = t10 * t81;
+    const real t102 = S[1] - t101;
+    S_Q[1] = t102;
+    const real t103 = t10 * t82;
+    const real t104 = S[2] - t103;
+    S_Q[2] = t104;
+    const real t105 = t10 * t83;
+    const real t106 = S[3] - t105;
+    S_Q[3] = t106;
+    const real t107 = t10 * t84;
+    const real t108 = S[4] - t107;
+    S_Q[4] = t108;
+    const real t109 = t10 * t85;
+    const real t110 = S[5] - t109;
+    S_Q[5] = t110;
+    const real t111 = t22 * t81;
+    const real t112 = S[6] - t111;
+    S_Q[6] = t112;
+    const real t113 = t22 * t82;
+    const real t114 = S[7] - t113;
+    S_Q[7] = t114;
+    const real t115 = t22 * t83;
+    const real t116 = S[8] - t115;
+    S_Q[8] = t116;
+    const real t117 = t22 * t84;
+    const real t118 = S[9] - t117;
+    S_Q[9] = t118;
+    const real t119 = t22 * t85;
+    const real t120 = S[10] - t119;
+    S_Q[10] = t120;
+    const real t121 = t35 * t82;
+    const real t122 = S[11] - t121;
+    S_Q[11] = t122;
+    const real t123 = t35 * t83;
+    const real t124 = S[12] - t123;
+    S_Q[12] = t124;
+    const real t125 = t35 * t84;
+    const real t126 = S[13] - t125;
+    S_Q[13] = t126;
+    const real t127 = t35 * t85;
+    const real t128 = S[14] - t127;
+    S_Q[14] = t128;
+    const real t129 = t48 * t83;
+    const real t130 = S[15] - t129;
+    S_Q[15] = t130;
+    const real t131 = t48 * t84;
+    const real t132 = S[16] - t131;
+    S_Q[16] = t132;
+    const real t133 = t48 * t85;
+    const real t134 = S[17] - t133;
+    S_Q[17] = t134;
+    const real t135 = t61 * t84;
+    const real t136 = S[18] - t135;
+    S_Q[18] = t136;
+    const real t137 = t61 * t85;
+    const real t138 = S[19] - t137;
+    S_Q[19] = t138;
+    const real t139 = t74 * t85;
+    const real t140 = S[20] - t139;
+    S_Q[20] = t140;
+    const real t141 = t10 * t98;
+    const real t142 = e[0] + t141;
+    e_Q[0] = t142;
+    const real t143 = t22 * t98;
+    const real t144 = e[1] + t143;
+    e_Q[1] = t144;
+    const real t145 = t35 * t98;
+    const real t146 = e[2] + t145;
+    e_Q[2] = t146;
+    const real t147 = t48 * t98;
+    const real t148 = e[3] + t147;
+    e_Q[3] = t148;
+    const real t149 = t61 * t98;
+    const real t150 = e[4] + t149;
+    e_Q[4] = t150;
+    const real t151 = t74 * t98;
+    const real t152 = e[5] + t151;
+    e_Q[5] = t152;
+    D_ii[0] = t77;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_eliminate_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_eliminate_outputs[] = {
+    {"G", 6, "", 0, 0},
+    {"g", 1, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 1, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic1_eliminate_guards[] = {
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -1302,13 +1543,25 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 1,
         .guards = mstmm_sweep_generic1_project_guards,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_sweep_generic1_eliminate,
+        .call = mstmm_sweep_generic1_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_sweep_generic1_eliminate_inputs,
+        .outputs = mstmm_sweep_generic1_eliminate_outputs,
+        .ir_hash = "ef331e7a502983c2670858fe2a22c34875cae371b7192b969a1cc90daf80651d",
+        .n_guards = 2,
+        .guards = mstmm_sweep_generic1_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "035dc081fa822e5edda94ea5c70f2be479155b9f51b977c19730b395616e8156",
+    .hash = "b926b2f238cff1eef2e51c1438de3d3d876ba37a781eab23c89bed5e0d80e544",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1318,6 +1571,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 6,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -25,6 +25,9 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1574,6 +1577,452 @@ static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
     {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* elimination of a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) efforts on the free coordinates
+ * out G[2][6] udot = g - G a_Q
+ * out g[2] udot = g - G a_Q
+ * out S_Q[21] S behind the hinge, hinge axes
+ * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
+ * out D_ii[2] (kg*m2 or kg) diagonal of D
+ */
+int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[2] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[2] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[4] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[6] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[8] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[10] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[2] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[2] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[4] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[6] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[8] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[10] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[4] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[2] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[4] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[6] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[8] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[10] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[6] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[2] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[4] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[6] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[8] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[10] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[8] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[2] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[4] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[6] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[8] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[10] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[10] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t79 = H[1] * S[0];
+    const real t80 = H[3] * S[1];
+    const real t81 = t79 + t80;
+    const real t82 = H[5] * S[2];
+    const real t83 = t81 + t82;
+    const real t84 = H[7] * S[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[9] * S[4];
+    const real t87 = t85 + t86;
+    const real t88 = H[11] * S[5];
+    const real t89 = t87 + t88;
+    const real t90 = H[1] * t89;
+    const real t91 = H[1] * S[1];
+    const real t92 = H[3] * S[6];
+    const real t93 = t91 + t92;
+    const real t94 = H[5] * S[7];
+    const real t95 = t93 + t94;
+    const real t96 = H[7] * S[8];
+    const real t97 = t95 + t96;
+    const real t98 = H[9] * S[9];
+    const real t99 = t97 + t98;
+    const real t100 = H[11] * S[10];
+    const real t101 = t99 + t100;
+    const real t102 = H[3] * t101;
+    const real t103 = t90 + t102;
+    const real t104 = H[1] * S[2];
+    const real t105 = H[3] * S[7];
+    const real t106 = t104 + t105;
+    const real t107 = H[5] * S[11];
+    const real t108 = t106 + t107;
+    const real t109 = H[7] * S[12];
+    const real t110 = t108 + t109;
+    const real t111 = H[9] * S[13];
+    const real t112 = t110 + t111;
+    const real t113 = H[11] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = H[5] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = H[1] * S[3];
+    const real t118 = H[3] * S[8];
+    const real t119 = t117 + t118;
+    const real t120 = H[5] * S[12];
+    const real t121 = t119 + t120;
+    const real t122 = H[7] * S[15];
+    const real t123 = t121 + t122;
+    const real t124 = H[9] * S[16];
+    const real t125 = t123 + t124;
+    const real t126 = H[11] * S[17];
+    const real t127 = t125 + t126;
+    const real t128 = H[7] * t127;
+    const real t129 = t116 + t128;
+    const real t130 = H[1] * S[4];
+    const real t131 = H[3] * S[9];
+    const real t132 = t130 + t131;
+    const real t133 = H[5] * S[13];
+    const real t134 = t132 + t133;
+    const real t135 = H[7] * S[16];
+    const real t136 = t134 + t135;
+    const real t137 = H[9] * S[18];
+    const real t138 = t136 + t137;
+    const real t139 = H[11] * S[19];
+    const real t140 = t138 + t139;
+    const real t141 = H[9] * t140;
+    const real t142 = t129 + t141;
+    const real t143 = H[1] * S[5];
+    const real t144 = H[3] * S[10];
+    const real t145 = t143 + t144;
+    const real t146 = H[5] * S[14];
+    const real t147 = t145 + t146;
+    const real t148 = H[7] * S[17];
+    const real t149 = t147 + t148;
+    const real t150 = H[9] * S[19];
+    const real t151 = t149 + t150;
+    const real t152 = H[11] * S[20];
+    const real t153 = t151 + t152;
+    const real t154 = H[11] * t153;
+    const real t155 = t142 + t154;
+    const real t156 = J[1] + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[0] * t89;
+    const real t159 = H[2] * t101;
+    const real t160 = t158 + t159;
+    const real t161 = H[4] * t114;
+    const real t162 = t160 + t161;
+    const real t163 = H[6] * t127;
+    const real t164 = t162 + t163;
+    const real t165 = H[8] * t140;
+    const real t166 = t164 + t165;
+    const real t167 = H[10] * t153;
+    const real t168 = t166 + t167;
+    const real t169 = 1.0 / t77;
+    const real t170 = t168 * t169;
+    const real t171 = t168 * t170;
+    const real t172 = t156 - t171;
+    const real t173 = t157 < t172;
+    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t174 = t10 * t169;
+    const real t175 = 1.0 / t172;
+    const real t176 = t10 * t170;
+    const real t177 = t89 - t176;
+    const real t178 = t175 * t177;
+    const real t179 = t170 * t178;
+    const real t180 = t174 - t179;
+    G[0] = t180;
+    const real t181 = t22 * t169;
+    const real t182 = t22 * t170;
+    const real t183 = t101 - t182;
+    const real t184 = t175 * t183;
+    const real t185 = t170 * t184;
+    const real t186 = t181 - t185;
+    G[1] = t186;
+    const real t187 = t35 * t169;
+    const real t188 = t35 * t170;
+    const real t189 = t114 - t188;
+    const real t190 = t175 * t189;
+    const real t191 = t170 * t190;
+    const real t192 = t187 - t191;
+    G[2] = t192;
+    const real t193 = t48 * t169;
+    const real t194 = t48 * t170;
+    const real t195 = t127 - t194;
+    const real t196 = t175 * t195;
+    const real t197 = t170 * t196;
+    const real t198 = t193 - t197;
+    G[3] = t198;
+    const real t199 = t61 * t169;
+    const real t200 = t61 * t170;
+    const real t201 = t140 - t200;
+    const real t202 = t175 * t201;
+    const real t203 = t170 * t202;
+    const real t204 = t199 - t203;
+    G[4] = t204;
+    const real t205 = t74 * t169;
+    const real t206 = t74 * t170;
+    const real t207 = t153 - t206;
+    const real t208 = t175 * t207;
+    const real t209 = t170 * t208;
+    const real t210 = t205 - t209;
+    G[5] = t210;
+    G[6] = t178;
+    G[7] = t184;
+    G[8] = t190;
+    G[9] = t196;
+    G[10] = t202;
+    G[11] = t208;
+    const real t211 = H[0] * e[0];
+    const real t212 = H[2] * e[1];
+    const real t213 = t211 + t212;
+    const real t214 = H[4] * e[2];
+    const real t215 = t213 + t214;
+    const real t216 = H[6] * e[3];
+    const real t217 = t215 + t216;
+    const real t218 = H[8] * e[4];
+    const real t219 = t217 + t218;
+    const real t220 = H[10] * e[5];
+    const real t221 = t219 + t220;
+    const real t222 = tau[0] - t221;
+    const real t223 = t169 * t222;
+    const real t224 = H[1] * e[0];
+    const real t225 = H[3] * e[1];
+    const real t226 = t224 + t225;
+    const real t227 = H[5] * e[2];
+    const real t228 = t226 + t227;
+    const real t229 = H[7] * e[3];
+    const real t230 = t228 + t229;
+    const real t231 = H[9] * e[4];
+    const real t232 = t230 + t231;
+    const real t233 = H[11] * e[5];
+    const real t234 = t232 + t233;
+    const real t235 = tau[1] - t234;
+    const real t236 = t170 * t222;
+    const real t237 = t235 - t236;
+    const real t238 = t175 * t237;
+    const real t239 = t170 * t238;
+    const real t240 = t223 - t239;
+    g[0] = t240;
+    g[1] = t238;
+    const real t241 = t10 * t180;
+    const real t242 = t89 * t178;
+    const real t243 = t241 + t242;
+    const real t244 = S[0] - t243;
+    S_Q[0] = t244;
+    const real t245 = t10 * t186;
+    const real t246 = t89 * t184;
+    const real t247 = t245 + t246;
+    const real t248 = S[1] - t247;
+    S_Q[1] = t248;
+    const real t249 = t10 * t192;
+    const real t250 = t89 * t190;
+    const real t251 = t249 + t250;
+    const real t252 = S[2] - t251;
+    S_Q[2] = t252;
+    const real t253 = t10 * t198;
+    const real t254 = t89 * t196;
+    const real t255 = t253 + t254;
+    const real t256 = S[3] - t255;
+    S_Q[3] = t256;
+    const real t257 = t10 * t204;
+    const real t258 = t89 * t202;
+    const real t259 = t257 + t258;
+    const real t260 = S[4] - t259;
+    S_Q[4] = t260;
+    const real t261 = t10 * t210;
+    const real t262 = t89 * t208;
+    const real t263 = t261 + t262;
+    const real t264 = S[5] - t263;
+    S_Q[5] = t264;
+    const real t265 = t22 * t186;
+    const real t266 = t101 * t184;
+    const real t267 = t265 + t266;
+    const real t268 = S[6] - t267;
+    S_Q[6] = t268;
+    const real t269 = t22 * t192;
+    const real t270 = t101 * t190;
+    const real t271 = t269 + t270;
+    const real t272 = S[7] - t271;
+    S_Q[7] = t272;
+    const real t273 = t22 * t198;
+    const real t274 = t101 * t196;
+    const real t275 = t273 + t274;
+    const real t276 = S[8] - t275;
+    S_Q[8] = t276;
+    const real t277 = t22 * t204;
+    const real t278 = t101 * t202;
+    const real t279 = t277 + t278;
+    const real t280 = S[9] - t279;
+    S_Q[9] = t280;
+    const real t281 = t22 * t210;
+    const real t282 = t101 * t208;
+    const real t283 = t281 + t282;
+    const real t284 = S[10] - t283;
+    S_Q[10] = t284;
+    const real t285 = t35 * t192;
+    const real t286 = t114 * t190;
+    const real t287 = t285 + t286;
+    const real t288 = S[11] - t287;
+    S_Q[11] = t288;
+    const real t289 = t35 * t198;
+    const real t290 = t114 * t196;
+    const real t291 = t289 + t290;
+    const real t292 = S[12] - t291;
+    S_Q[12] = t292;
+    const real t293 = t35 * t204;
+    const real t294 = t114 * t202;
+    const real t295 = t293 + t294;
+    const real t296 = S[13] - t295;
+    S_Q[13] = t296;
+    const real t297 = t35 * t210;
+    const real t298 = t114 * t208;
+    const real t299 = t297 + t298;
+    const real t300 = S[14] - t299;
+    S_Q[14] = t300;
+    const real t301 = t48 * t198;
+    const real t302 = t127 * t196;
+    const real t303 = t301 + t302;
+    const real t304 = S[15] - t303;
+    S_Q[15] = t304;
+    const real t305 = t48 * t204;
+    const real t306 = t127 * t202;
+    const real t307 = t305 + t306;
+    const real t308 = S[16] - t307;
+    S_Q[16] = t308;
+    const real t309 = t48 * t210;
+    const real t310 = t127 * t208;
+    const real t311 = t309 + t310;
+    const real t312 = S[17] - t311;
+    S_Q[17] = t312;
+    const real t313 = t61 * t204;
+    const real t314 = t140 * t202;
+    const real t315 = t313 + t314;
+    const real t316 = S[18] - t315;
+    S_Q[18] = t316;
+    const real t317 = t61 * t210;
+    const real t318 = t140 * t208;
+    const real t319 = t317 + t318;
+    const real t320 = S[19] - t319;
+    S_Q[19] = t320;
+    const real t321 = t74 * t210;
+    const real t322 = t153 * t208;
+    const real t323 = t321 + t322;
+    const real t324 = S[20] - t323;
+    S_Q[20] = t324;
+    const real t325 = t10 * t240;
+    const real t326 = t89 * t238;
+    const real t327 = t325 + t326;
+    const real t328 = e[0] + t327;
+    e_Q[0] = t328;
+    const real t329 = t22 * t240;
+    const real t330 = t101 * t238;
+    const real t331 = t329 + t330;
+    const real t332 = e[1] + t331;
+    e_Q[1] = t332;
+    const real t333 = t35 * t240;
+    const real t334 = t114 * t238;
+    const real t335 = t333 + t334;
+    const real t336 = e[2] + t335;
+    e_Q[2] = t336;
+    const real t337 = t48 * t240;
+    const real t338 = t127 * t238;
+    const real t339 = t337 + t338;
+    const real t340 = e[3] + t339;
+    e_Q[3] = t340;
+    const real t341 = t61 * t240;
+    const real t342 = t140 * t238;
+    const real t343 = t341 + t342;
+    const real t344 = e[4] + t343;
+    e_Q[4] = t344;
+    const real t345 = t74 * t240;
+    const real t346 = t153 * t238;
+    const real t347 = t345 + t346;
+    const real t348 = e[5] + t347;
+    e_Q[5] = t348;
+    D_ii[0] = t77;
+    D_ii[1] = t156;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_eliminate_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_eliminate_outputs[] = {
+    {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0},
+    {"S_Q", 21, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+    {"D_ii", 2, "kg*m2 or kg", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic2_eliminate_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
     {
         .name = "forward",
@@ -1635,13 +2084,25 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_guards = 2,
         .guards = mstmm_sweep_generic2_project_guards,
     },
+    {
+        .name = "eliminate",
+        .function = (void (*)(void))mstmm_sweep_generic2_eliminate,
+        .call = mstmm_sweep_generic2_eliminate_call,
+        .n_inputs = 5,
+        .n_outputs = 5,
+        .inputs = mstmm_sweep_generic2_eliminate_inputs,
+        .outputs = mstmm_sweep_generic2_eliminate_outputs,
+        .ir_hash = "dce361a0a08b12fd3d9aef903b53ecbaeca2be5ebf2a95d07f58f12fb4ed9c42",
+        .n_guards = 4,
+        .guards = mstmm_sweep_generic2_eliminate_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "5b650b93efdc0c555c68257bf44d33e3e802a9da482081d876be29b63f572005",
+    .hash = "e22a33380a593336f85e37ddb109700c5a835963d10bd82dd8c5a063447cc245",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1651,6 +2112,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 6,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -9,8 +9,9 @@ from typing import Any
 from mstmm.errors import SceneError
 from mstmm.expression import Expression
 from mstmm.hinge_types import HINGE_TYPES
+from mstmm.ir import KernelIR
 from mstmm.scene import Hinge, Scene, split
-from mstmm.tape import Tape
+from mstmm.tape import Tape, compile_tape
 from mstmm.topology import GROUND_INDEX, Topology, build
 
 from . import placement, prebuilt, values
@@ -40,6 +41,8 @@ class Packed:
     n_memory: int
     breaks: tuple[float, ...]
     warnings: list[str] = field(default_factory=list)
+    #: kernels of the scene's expressions: "values", "drives", and "effort k" of spring k
+    expressions: dict[str, KernelIR] = field(default_factory=dict)
     kept: list[Any] = field(default_factory=list)
 
     def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
@@ -249,7 +252,13 @@ class _Packing:
         self.kept.append(records)
         self._driven = [entry for _, _, entry in driven]
         if driven:
-            packed.model.drive_tape = self._c_tape(values.drive_tape(self._driven))
+            packed.model.drive_tape = self._expression(
+                packed, "drives", values.drive_kernel(self._driven)
+            )
+
+    def _expression(self, packed: Packed, name: str, kernel: KernelIR) -> Any:
+        packed.expressions[name] = kernel
+        return self._c_tape(compile_tape(kernel))
 
     def _c_tape(self, tape: Tape) -> Any:
         self.slots = max(self.slots, tape.slots)
@@ -272,7 +281,7 @@ class _Packing:
     def _forces(self, packed: Packed) -> None:
         records = self.ffi.new("mstmm_force[]", max(1, len(self.scene.spring)))
         self.kept.append(records)
-        for record, spring in zip(records, self.scene.spring, strict=False):
+        for index, (record, spring) in enumerate(zip(records, self.scene.spring, strict=False)):
             element = self.element("force", spring.type, spring.name)
             for letter, reference in (("f", spring.from_), ("t", spring.to)):
                 body, axes, offset = packed.end(reference)
@@ -286,7 +295,9 @@ class _Packing:
                 law = spring.law
                 record.p = self.reals((law.stiffness, law.rest, law.damping))
                 if not law.effort.is_zero:
-                    record.effort = self._c_tape(values.effort_tape(law.effort, self.layout))
+                    record.effort = self._expression(
+                        packed, f"effort {index}", values.effort_kernel(law.effort, self.layout)
+                    )
                     self.values.breaks.update(law.effort.time_breaks())
             else:
                 given = user_parameters(element, spring.parameters, f'spring "{spring.name}"')
@@ -299,7 +310,7 @@ class _Packing:
     def _tapes(self, packed: Packed) -> None:
         packed.model.n_values = len(self.values)
         if len(self.values):
-            packed.model.value_tape = self._c_tape(self.values.tape())
+            packed.model.value_tape = self._expression(packed, "values", self.values.kernel())
 
     def _sizes(self, packed: Packed) -> None:
         model, layout = packed.model, self.layout

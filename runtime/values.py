@@ -8,7 +8,7 @@ from typing import Any
 from mstmm.drive import motion
 from mstmm.expression import Expression, Name
 from mstmm.graph import Graph, Node
-from mstmm.ir import Port
+from mstmm.ir import KernelIR, Port
 from mstmm.scene import Hinge
 from mstmm.tape import Tape, compile_tape
 
@@ -41,9 +41,9 @@ class Values:
     def __len__(self) -> int:
         return len(self._nodes)
 
-    def tape(self) -> Tape:
+    def kernel(self) -> KernelIR:
         """t (1), q, u -> the values in the order of their places."""
-        return _tape(self._graph, "values", state_ports(self.layout), self._nodes)
+        return _kernel(self._graph, "values", state_ports(self.layout), self._nodes)
 
 
 def state_ports(layout: Layout) -> list[Port]:
@@ -80,24 +80,24 @@ def resolver(
     return resolve
 
 
-def _tape(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> Tape:
+def _kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> KernelIR:
     output = Port("values", (len(nodes),))
-    return compile_tape(graph.kernel(name, inputs, [output], {"values": nodes}))
+    return graph.kernel(name, inputs, [output], {"values": nodes})
 
 
-def drive_tape(drives: Sequence[Expression]) -> Tape:
+def drive_kernel(drives: Sequence[Expression]) -> KernelIR:
     """t -> position, speed and acceleration of every drive."""
     graph = Graph()
     time = graph.element("t", 0)
     nodes = [node for drive in drives for node in motion(drive, time)]
-    return _tape(graph, "drives", [Port("t", (1,))], nodes)
+    return _kernel(graph, "drives", [Port("t", (1,))], nodes)
 
 
-def effort_tape(effort: Expression, layout: Layout) -> Tape:
+def effort_kernel(effort: Expression, layout: Layout) -> KernelIR:
     """t, q, u, [length, rate] -> effort of a spring."""
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))
-    return _tape(graph, "effort", [*state_ports(layout), Port("length", (2,))], [node])
+    return _kernel(graph, "effort", [*state_ports(layout), Port("length", (2,))], [node])
 
 
 def event_tape(
@@ -115,7 +115,7 @@ def event_tape(
         difference = left.build(graph, resolve) - right.build(graph, resolve)
         nodes.append(difference if sign in (">", ">=") else -difference)
     inputs = [*state_ports(layout), Port("points", (6 * len(probes),))]
-    return _tape(graph, "events", inputs, nodes), list(probes)
+    return compile_tape(_kernel(graph, "events", inputs, nodes)), list(probes)
 
 
 def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
@@ -136,4 +136,4 @@ def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
     return result
 
 
-__all__ = ["Values", "c_tape", "drive_tape", "effort_tape", "event_tape"]
+__all__ = ["Values", "c_tape", "drive_kernel", "effort_kernel", "event_tape"]

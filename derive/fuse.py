@@ -1,0 +1,290 @@
+"""Fused engine: the whole sweep of one scene as straight-line KernelIRs, by value numbering.
+
+The element kernels are replayed in the order in which the looped engine calls them, but on the
+nodes of one graph: axes that are aligned, loads that are zero and motions that stay in a plane fold
+away as they arise, and what no acceleration needs is never emitted.  No SymPy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from mstmm.graph import Graph, Node
+from mstmm.ir import KernelIR, Port
+from mstmm.structure import BodyStructure, Entries, Key, Structure
+
+from .fused_loads import LoadPass
+from .inline import Inliner, Nodes
+from .transport import Stage, stages_of
+
+#: (element, kernel name) -> its IR.
+Kernels = Callable[[Key, str], KernelIR]
+
+#: Reasons of a failure, as the looped engine numbers them.
+UNDETERMINED, HINGE = 1, 4
+#: A pivot must exceed this share of the mean inertia of the body it moves.
+PIVOT_FLOOR = Fraction(1, 10**14)
+
+
+@dataclass(frozen=True)
+class Fused:
+    """Kernels of one scene.  Guard code 1 + k stands for failures[k] = (reason, element, code)."""
+
+    kernels: dict[str, KernelIR]
+    failures: tuple[tuple[int, int, int], ...]
+
+
+@dataclass
+class BodyNodes:
+    """What is known of a body while the sweep runs."""
+
+    stages: tuple[Stage, ...]
+    hinge: dict[str, Nodes]
+    s: Nodes
+    motion: Nodes
+    inertia: Nodes
+    load: Nodes
+    own: Nodes
+    tau: Nodes
+    gain: Nodes
+    offset: Nodes
+    delta: Nodes
+    udot: Nodes
+
+
+def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None) -> Fused:
+    """Kernels "accelerations" and "accelerations_power" of a scene.
+
+    Inputs p, t, q, u, memory, efforts; outputs qdot, udot, and with power the power of everything
+    that is not stored and the potential of springs and laws.  With `numbers` the parameters are
+    baked in as constants and p is not read.
+    """
+    return _Fusion(structure, kernels, numbers).run()
+
+
+class _Fusion:
+    """One replay of the sweep: forward, laws and loads, condense, recover."""
+
+    def __init__(
+        self, structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
+    ) -> None:
+        self.structure, self.kernels, self.numbers = structure, kernels, numbers
+        self.graph = Graph()
+        self.inline = Inliner(self.graph)
+        self.zero, self.one = self.inline.zero, self.inline.one
+        self.failures: list[tuple[int, int, int]] = []
+        self.t = self.graph.element("t", 0)
+        self.q = self.graph.vector("q", structure.nq)
+        self.u = self.graph.vector("u", structure.nu)
+        self.efforts = self.graph.vector("efforts", structure.nu)
+        self.memory = self.graph.vector("memory", structure.n_memory)
+        self.bodies: list[BodyNodes] = []
+        self.power, self.potential = self.zero, self.zero
+
+    # --- small tools ---------------------------------------------------------------------------
+
+    def entries(self, entries: Entries) -> Nodes:
+        """Nodes of structural constants and of places in p."""
+        return [self._entry(entry) for entry in entries]
+
+    def _entry(self, entry: float | int) -> Node:
+        if isinstance(entry, float):
+            return self.graph.constant(entry)
+        if self.numbers is not None:
+            return self.graph.constant(self.numbers[entry])
+        return self.graph.element("p", entry)
+
+    def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
+        """A step of the sweep for any hinge with `nu` speeds."""
+        return self.inline.run(self.kernels(("sweep", f"generic{nu}"), name), inputs)
+
+    def frames(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
+        """A kernel of poses, points and loads."""
+        return self.inline.run(self.kernels(("sweep", "frames"), name), inputs)
+
+    def fail_unless(self, condition: Node, reason: int, element: int, code: int) -> None:
+        """Guard of the fused kernel that stands for a failure of the looped engine."""
+        failure = (reason, element, code)
+        if failure not in self.failures:
+            self.failures.append(failure)
+        self.graph.guard(condition, 1 + self.failures.index(failure), f"failure {failure}")
+
+    def identity(self) -> Nodes:
+        return [self.one if i % 4 == 0 else self.zero for i in range(9)]
+
+    def zeros(self, count: int) -> Nodes:
+        return [self.zero] * count
+
+    # --- passes ----------------------------------------------------------------------------------
+
+    def run(self) -> Fused:
+        imposed = self._drives()
+        ground = [*self.zeros(6), *(-g for g in self.entries(self.structure.gravity))]
+        qdot, udot = self.zeros(self.structure.nq), self.zeros(self.structure.nu)
+        for index, body in enumerate(self.structure.bodies):
+            nodes = self._forward(index, body, imposed, ground)
+            self.bodies.append(nodes)
+            qdot[body.q : body.q + body.nq] = nodes.hinge["qdot"]
+        LoadPass(self).run()
+        for index in reversed(range(len(self.bodies))):
+            self._condense(index)
+        for index, body in enumerate(self.structure.bodies):
+            self._recover(index)
+            udot[body.u : body.u + body.nu] = self.bodies[index].udot
+        self._drive_power()
+        return self._kernels(qdot, udot)
+
+    def _drives(self) -> dict[tuple[int, int], Node]:
+        """Driven coordinates and speeds filled in; prescribed accelerations by (body, speed)."""
+        if self.structure.drives is None:
+            return {}
+        values = self.inline.run(self.structure.drives, {"t": [self.t]})
+        flat = next(iter(values.values()))
+        imposed = {}
+        for k, (index, speed) in enumerate(self.structure.driven):
+            body = self.structure.bodies[index]
+            self.q[body.q + speed], self.u[body.u + speed] = flat[3 * k], flat[3 * k + 1]
+            imposed[index, speed] = flat[3 * k + 2]
+        return imposed
+
+    def _forward(
+        self,
+        index: int,
+        body: BodyStructure,
+        imposed: dict[tuple[int, int], Node],
+        ground: Nodes,
+    ) -> BodyNodes:
+        """Hinge motion, bias motion, own inertia and own load of a body."""
+        q, u = self.q[body.q : body.q + body.nq], self.u[body.u : body.u + body.nu]
+        hinge = self.inline.run(
+            self.kernels(body.hinge, "hinge"),
+            {"p": self.entries(body.hinge_p), "q": q, "u": u},
+            lambda condition, code: self.fail_unless(condition, HINGE, index, code),
+        )
+        s = [imposed.get((index, k), self.zero) for k in range(body.nu)]
+        stages = stages_of(self, body, hinge)
+        motion = self.bodies[body.parent].motion if body.parent >= 0 else ground
+        for stage in stages[:-1]:
+            motion = stage.motion(motion)
+        motion = stages[-1].motion_behind_hinge(motion, hinge, s)
+        p = self.entries(body.body_p)
+        own = self.inline.run(self.kernels(body.body, "inertia"), {"p": p})["S"]
+        load = self.inline.run(self.kernels(body.body, "bias_load"), {"p": p, "motion": motion})
+        tau = self.efforts[body.u : body.u + body.nu]
+        none: Nodes = []
+        return BodyNodes(stages, hinge, s, motion, own, load["e"], own, tau, none, none, none, none)
+
+    def free(self, index: int) -> list[int]:
+        """Speeds of a body's hinge that no drive prescribes."""
+        body = self.structure.bodies[index]
+        return [k for k in range(body.nu) if not body.imposed[k]]
+
+    def _free_subspace(self, index: int) -> Nodes:
+        body, h = self.structure.bodies[index], self.bodies[index].hinge["H"]
+        return [h[row * body.nu + k] for row in range(6) for k in self.free(index)]
+
+    def _condense(self, index: int) -> None:
+        """Eliminate the free speeds, then carry S and e to the parent."""
+        body, nodes = self.structure.bodies[index], self.bodies[index]
+        inertia, load = nodes.inertia, nodes.load
+        if self.free(index):
+            inertia, load = self._eliminate(index)
+        if body.parent < 0:
+            return
+        for stage in reversed(nodes.stages):
+            inertia, load = stage.condense(inertia, load)
+        parent = self.bodies[body.parent]
+        parent.inertia = [a + b for a, b in zip(parent.inertia, inertia, strict=True)]
+        parent.load = [a + b for a, b in zip(parent.load, load, strict=True)]
+
+    def _eliminate(self, index: int) -> tuple[Nodes, Nodes]:
+        body, nodes, free = self.structure.bodies[index], self.bodies[index], self.free(index)
+        rotor = self.entries(body.rotor)
+        given: dict[str, Sequence[Node]] = {
+            "S": nodes.inertia, "e": nodes.load, "tau": [nodes.tau[k] for k in free],
+        }  # fmt: skip
+        if len(free) == body.nu and all(x.value == 0 for x in rotor):
+            kernel = self.kernels(body.hinge, "eliminate")
+            given |= {"p": self.entries(body.hinge_p), "q": self.q[body.q : body.q + body.nq]}
+        else:
+            kernel = self.kernels(("sweep", f"generic{len(free)}"), "eliminate")
+            given |= {"H": self._free_subspace(index), "J": [rotor[k] for k in free]}
+        found = self.inline.run(kernel, given, self._pivot_guard(index))
+        self._floor(index, found["D_ii"])
+        nodes.gain, nodes.offset = found["G"], found["g"]
+        return found["S_Q"], found["e_Q"]
+
+    def _pivot_guard(self, index: int) -> Callable[[Node, int], None]:
+        def guard(condition: Node, code: int) -> None:
+            if condition.op == "lt" and condition.args[0].value == 0:
+                return  # the floor below asks for more
+            self.fail_unless(condition, UNDETERMINED, index, code)
+
+        return guard
+
+    def _floor(self, index: int, pivots: Nodes) -> None:
+        """Every diagonal entry of D against the mean inertia of the body itself."""
+        nodes, free = self.bodies[index], self.free(index)
+        own, h = nodes.own, self._free_subspace(index)
+        diagonal = (0, 6, 11, 15, 18, 20)
+        mass, inertia = (
+            self.graph.constant(PIVOT_FLOOR / 3) * (own[a] + own[b] + own[c])
+            for a, b, c in (diagonal[:3], diagonal[3:])
+        )
+        for i, pivot in enumerate(pivots):
+            column = h[i :: len(free)]
+            moves = any(x.value != 0 for x in column[:3])
+            self.fail_unless(
+                self.graph.call("lt", mass if moves else inertia, pivot), UNDETERMINED, index, 1
+            )
+
+    def _recover(self, index: int) -> None:
+        body, nodes = self.structure.bodies[index], self.bodies[index]
+        delta = self.bodies[body.parent].delta if body.parent >= 0 else self.zeros(6)
+        for stage in nodes.stages[:-1]:
+            delta = stage.delta(delta)
+        free = self.free(index)
+        rates, nodes.delta = nodes.stages[-1].delta_behind_hinge(
+            delta, self._free_subspace(index), nodes.gain, nodes.offset
+        )
+        nodes.udot = list(nodes.s)
+        for k, rate in zip(free, rates, strict=True):
+            nodes.udot[k] = rate
+
+    def _drive_power(self) -> None:
+        """Power that drives feed in: tau_d . u_d with tau_d = H_d^T f + J udot - given."""
+        for body, nodes in zip(self.structure.bodies, self.bodies, strict=True):
+            if not any(body.imposed):
+                continue
+            load = self.frames(
+                "reaction", S=nodes.inertia, e=nodes.load, delta=nodes.delta, A=self.identity()
+            )["f"]
+            tau = self.sweep(body.nu, "effort", H=nodes.hinge["H"], f=load)["tau"]
+            rotor = self.entries(body.rotor)
+            for k in range(body.nu):
+                if body.imposed[k]:
+                    effort = tau[k] + rotor[k] * nodes.udot[k] - nodes.tau[k]
+                    self.power = self.power + effort * self.u[body.u + k]
+
+    def _kernels(self, qdot: Nodes, udot: Nodes) -> Fused:
+        s = self.structure
+        inputs = [
+            Port("p", (s.np,)), Port("t", (1,)), Port("q", (s.nq,)), Port("u", (s.nu,)),
+            Port("memory", (s.n_memory,)), Port("efforts", (s.nu,)),
+        ]  # fmt: skip
+        outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
+        sums = [Port("power", (1,)), Port("potential", (1,))]
+        values: dict[str, object] = {"qdot": qdot, "udot": udot}
+        power: dict[str, object] = {"power": [self.power], "potential": [self.potential]}
+        kernel = self.graph.kernel
+        return Fused(
+            {
+                "accelerations": kernel("accelerations", inputs, outputs, values),
+                "accelerations_power": kernel(
+                    "accelerations_power", inputs, [*outputs, *sums], values | power
+                ),
+            },
+            tuple(self.failures),
+        )

@@ -1,0 +1,81 @@
+"""Transport between two frames of a fused scene: of bias motion, of S and e, and of deviations.
+
+A stage is the way from an inboard frame to an outboard one: rotation R (outboard to inboard axes)
+and position d of the outboard origin, inboard axes.  A body has a constant stage to the inboard
+hinge axes and the hinge's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from mstmm.graph import Node
+from mstmm.structure import BodyStructure, Entries
+
+from .inline import Nodes
+
+
+class Fusion(Protocol):
+    """What a stage needs of the fused sweep."""
+
+    zero: Node
+
+    def entries(self, entries: Entries) -> Nodes: ...
+    def identity(self) -> Nodes: ...
+    def zeros(self, count: int) -> Nodes: ...
+    def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]: ...
+
+
+class Stage:
+    """One stage with any rotation."""
+
+    def __init__(self, fusion: Fusion, rotation: Nodes, position: Nodes) -> None:
+        self.fusion, self.rotation, self.position = fusion, rotation, position
+
+    def motion(self, motion: Nodes) -> Nodes:
+        """Bias motion (w, wd, rdd) of the outboard frame, at rest in the inboard one."""
+        f = self.fusion
+        return f.sweep(
+            0, "forward", Rt=self.rotation, ro=self.position, R=f.identity(), d=f.zeros(3), H=(),
+            v=f.zeros(3), w=f.zeros(3), c=f.zeros(6), s=(), motion_I=motion,
+        )["motion"]  # fmt: skip
+
+    def motion_behind_hinge(self, motion: Nodes, hinge: dict[str, Nodes], s: Nodes) -> Nodes:
+        """Bias motion of the body behind the hinge whose stage this is."""
+        f = self.fusion
+        arrays = {name: hinge[name] for name in ("R", "d", "H", "v", "w", "c")}
+        return f.sweep(
+            len(s), "forward", Rt=f.identity(), ro=f.zeros(3), **arrays, s=s, motion_I=motion
+        )["motion"]
+
+    def carried(self, w: Nodes) -> Nodes:
+        """A rate of rotation in outboard axes."""
+        return self.motion([*w, *self.fusion.zeros(6)])[:3]
+
+    def condense(self, inertia: Nodes, load: Nodes) -> tuple[Nodes, Nodes]:
+        """X^T S X and X^T e."""
+        found = self.fusion.sweep(
+            0, "condense", Rc=self.rotation, r=self.position, H=(), J=(), S=inertia, e=load, tau=()
+        )
+        return found["S_I"], found["e_I"]
+
+    def delta(self, delta: Nodes) -> Nodes:
+        """X delta: deviation of the outboard frame, at rest in the inboard one."""
+        return self.delta_behind_hinge(delta, [], [], [])[1]
+
+    def delta_behind_hinge(
+        self, delta: Nodes, subspace: Nodes, gain: Nodes, offset: Nodes
+    ) -> tuple[Nodes, Nodes]:
+        """(udot, deviation of the body behind the hinge)."""
+        found = self.fusion.sweep(
+            len(offset), "recover", Rc=self.rotation, r=self.position, H=subspace, G=gain,
+            g=offset, delta_I=delta,
+        )  # fmt: skip
+        return found["udot"], found["delta"]
+
+
+def stages_of(fusion: Fusion, body: BodyStructure, hinge: dict[str, Nodes]) -> tuple[Stage, ...]:
+    """Constant stages from the parent's frame to the inboard hinge axes, then the hinge's own."""
+    connection = Stage(fusion, fusion.entries(body.rotation), fusion.entries(body.position))
+    return connection, Stage(fusion, hinge["R"], hinge["d"])

@@ -1,0 +1,139 @@
+"""Packed scene -> Structure for the fused engine, and the vector p of its run-time numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.structure import (
+    BodyStructure,
+    Entries,
+    Entry,
+    ForceStructure,
+    Key,
+    LawStructure,
+    LoadStructure,
+    Structure,
+)
+
+from . import prebuilt
+from .pack import Known, Packed
+from .prebuilt import Element
+
+#: Numbers behind the parameters of a user's body: internal frame in its own (rotation, origin).
+_USER_FRAME = 12
+
+
+class _Reader:
+    """Reads the engine's records; numbers become structural constants or places in p."""
+
+    def __init__(self, packed: Packed, known: Known) -> None:
+        self.packed, self.ffi = packed, packed.ffi
+        self.numbers: list[float] = []
+        self.elements = {**prebuilt.elements(), **known}
+        self._owners = {
+            (name, self._address(function)): key
+            for key, element in self.elements.items()
+            for name, function in element.functions.items()
+        }
+
+    def _address(self, function: Any) -> int:
+        return int(self.ffi.cast("uintptr_t", function))
+
+    def owner(self, kernel: str, function: Any) -> Key:
+        """Element to which a kernel function belongs."""
+        return self._owners[kernel, self._address(function)]
+
+    def law_kernel(self, function: Any) -> str:
+        """Name of a kernel of the laws."""
+        laws = self.elements["sweep", "laws"].functions
+        address = self._address(function)
+        return next(name for name, f in laws.items() if self._address(f) == address)
+
+    def entries(self, values: Iterable[float], axes: bool = False) -> Entries:
+        """Zeros, and +-1 of axes, are structure; the rest goes to p."""
+        return tuple(self._entry(float(value), axes) for value in values)
+
+    def _entry(self, value: float, axes: bool) -> Entry:
+        if value == 0.0 or (axes and abs(value) == 1.0):
+            return value + 0.0  # -0.0 and 0.0 are one structure
+        self.numbers.append(value)
+        return len(self.numbers) - 1
+
+    def unpack(self, pointer: Any, count: int) -> list[Any]:
+        """The first `count` numbers of a C array."""
+        return list(self.ffi.unpack(pointer, count)) if count else []
+
+
+def structure_of(packed: Packed, known: Known) -> tuple[Structure, NDArray[np.float64]]:
+    """(structure, p) of a packed scene; `known` are elements beyond the prebuilt ones."""
+    reader, model = _Reader(packed, known), packed.model
+    gravity = reader.entries(model.gravity)
+    drives = [model.drives[k] for k in range(model.n_drives)]
+    bodies = tuple(_body(reader, i) for i in range(model.n_bodies))
+    laws = tuple(_law(reader, model.laws[k]) for k in range(model.n_laws))
+    loads = tuple(_load(reader, model.loads[k]) for k in range(model.n_loads))
+    forces = tuple(_force(reader, k) for k in range(model.n_forces))
+    used = {key for body in bodies for key in (body.hinge, body.body)}
+    used |= {force.element for force in forces}
+    structure = Structure(
+        int(model.nq), int(model.nu), len(reader.numbers), int(model.n_memory), gravity, bodies,
+        laws, loads, forces, packed.expressions.get("values"), packed.expressions.get("drives"),
+        tuple((int(d.body), int(d.speed)) for d in drives),
+        {key: _hash(reader, reader.elements[key]) for key in sorted(used)},
+    )  # fmt: skip
+    return structure, np.array(reader.numbers)
+
+
+def _hash(reader: _Reader, element: Element) -> str:
+    return prebuilt.text(reader.ffi, element.descriptor.hash)
+
+
+def _body(reader: _Reader, index: int) -> BodyStructure:
+    record = reader.packed.model.bodies[index]
+    hinge, body = reader.owner("hinge", record.hinge), reader.owner("inertia", record.inertia)
+    connection = reader.unpack(record.connection, 12)
+    count = reader.elements[body].descriptor.np
+    own = reader.unpack(record.body_p, count if body[1] == "rigid" else count + _USER_FRAME)
+    return BodyStructure(
+        int(record.parent), hinge, body, int(record.q), int(record.u), int(record.nq),
+        int(record.nu), reader.entries(connection[:9], axes=True), reader.entries(connection[9:]),
+        reader.entries(reader.unpack(record.hinge_p, reader.elements[hinge].descriptor.np)),
+        (*reader.entries(own[:count]), *reader.entries(own[count:], axes=True)),
+        reader.entries(reader.unpack(record.rotor, record.nu)),
+        tuple(reader.unpack(record.imposed_mask, record.nu)),
+    )  # fmt: skip
+
+
+def _law(reader: _Reader, record: Any) -> LawStructure:
+    kernel = reader.law_kernel(record.evaluate)
+    kind = int(record.kind)
+    counts = {"linear": 3, "full": 11, "rotation": 7, "six": 16}
+    return LawStructure(
+        int(record.body), kernel, int(record.coordinate), int(record.speed), int(record.n),
+        int(record.twist), reader.entries(reader.unpack(record.p, counts[kernel])),
+        reader.entries(reader.unpack(record.axes, 9 * kind), axes=True),
+        tuple(reader.unpack(record.effort, record.n)),
+    )  # fmt: skip
+
+
+def _load(reader: _Reader, record: Any) -> LoadStructure:
+    return LoadStructure(
+        int(record.body), int(record.axes), reader.entries(record.axes_own, axes=True),
+        reader.entries(record.offset), tuple(record.force), tuple(record.moment),
+    )  # fmt: skip
+
+
+def _force(reader: _Reader, index: int) -> ForceStructure:
+    record = reader.packed.model.forces[index]
+    element = reader.owner("wrench", record.wrench)
+    count = reader.elements[element].descriptor.np
+    return ForceStructure(
+        element, int(record.body_f), int(record.body_t), reader.entries(record.axes_f, axes=True),
+        reader.entries(record.axes_t, axes=True), reader.entries(record.offset_f),
+        reader.entries(record.offset_t), reader.entries(reader.unpack(record.p, count)),
+        reader.packed.expressions.get(f"effort {index}"),
+    )  # fmt: skip
