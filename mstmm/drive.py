@@ -8,7 +8,8 @@ from collections.abc import Callable
 from .errors import ExpressionError
 from .expression import Expression
 from .expression_parser import MEANING
-from .graph import Graph, Node, derivative
+from .graph import Graph, Node
+from .tangent import derivative
 
 #: Longest numerator or denominator of a constant; fractions are stored as decimal text.
 _MAX_BITS = 12_000

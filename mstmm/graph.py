@@ -305,8 +305,9 @@ class Graph:
     ) -> KernelIR:
         """Order what the outputs need (dead terms drop out) into a frozen kernel.
 
-        `values[port]` is a node, or a nested list of nodes in the port's shape.  An axis of the
-        size symbol has no list: one value, which may contain `LOOP_INDEX`, stands for all k < n.
+        `values[port]` is a node, or a nested list of nodes in the port's shape; an entry None is
+        not stored.  An axis of the size symbol has no list: one value, which may contain
+        `LOOP_INDEX`, stands for all k < n.
         """
         writer = _Writer(self)
         writer.statements.extend(self._solves)
@@ -385,6 +386,8 @@ class _Writer:
 
     def store(self, port: Port, value: object) -> None:
         for index, entry in _flatten(value, port.shape):
+            if entry is None:
+                continue
             node = self.graph.node(entry)
             if LOOP_INDEX in index:
                 body, operand = self._loop_body(node)
@@ -408,7 +411,7 @@ def _walk(root: Node) -> list[Node]:
 
 def _flatten(
     value: object, shape: tuple[int | str, ...]
-) -> list[tuple[tuple[int | str, ...], Node | Number]]:
+) -> list[tuple[tuple[int | str, ...], Node | Number | None]]:
     """Entries with their indices; along the run-time size one value stands for all k < n."""
     if not shape:
         return [((), value)]  # type: ignore[list-item]
@@ -418,71 +421,3 @@ def _flatten(
         raise ValueError(f"{value!r} does not fill the shape {shape}")
     entries = enumerate(value)
     return [((i, *rest), v) for i, entry in entries for rest, v in _flatten(entry, shape[1:])]
-
-
-def derivative(node: Node, seeds: dict[Node, Node | Number]) -> Node:
-    """Exact directional derivative: `seeds` gives the derivative of each independent leaf.
-
-    abs, min, max and select differentiate branch by branch (their kinks carry no impulse);
-    sign, floor and comparisons are flat.
-    """
-    graph = node.graph
-    known: dict[int, Node] = {leaf.number: graph.node(d) for leaf, d in seeds.items()}
-    stack = [node]
-    while stack:
-        current = stack[-1]
-        if current.number in known:
-            stack.pop()
-            continue
-        missing = [a for a in current.args if a.number not in known]
-        if missing:
-            stack.extend(missing)
-            continue
-        known[current.number] = _rule(graph, current, [known[a.number] for a in current.args])
-    return known[node.number]
-
-
-def _rule(graph: Graph, node: Node, d: list[Node]) -> Node:
-    """Derivative of one operation given the derivatives of its operands."""
-    if not node.args or all(term.value == 0 for term in d):
-        return graph.constant(0)
-    a = node.args[0]
-    b = node.args[1] if len(node.args) > 1 else graph.constant(0)
-    call = graph.call
-    rules: dict[str, Callable[[], Node]] = {
-        "neg": lambda: -d[0],
-        "add": lambda: d[0] + d[1],
-        "sub": lambda: d[0] - d[1],
-        "mul": lambda: d[0] * b + a * d[1],
-        "div": lambda: (d[0] - node * d[1]) / b,
-        "pow": lambda: _power_rule(graph, node, d),
-        "sqrt": lambda: d[0] / (2 * node),
-        "sin": lambda: call("cos", a) * d[0],
-        "cos": lambda: -(call("sin", a) * d[0]),
-        "tan": lambda: (1 + node * node) * d[0],
-        "asin": lambda: d[0] / call("sqrt", 1 - a * a),
-        "acos": lambda: -(d[0] / call("sqrt", 1 - a * a)),
-        "atan": lambda: d[0] / (1 + a * a),
-        "atan2": lambda: (d[0] * b - a * d[1]) / (a * a + b * b),
-        "sinh": lambda: call("cosh", a) * d[0],
-        "cosh": lambda: call("sinh", a) * d[0],
-        "tanh": lambda: (1 - node * node) * d[0],
-        "exp": lambda: node * d[0],
-        "log": lambda: d[0] / a,
-        "abs": lambda: call("sign", a) * d[0],
-        "min": lambda: call("select", call("lt", a, b), d[0], d[1]),
-        "max": lambda: call("select", call("lt", a, b), d[1], d[0]),
-        "select": lambda: call("select", a, d[1], d[2]),
-        "sum": lambda: graph.sum_over_modes(d[0]),
-    }
-    return rules[node.op]() if node.op in rules else graph.constant(0)
-
-
-def _power_rule(graph: Graph, node: Node, d: list[Node]) -> Node:
-    base, exponent = node.args
-    slope = exponent * graph.power(base, exponent - 1) * d[0]
-    if d[1].value == 0:
-        return slope
-    # Where the exponent stands still, a negative base has a slope but no logarithm.
-    still = graph.call("eq", d[1], 0)
-    return graph.select(still, slope, slope + node * graph.call("log", base) * d[1])
