@@ -45,7 +45,8 @@ class Equation:
     """left = right; for a definition `left` is the MatrixSymbol that `right` gives a value to.
 
     `zeros` declares entries of `right` that vanish identically although no single term does; they
-    are not computed, and the checks evaluate `right` without them.
+    are not computed.  Of a `symmetric` one the upper half is computed and mirrored.  `computed` is
+    a shorter form of `right` that is lowered in its place.  The checks evaluate `right` as it is.
     """
 
     name: str
@@ -54,6 +55,8 @@ class Equation:
     source: str = ""
     remark: str = ""
     zeros: tuple[tuple[int, int], ...] = ()
+    symmetric: bool = False
+    computed: sp.Basic | None = None
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from mstmm.ir import KernelIR
 
 from . import body as body_kernels
 from . import force as force_kernels
-from . import frames, laws, sweep
+from . import frames, laws, screw, sweep
 from .classical import CLASSICAL, classical_guards
 from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
@@ -123,6 +123,11 @@ def law_kernels() -> tuple[Kernel, ...]:
     )
 
 
+def screw_kernels() -> tuple[Kernel, ...]:
+    """Transport across axial screws."""
+    return tuple(Kernel(name, derivation) for name, derivation in screw.derivations().items())
+
+
 def classical_kernel(name: str) -> Kernel:
     """The classical transfer matrix `name`."""
     derivation = CLASSICAL[name]()
@@ -137,6 +142,7 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     }
     table["sweep", "frames"] = frame_kernels
     table["sweep", "laws"] = law_kernels
+    table["sweep", "screw"] = screw_kernels
     for nu in range(MAX_SPEEDS + 1):
         table["sweep", f"generic{nu}"] = lambda nu=nu: generic_kernels(nu)  # type: ignore[misc]
     for name in CLASSICAL:

@@ -85,9 +85,12 @@ class _Lowering:
         return self.graph.matrix(name, rows, columns)
 
     def define(self, equation: Equation) -> None:
-        value = self.matrix(equation.right)
+        value = self.matrix(equation.right if equation.computed is None else equation.computed)
         for i, j in equation.zeros:
             value[i][j] = self.graph.constant(0)
+        if equation.symmetric:
+            for i, row in enumerate(value):
+                row[:i] = [value[j][i] for j in range(i)]
         self.known[str(equation.left.name)] = value
 
     def stored(self, quantity: Quantity) -> list[object]:

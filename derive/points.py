@@ -1,6 +1,7 @@
 """Points at which kernels are compared: random ones, and those where a formula could break.
 
-Everything is drawn as doubles, so that exact and rounded evaluation start from the same numbers.
+Everything is drawn as doubles, so that exact and rounded evaluation start from the same numbers;
+but for pairs of cosine and sine, which as doubles would miss c^2 + s^2 = 1 and have sixty digits.
 """
 
 from __future__ import annotations
@@ -9,6 +10,9 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
+
+import mpmath
 
 from mstmm.ir import KernelIR, Port
 from mstmm.spec import Param
@@ -87,6 +91,8 @@ class Source:
             return [numbers.uniform(0.2, 2.0) for _ in range(length)]
         if port.name in ("a", "a_n"):
             return _unit(3, numbers)
+        if port.name == "turn":
+            return _cosine_and_sine(numbers.uniform(-4.0, 4.0))
         return _uniform(length, numbers)
 
     def coordinate_values(self, numbers: random.Random, turn: str | None = None) -> Numbers:
@@ -125,6 +131,8 @@ class Source:
                 drawn = self.coordinate_values(numbers, "rest")
             elif port.shape == (3, 3) and port.name != "F_scale":
                 drawn = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+            elif port.name == "turn":
+                drawn = [1.0, 0.0]
             elif port.name in ("u", "s", "motion", "motion_I", "v", "w", "tau", "e", "effort"):
                 drawn = [0.0] * port.length()
             inputs[port.name] = drawn
@@ -232,6 +240,11 @@ def _bounds(p: Param, low: float, high: float) -> tuple[float, float]:
 
 def _uniform(count: int, numbers: random.Random) -> Numbers:
     return [numbers.uniform(-1.0, 1.0) for _ in range(count)]
+
+
+def _cosine_and_sine(angle: float) -> list[Any]:
+    with mpmath.workdps(60):
+        return [mpmath.cos(angle), mpmath.sin(angle)]
 
 
 def _unit(count: int, numbers: random.Random) -> Numbers:

@@ -19,6 +19,7 @@ from .kernels import (
     generic_kernels,
     kernels_of,
     law_kernels,
+    screw_kernels,
 )
 from .registry import Element, builtin_elements, kind_of
 
@@ -69,9 +70,11 @@ def shared_specs() -> list[ElementSpec]:
     """What is no element of a scene: frames, laws, generic sweep."""
     plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
     frames, laws = _lowered(frame_kernels()), _lowered(law_kernels())
+    screws = _lowered(screw_kernels())
     return [
         plain(name="frames", title="poses, points and loads", kernels=frames),
         plain(name="laws", title="laws on hinge coordinates", kernels=laws),
+        plain(name="screw", title="transport across axial screws", kernels=screws),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
     ]
 

@@ -178,9 +178,19 @@ def _congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
     lever = tilde(_column(SHIFT.symbol))
     moved_b = _symbol("B_I", 3, 3)
     equations = (
-        Equation("force-acceleration block, parent axes", turned_a, R.symbol * a * R.symbol.T),
+        Equation(
+            "force-acceleration block, parent axes",
+            turned_a,
+            R.symbol * a * R.symbol.T,
+            symmetric=True,
+        ),
         Equation("mixed block, parent axes", turned_b, R.symbol * b * R.symbol.T),
-        Equation("moment-rotation block, parent axes", turned_c, R.symbol * c * R.symbol.T),
+        Equation(
+            "moment-rotation block, parent axes",
+            turned_c,
+            R.symbol * c * R.symbol.T,
+            symmetric=True,
+        ),
         Equation("mixed block at the parent's P", moved_b, turned_b - turned_a * lever),
     )
     corner = turned_c + lever * moved_b - turned_b.T * lever
@@ -243,7 +253,9 @@ def condense(
                 offset.symbol,
                 Solve(pivot, tau.symbol - h.T * E.symbol, symmetric=True),
             ),
-            Equation("S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros),
+            Equation(
+                "S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros, symmetric=True
+            ),
             Equation("e_Q = e + U g", _symbol("e_full", 6), passed),
             Equation("e_Q", load, _replace_rows(_symbol("e_full", 6), tau.symbol, units)),
         ]

@@ -436,4 +436,24 @@ int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const r
     const real *restrict B, const real *restrict effort, const real *restrict twist_ref,
     real *restrict tau, real *restrict V, real *restrict P, real *restrict twist);
 
+extern const mstmm_element mstmm_sweep_screw;
+int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,
+    const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_condense_x(const real *restrict turn, const real *restrict d,
+    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_condense_plain_x(const real *restrict turn, const real *restrict d,
+    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_motion_x(const real *restrict turn, const real *restrict d,
+    const real *restrict motion_I, real *restrict motion);
+int mstmm_sweep_screw_delta_x(const real *restrict turn, const real *restrict d,
+    const real *restrict delta_I, real *restrict delta);
+int mstmm_sweep_screw_condense_z(const real *restrict turn, const real *restrict d,
+    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_condense_plain_z(const real *restrict turn, const real *restrict d,
+    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_motion_z(const real *restrict turn, const real *restrict d,
+    const real *restrict motion_I, real *restrict motion);
+int mstmm_sweep_screw_delta_z(const real *restrict turn, const real *restrict d,
+    const real *restrict delta_I, real *restrict delta);
+
 #endif

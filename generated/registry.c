@@ -32,7 +32,8 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_generic5,
     &mstmm_sweep_generic6,
     &mstmm_sweep_laws,
+    &mstmm_sweep_screw,
     NULL,
 };
 
-const int mstmm_element_count = 28;
+const int mstmm_element_count = 29;

@@ -187,7 +187,8 @@ class _Subject:
                 if exact is not None and _finite(exact):
                     return f"the equations have no value ({undefined}), the IR has one"
                 return None
-        found = self._c_values(kernel, inputs)
+        rounded = {name: [float(v) for v in row] for name, row in inputs.items()}  # as C has them
+        found = self._c_values(kernel, rounded)
         if found is not None and found[0] != code:
             return f"C returns {found[0]}, the IR {code}"
         if exact is None or not _finite(exact):
@@ -195,7 +196,7 @@ class _Subject:
         first = 0.0 if stated is None else _difference(exact, stated.outputs, inputs)
         if stated is not None and stated.asymmetry > 1e-30 * _size(inputs):
             return "a quantity called symmetric is not"
-        second = 0.0 if found is None else self._share(kernel, inputs, found[1])
+        second = 0.0 if found is None else self._share(kernel, rounded, found[1])
         return first, second
 
     def _share(
