@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from mstmm.errors import ElementError
 from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR, Port
 from mstmm.structure import BodyStructure, Entries, Key, Structure
@@ -99,6 +100,10 @@ class _Fusion:
     def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
         """A step of the sweep for any hinge with `nu` speeds."""
         return self.inline.run(self.kernels(("sweep", f"generic{nu}"), name), inputs)
+
+    def screw(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
+        """A step across an axial screw."""
+        return self.inline.run(self.kernels(("sweep", "screw"), name), inputs)
 
     def frames(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
         """A kernel of poses, points and loads."""
@@ -205,8 +210,8 @@ class _Fusion:
         given: dict[str, Sequence[Node]] = {
             "S": nodes.inertia, "e": nodes.load, "tau": [nodes.tau[k] for k in free],
         }  # fmt: skip
-        if len(free) == body.nu and all(x.value == 0 for x in rotor):
-            kernel = self.kernels(body.hinge, "eliminate")
+        kernel = self._own_elimination(body) if len(free) == body.nu else None
+        if kernel is not None and all(x.value == 0 for x in rotor):
             given |= {"p": self.entries(body.hinge_p), "q": self.q[body.q : body.q + body.nq]}
         else:
             kernel = self.kernels(("sweep", f"generic{len(free)}"), "eliminate")
@@ -215,6 +220,13 @@ class _Fusion:
         self._floor(index, found["D_ii"])
         nodes.gain, nodes.offset = found["G"], found["g"]
         return found["S_Q"], found["e_Q"]
+
+    def _own_elimination(self, body: BodyStructure) -> KernelIR | None:
+        """Elimination specialised to the hinge; definitions of earlier versions have none."""
+        try:
+            return self.kernels(body.hinge, "eliminate")
+        except ElementError:
+            return None
 
     def _pivot_guard(self, index: int) -> Callable[[Node, int], None]:
         def guard(condition: Node, code: int) -> None:

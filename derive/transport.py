@@ -16,6 +16,10 @@ from mstmm.structure import BodyStructure, Entries
 from .inline import Nodes
 
 
+#: Axes of which the sweep has screws; a turn about y is carried as any other.
+AXES = ("x", "", "z")
+
+
 class Fusion(Protocol):
     """What a stage needs of the fused sweep."""
 
@@ -25,10 +29,11 @@ class Fusion(Protocol):
     def identity(self) -> Nodes: ...
     def zeros(self, count: int) -> Nodes: ...
     def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]: ...
+    def screw(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]: ...
 
 
 class Stage:
-    """One stage with any rotation."""
+    """One stage; S is carried by the double angle where it is a screw about z or x."""
 
     def __init__(self, fusion: Fusion, rotation: Nodes, position: Nodes) -> None:
         self.fusion, self.rotation, self.position = fusion, rotation, position
@@ -55,10 +60,33 @@ class Stage:
 
     def condense(self, inertia: Nodes, load: Nodes) -> tuple[Nodes, Nodes]:
         """X^T S X and X^T e."""
-        found = self.fusion.sweep(
+        f, axis = self.fusion, self._screw_axis()
+        if axis:
+            k = AXES.index(axis)
+            i, j = (k + 1) % 3, (k + 2) % 3
+            found = f.screw(
+                f"condense_{axis}", turn=[self.rotation[4 * i], self.rotation[3 * j + i]],
+                d=[self.position[k]], S=inertia, e=load,
+            )  # fmt: skip
+            return found["S_I"], found["e_I"]
+        found = f.sweep(
             0, "condense", Rc=self.rotation, r=self.position, H=(), J=(), S=inertia, e=load, tau=()
         )
         return found["S_I"], found["e_I"]
+
+    def _screw_axis(self) -> str:
+        """Axis about which this stage is a screw with an angle known only at run time, or ""."""
+        for k, axis in enumerate(AXES):
+            if not axis:
+                continue
+            others = [n for n in range(3) if n != k]
+            cross = [self.rotation[3 * k + n] for n in others]
+            cross += [self.rotation[3 * n + k] for n in others]
+            aside = [self.position[n] for n in others]
+            turns = self.rotation[4 * others[0]].value is None
+            if turns and all(x.value == 0 for x in (*cross, *aside)):
+                return axis
+        return ""
 
     def delta(self, delta: Nodes) -> Nodes:
         """X delta: deviation of the outboard frame, at rest in the inboard one."""
