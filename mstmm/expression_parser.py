@@ -6,7 +6,8 @@
     factor     := ("-" | "+") factor | power
     power      := atom ["^" factor]                      (right associative: 2^3^2 = 2^9)
     atom       := number | "pi" | name | function "(" comparison {"," comparison} ")" | "(" .. ")"
-    name       := word {"." word} ["[" whole number "]"]
+    name       := word [place] {"." word} ["[" whole number "]"]
+    place      := "[" (whole number | "last") "]"        (of a chain's member, as in rope[3].tip.x)
 
 An operator stack (shunting yard) replaces the call stack, so that no text can overflow it.
 """
@@ -42,7 +43,8 @@ _PREFIX_PRECEDENCE = 4
 _TOKEN = re.compile(
     r"(?P<space>[ \t\r\n]+)"
     r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*(?:\[[0-9]{1,6}\])?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\[(?:[0-9]{1,8}|last)\](?=\.))?"
+    r"(?:\.[A-Za-z_][A-Za-z0-9_]*)*(?:\[[0-9]{1,6}\])?)"
     r"|(?P<symbol><=|>=|[-+*/^<>(),])"
 )
 _WAYS_OUT = {
@@ -64,7 +66,10 @@ _WAYS_OUT = {
 
 @dataclass(frozen=True)
 class Name:
-    """A name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1."""
+    """A name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1.
+
+    Of a chain's members there are `rope[3].tip.x` and `rope[3].hinge.q`.
+    """
 
     parts: tuple[str, ...]
     index: int | None = None
@@ -79,6 +84,16 @@ class Name:
     def owner(self) -> str:
         """Hinge or body the name belongs to; "" for `t`, the own `q`, `u` and parameters."""
         return self.parts[0] if len(self.parts) > 1 else ""
+
+    @property
+    def hinge(self) -> str:
+        """Hinge whose `q` or `u` it is, "shoulder" or "rope[3].hinge"; "" for the own ones."""
+        return ".".join(self.parts[:-1])
+
+    @property
+    def is_member(self) -> bool:
+        """True where it begins with the member of a chain."""
+        return self.parts[0].endswith("]")
 
     @property
     def quantity(self) -> str:
@@ -234,11 +249,13 @@ class Parser:
         return False, end
 
     def _name(self, token: str, start: int) -> Name:
-        words, bracket, index = token.partition("[")
+        words, bracket, index = token, "", ""
+        if token.endswith("]"):
+            words, bracket, index = token.rpartition("[")
         parts = tuple(words.split("."))
         if len(parts) > 3:
             raise self.error("a name has at most three parts, as in body.end.x", start)
-        if any(len(part) > MAX_WORD for part in parts):
+        if any(len(part.partition("[")[0]) > MAX_WORD for part in parts):
             raise self.error(f"a word has at most {MAX_WORD} characters", start)
         return Name(parts, int(index[:-1]) if bracket else None, start)
 

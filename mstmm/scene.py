@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextvars import ContextVar
+from functools import cached_property
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, ValidationError, model_validator
@@ -17,15 +18,17 @@ from . import scene_checks, scene_errors, scene_text, scene_types
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .rotations import Vector
+from .scene_chain import Chain
 from .scene_file import load_scene, read
 from .scene_law import Friction, Law, LawEntry, Limits, SpringLaw
+from .scene_members import Bodies, Hinges
 from .scene_parts import Body, End, Event, Hinge, Initial, Load, Spring
 from .scene_rules import Table, split
 from .spec import ElementSpec
 
 __all__ = [
-    "Body", "End", "Event", "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits", "Load",
-    "Scene", "Spring", "SpringLaw", "load_scene", "read", "split",
+    "Body", "Chain", "End", "Event", "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits",
+    "Load", "Scene", "Spring", "SpringLaw", "load_scene", "read", "split",
 ]  # fmt: skip
 
 #: What messages call the scene that is being read.
@@ -42,7 +45,7 @@ class Scene(Table):
     """Everything a simulation needs to know, SI units and radians, frozen.
 
     `gravity` in m/s^2, inertial axes.  Lists keep the order of the file: hinge coordinates appear
-    in q and u in the order of `hinge`.
+    in q and u in the order of `hinge`, then those of the chains in the order of `chain`.
     """
 
     model_config = ConfigDict(title="mstmm scene")
@@ -52,6 +55,7 @@ class Scene(Table):
     allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
+    chain: tuple[Chain, ...] = ()
     load: tuple[Load, ...] = ()
     event: tuple[Event, ...] = ()
     spring: tuple[Spring, ...] = ()
@@ -71,6 +75,16 @@ class Scene(Table):
             return cls(**data)
         finally:
             _source.reset(token)
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Every body: `body`, then the members of the chains, made when they are asked for."""
+        return Bodies(self.body, self.chain)
+
+    @cached_property
+    def hinges(self) -> Hinges:
+        """Every hinge: `hinge`, then the members of the chains, made when they are asked for."""
+        return Hinges(self.hinge, self.chain)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain, islice
+from collections.abc import Iterable, Iterator
+from itertools import chain as one_after_another
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from . import topology
@@ -15,18 +16,19 @@ from .scene_rules import GROUND, Location, split
 
 if TYPE_CHECKING:
     from .scene import Scene
+    from .scene_parts import BodyTable
 
 
 def problems(scene: Scene) -> list[Problem]:
     """Everything in which the elements of a scene do not fit each other."""
-    if not scene.body:
+    if not scene.body and not scene.chain:
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene))
     return found or _first(_expressions(scene), topology.problems(scene))
 
 
 def _first(*findings: Iterable[Problem]) -> list[Problem]:
-    return list(islice(chain(*findings), MAX_PROBLEMS))
+    return list(islice(one_after_another(*findings), MAX_PROBLEMS))
 
 
 def _duplicates(scene: Scene) -> Iterator[Problem]:
@@ -39,19 +41,34 @@ def _duplicates(scene: Scene) -> Iterator[Problem]:
                     (table, i, "name"),
                     f'"{element.name}" is also the name of {table} number {first + 1}; rename one',
                 )
+    bodies, hinges = ({e.name for e in table} for table in (scene.body, scene.hinge))
+    for i, chain in enumerate(scene.chain):
+        for what, names in (("body", bodies), ("hinge", hinges)):
+            if chain.name in names:
+                yield (
+                    ("chain", i, "name"),
+                    f'"{chain.name}" is also the name of a {what}; rename one',
+                )
 
 
 def _references(scene: Scene) -> Iterator[Problem]:
-    ends = {body.name: body.ends for body in scene.body}
     for i, hinge in enumerate(scene.hinge):
-        yield from _end(hinge.inboard, ends, ("hinge", i, "inboard"))
-        yield from _end(hinge.outboard, ends, ("hinge", i, "outboard"))
+        yield from _end(hinge.inboard, scene, ("hinge", i, "inboard"))
+        yield from _end(hinge.outboard, scene, ("hinge", i, "outboard"))
+        if scene.bodies.place(hinge.outboard_body) is not None:
+            yield (
+                ("hinge", i, "outboard"),
+                f'"{hinge.outboard_body}" is held by the hinge of its chain; '
+                "hang other bodies on it as inboard",
+            )
+    for i, chain in enumerate(scene.chain):
+        yield from _end(chain.inboard, scene, ("chain", i, "inboard"))
     for i, load in enumerate(scene.load):
-        yield from _end(load.on, ends, ("load", i, "on"))
-        yield from _axes(scene, i, ends)
+        yield from _end(load.on, scene, ("load", i, "on"))
+        yield from _axes(scene, i)
     for i, spring in enumerate(scene.spring):
-        yield from _end(spring.from_, ends, ("spring", i, "from"))
-        yield from _end(spring.to, ends, ("spring", i, "to"))
+        yield from _end(spring.from_, scene, ("spring", i, "from"))
+        yield from _end(spring.to, scene, ("spring", i, "to"))
     hinges = {hinge.name: hinge for hinge in scene.hinge}
     for i, event in enumerate(scene.event):
         if event.hinge is None:
@@ -63,41 +80,50 @@ def _references(scene: Scene) -> Iterator[Problem]:
             yield place, f'"{event.hinge}" is neither driven nor fixed, so it cannot be released'
 
 
-def _end(
-    reference: str, ends: Mapping[str, Mapping[str, object]], place: Location
-) -> Iterator[Problem]:
+def _end(reference: str, scene: Scene, place: Location) -> Iterator[Problem]:
     """Is there such a body, and has it such an end?"""
     body, at = split(reference)
     if body == GROUND:
         return
-    if body not in ends:
-        yield place, f'there is no body "{body}"{near(body, ends)}'
-    elif at and at not in ends[body]:
-        way_out = near(at, ends[body]) if ends[body] else f"; give it ends = {{ {at} = [x, y, z] }}"
+    ends = scene.bodies.ends(body)
+    if ends is None:
+        yield place, scene.bodies.missing(body)
+    elif at and at not in ends:
+        way_out = near(at, ends) if ends else f"; give it ends = {{ {at} = [x, y, z] }}"
         yield place, f'body "{body}" has no end "{at}"{way_out}'
 
 
-def _axes(scene: Scene, i: int, bodies: Mapping[str, object]) -> Iterator[Problem]:
+def _axes(scene: Scene, i: int) -> Iterator[Problem]:
     load = scene.load[i]
+    known = scene.bodies.find(load.axes) is not None
     if load.axes in ("inertial", "body"):
-        if load.axes in bodies and not (load.axes == "body" == split(load.on)[0]):
+        if known and not (load.axes == "body" == split(load.on)[0]):
             yield (
                 ("load", i, "axes"),
                 f'"{load.axes}" could also mean the body of this name; rename that body',
             )
-    elif load.axes not in bodies:
-        options = ["inertial", "body", *bodies]
+    elif not known:
+        options = ["inertial", "body", *(body.name for body in scene.body)]
         yield ("load", i, "axes"), f'there is no body "{load.axes}"{near(load.axes, options)}'
 
 
-def _inertias(scene: Scene) -> Iterator[Problem]:
+def _tables(scene: Scene) -> Iterator[tuple[Location, str, BodyTable]]:
+    """(place, name for a warning, table) of every body table, those of chains among them."""
     for i, body in enumerate(scene.body):
+        yield ("body", i), f'body "{body.name}"', body
+    for i, chain in enumerate(scene.chain):
+        for k, table in enumerate(chain.body):
+            yield ("chain", i, "body", k), f'body {k + 1} of chain "{chain.name}"', table
+
+
+def _inertias(scene: Scene) -> Iterator[Problem]:
+    for place, _, body in _tables(scene):
         if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
             continue
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
             yield (
-                ("body", i, "inertia"),
+                (*place, "inertia"),
                 f"{excess}, so no body has this inertia; correct it, or accept it with "
                 "allow_unphysical_inertia = true",
             )
@@ -106,10 +132,10 @@ def _inertias(scene: Scene) -> Iterator[Problem]:
 def warnings(scene: Scene) -> tuple[str, ...]:
     """What is accepted but worth knowing: inertias that no body can have."""
     found = []
-    for body in scene.body:
+    for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
-            found.append(f'body "{body.name}": inertia: {excess}; accepted as asked')
+            found.append(f"{name}: inertia: {excess}; accepted as asked")
     return tuple(found)
 
 
@@ -117,17 +143,21 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def _expressions(scene: Scene) -> Iterator[Problem]:
-    hinges = {hinge.name: hinge for hinge in scene.hinge}
-    ends = {body.name: frozenset(body.ends) for body in scene.body}
-    anywhere = Scope(hinges, ends)
-    in_events = Scope(hinges, ends, positions=True)
+    hinges, bodies = scene.hinges, scene.bodies
+    anywhere = Scope(hinges, bodies)
+    in_events = Scope(hinges, bodies, positions=True)
     for i, hinge in enumerate(scene.hinge):
-        own = Scope(hinges, ends, own=hinge)
+        own = Scope(hinges, bodies, own=hinge)
         for k, effort in enumerate(hinge.law.effort):
             yield from _names(effort, own, ("hinge", i, "law", "effort", k))
         if hinge.release is not None:
-            released = Scope(hinges, ends, own=hinge, positions=True)
+            released = Scope(hinges, bodies, own=hinge, positions=True)
             yield from _names(hinge.release, released, ("hinge", i, "release"))
+    for i, chain in enumerate(scene.chain):
+        for j, table in enumerate(chain.hinge):
+            member = Scope(hinges, bodies, own=table)
+            for k, effort in enumerate(table.law.effort):
+                yield from _names(effort, member, ("chain", i, "hinge", j, "law", "effort", k))
     for i, load in enumerate(scene.load):
         for key in ("force", "moment"):
             for k, entry in enumerate(getattr(load, key)):
@@ -136,7 +166,7 @@ def _expressions(scene: Scene) -> Iterator[Problem]:
         yield from _names(event.when, in_events, ("event", i, "when"))
     for i, spring in enumerate(scene.spring):
         yield from _names(
-            spring.law.effort, Scope(hinges, ends, spring=True), ("spring", i, "law", "effort")
+            spring.law.effort, Scope(hinges, bodies, spring=True), ("spring", i, "law", "effort")
         )
 
 

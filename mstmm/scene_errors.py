@@ -31,7 +31,7 @@ RESERVED = {
 }
 
 #: The lists of tables of a scene.
-TABLES = ("body", "hinge", "load", "event", "spring")
+TABLES = ("body", "hinge", "chain", "load", "event", "spring")
 
 Problem = tuple[Location, str]
 
@@ -86,11 +86,23 @@ def _words(item: Mapping[str, Any], place: Location, model: type[BaseModel]) -> 
     if item["type"] == "missing":
         return f"missing; expected {_expected(model, place)}"
     if item["type"] == "extra_forbidden":
-        return _unknown_key(str(place[-1]), _model_at(model, place[:-1]))
+        return _unknown_key(str(place[-1]), _model_at(model, place[:-1]), place)
     return f"expected {_expected(model, place)}, found {found(item['input'])}"
 
 
-def _unknown_key(key: str, model: type[BaseModel]) -> str:
+#: Keys of bodies and hinges that the members of a chain do not have.
+_OF_CHAINS = {
+    "name": 'a chain names its members itself, as in "rope[3]"; leave it out',
+    "inboard": "the first member hangs on the chain's own inboard, every other on the one before",
+    "outboard": "a member is held at its origin; leave it out",
+    "position": "the chain itself takes the position; leave it out here",
+    "release": "members of a chain cannot be released; write this hinge as a [[hinge]]",
+}
+
+
+def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
+    if len(place) == 5 and place[0] == "chain" and key in _OF_CHAINS:
+        return _OF_CHAINS[key]
     if key in RESERVED:
         return f"{RESERVED[key]} come in a later release; leave {key} out for now"
     keys = [f.alias or name for name, f in model.model_fields.items()]

@@ -15,7 +15,7 @@ from .scene_rules import GROUND, Location, Refused, counted, found, quaternion
 
 if TYPE_CHECKING:
     from .scene_law import Law, LawEntry
-    from .scene_parts import Hinge
+    from .scene_parts import Hinge, HingeTable
 
 _ZERO = (0.0, 0.0, 0.0)
 _Z = (0.0, 0.0, 1.0)
@@ -24,9 +24,9 @@ _X = (1.0, 0.0, 0.0)
 _AGREES = 1e-9
 
 
-def settled(hinge: Hinge) -> dict[str, Any]:
+def settled(hinge: HingeTable) -> dict[str, Any]:
     """Fields with their defaults filled in; Refused names everything that does not fit."""
-    problems = list(_placement(hinge))
+    problems = hinge.misplaced()
     changes: dict[str, Any] = {}
     kind = hinge.builtin
     if kind is None:
@@ -44,7 +44,7 @@ def settled(hinge: Hinge) -> dict[str, Any]:
             f'a {kind.name} hinge has no parameters; '
             "name them in the type of your own hinge",
         ))  # fmt: skip
-    if hinge.release is not None and drive is None and kind.coordinates:
+    if hinge.lets_go and drive is None and kind.coordinates:
         problems.append((
             ("release",),
             "only a driven or fixed hinge can be released; add a drive or leave it out",
@@ -56,7 +56,7 @@ def settled(hinge: Hinge) -> dict[str, Any]:
     return changes
 
 
-def _placement(hinge: Hinge) -> list[tuple[Location, str]]:
+def misplaced(hinge: Hinge) -> list[tuple[Location, str]]:
     """Ends that cannot be joined."""
     problems: list[tuple[Location, str]] = []
     if hinge.outboard_body == GROUND:
@@ -75,7 +75,7 @@ def _placement(hinge: Hinge) -> list[tuple[Location, str]]:
     return problems
 
 
-def _user_type(hinge: Hinge) -> list[tuple[Location, str]]:
+def _user_type(hinge: HingeTable) -> list[tuple[Location, str]]:
     """A user's type takes parameters instead of the keys of the built-in types."""
     return [
         ((key,), f'only built-in types take {key}; give "{hinge.type}" its numbers as parameters')
@@ -84,7 +84,9 @@ def _user_type(hinge: Hinge) -> list[tuple[Location, str]]:
     ]
 
 
-def _axes(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) -> dict[str, Any]:
+def _axes(
+    hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]
+) -> dict[str, Any]:
     """axis, axis2, normal and lead, each where the type has it."""
     for key in ("axis2", "lead"):
         if key not in kind.keys and getattr(hinge, key) is not None:
@@ -112,7 +114,7 @@ def _axes(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) -
     return {}
 
 
-def _planar_axes(hinge: Hinge, problems: list[tuple[Location, str]]) -> dict[str, Any]:
+def _planar_axes(hinge: HingeTable, problems: list[tuple[Location, str]]) -> dict[str, Any]:
     """The normal under both its names, and the direction of x in the plane."""
     normal = hinge.axis if hinge.normal is None else hinge.normal
     if hinge.normal is not None and hinge.axis not in (_Z, hinge.normal):
@@ -139,7 +141,7 @@ def _not_collinear(
 # --- law ------------------------------------------------------------------------------------------
 
 
-def _law(hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
+def _law(hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
     """The law with one entry per speed."""
     law, count = hinge.law, len(kind.speeds)
     neutral = _neutral(type(law))
@@ -208,7 +210,7 @@ def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, 
 
 
 def _drive(
-    hinge: Hinge, kind: HingeType, problems: list[tuple[Location, str]]
+    hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]
 ) -> tuple[Expression | None, ...] | None:
     drive = hinge.drive
     if drive is None or (drive and all(entry is None for entry in drive)):
@@ -275,7 +277,7 @@ def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
 
 
 def _initial(
-    hinge: Hinge,
+    hinge: HingeTable,
     kind: HingeType,
     drive: tuple[Expression | None, ...] | None,
     problems: list[tuple[Location, str]],

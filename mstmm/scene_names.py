@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,8 @@ from .expression import Name
 from .scene_errors import near
 
 if TYPE_CHECKING:
-    from .scene_parts import Hinge
+    from .scene_members import Bodies, Hinges
+    from .scene_parts import HingeTable
 
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
 
@@ -23,9 +24,9 @@ class Scope:
     `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
     """
 
-    hinges: Mapping[str, Hinge]
-    ends: Mapping[str, Collection[str]]
-    own: Hinge | None = None
+    hinges: Hinges
+    bodies: Bodies
+    own: HingeTable | None = None
     spring: bool = False
     positions: bool = False
 
@@ -34,16 +35,16 @@ def problem_with(name: Name, scope: Scope) -> str | None:
     """Why the name means nothing in this scope; None where it means something."""
     if len(name.parts) == 1:
         return _bare(name, scope)
-    if name.quantity in ("q", "u") and len(name.parts) == 2:
-        hinge = scope.hinges.get(name.owner)
+    if name.quantity in ("q", "u") and (len(name.parts) == 2 or name.is_member):
+        hinge = scope.hinges.find(name.hinge)
         if hinge is None:
-            return f"there is no hinge {name.owner!r}{near(name.owner, scope.hinges)}"
-        return _indexed(name, hinge)
+            return scope.hinges.missing(name.hinge, repr(name.hinge))
+        return _indexed(name, scope.hinges[hinge], name.hinge)
     if name.quantity in POSITIONS:
         return _position(name, scope)
-    if name.owner in scope.hinges:
-        return f"{name.text!r} is unknown; of a hinge there is {name.owner}.q and {name.owner}.u"
-    if scope.positions and name.owner in scope.ends:
+    if scope.hinges.find(name.hinge) is not None:
+        return f"{name.text!r} is unknown; of a hinge there is {name.hinge}.q and {name.hinge}.u"
+    if scope.positions and scope.bodies.find(name.owner) is not None:
         return f"{name.text!r} is unknown; of a body or end there is x, y, z, vx, vy, vz"
     return f"{name.text!r} is unknown; write the name of a hinge and .q or .u"
 
@@ -55,7 +56,7 @@ def _bare(name: Name, scope: Scope) -> str | None:
         return None if name.index is None else f"{word!r} is one number; leave out [{name.index}]"
     if word in ("q", "u"):
         if scope.own is not None:
-            return _indexed(name, scope.own)
+            return _indexed(name, scope.own, getattr(scope.own, "name", "of a chain"))
         if scope.spring:
             return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
         return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
@@ -63,13 +64,13 @@ def _bare(name: Name, scope: Scope) -> str | None:
     return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
 
 
-def _indexed(name: Name, hinge: Hinge) -> str | None:
+def _indexed(name: Name, hinge: HingeTable, called: str) -> str | None:
     """Does the hinge have this coordinate?  User types are checked with their definition."""
     kind = hinge.builtin
     if kind is None:
         return None
     entries = kind.coordinates if name.quantity == "q" else kind.speeds
-    return index_problem(name, hinge.name, len(entries))
+    return index_problem(name, called, len(entries))
 
 
 def index_problem(name: Name, hinge: str, count: int) -> str | None:
@@ -94,9 +95,9 @@ def _position(name: Name, scope: Scope) -> str | None:
         )
     if name.index is not None:
         return f"{name.text!r} is one number; leave out [{name.index}]"
-    if name.owner not in scope.ends:
-        return f"there is no body {name.owner!r}{near(name.owner, scope.ends)}"
-    if len(name.parts) == 3 and name.parts[1] not in scope.ends[name.owner]:
-        options = scope.ends[name.owner]
-        return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], options)}'
+    ends = scope.bodies.ends(name.owner)
+    if ends is None:
+        return scope.bodies.missing(name.owner, repr(name.owner))
+    if len(name.parts) == 3 and name.parts[1] not in ends:
+        return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], ends)}'
     return None

@@ -7,7 +7,7 @@ expressions.  SI units and radians throughout.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -18,7 +18,7 @@ from .expression import Expression, number
 from .hinge_types import HINGE_TYPES, HingeType
 from .rotations import IDENTITY, Matrix, Vector, from_orientation, reject, unit
 from .scene_law import Law, SpringLaw
-from .scene_rules import GROUND, NAME, Refused, Shorthand, Table, found, refuse, split
+from .scene_rules import GROUND, NAME, Location, Refused, Shorthand, Table, found, refuse, split
 
 Numbers = tuple[float, ...]
 Orientation = tuple[float, ...]
@@ -52,14 +52,14 @@ def _as_ends(value: Any) -> Any:
     return {key: _as_end(v) for key, v in value.items()}
 
 
-class Body(Table):
-    """A rigid body, or a body of a user's own type with `parameters`.
+class BodyTable(Table):
+    """What a body is, without its name: a rigid body, or one of a user's own type with
+    `parameters`.
 
     Body axes have their origin at the input end.  `inertia` is about the centre of mass as
     (xx, yy, zz, xy, xz, yz), tensor entries (Jxy = -int xy dm), kg m^2.
     """
 
-    name: Annotated[str, texts.name("the body's name")]
     type: Annotated[str, texts.name("a body type")] = "rigid"
     mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
     center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
@@ -93,7 +93,7 @@ class Body(Table):
         return self.ends[at].rotation if at else IDENTITY
 
     @model_validator(mode="after")
-    def _settle(self) -> Body:
+    def _settle(self) -> Self:
         if len(self.inertia) == 3:
             object.__setattr__(self, "inertia", (*self.inertia, 0.0, 0.0, 0.0))
         problems = scene_physics.inertia_problems(self.inertia_matrix)
@@ -107,6 +107,12 @@ class Body(Table):
         return self
 
 
+class Body(BodyTable):
+    """A body of the scene."""
+
+    name: Annotated[str, texts.name("the body's name")]
+
+
 # --- hinge ----------------------------------------------------------------------------------------
 
 
@@ -117,8 +123,8 @@ class Initial(Table):
     u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
 
 
-class Hinge(Table):
-    """A hinge between an inboard end (or the ground) and an outboard body.
+class HingeTable(Table):
+    """What a hinge is, without its name and what it joins.
 
     `axis` and `axis2` are in the axes of the outboard end at q = 0; planar: the normal and the
     direction of x.  `drive` has one entry per coordinate, None where the coordinate is free; it is
@@ -126,11 +132,7 @@ class Hinge(Table):
     coordinate is driven) and `law` has one entry per speed.
     """
 
-    name: Annotated[str, texts.name("the hinge's name")]
     type: Annotated[str, texts.name("a hinge type", ", ".join(HINGE_TYPES) + " or your own")]
-    inboard: Annotated[str, texts.end()]
-    outboard: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
     axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
     axis2: Annotated[Vector | None, rules.direction()] = None
@@ -144,35 +146,12 @@ class Hinge(Table):
             'an expression of t, or a list with one per coordinate ("free" where none)', free=True
         ),
     ] = None
-    release: Annotated[
-        Expression | None,
-        texts.condition('a time in s or a comparison such as "t >= 1"', time=True),
-    ] = None
     parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
 
     @property
     def builtin(self) -> HingeType | None:
         """The built-in type, None for a user's type."""
         return HINGE_TYPES.get(self.type)
-
-    @property
-    def inboard_body(self) -> str:
-        """Name of the inboard body, or "ground"."""
-        return split(self.inboard)[0]
-
-    @property
-    def inboard_end(self) -> str:
-        """End of the inboard body, "" for its origin or the ground."""
-        return split(self.inboard)[1]
-
-    @property
-    def outboard_body(self) -> str:
-        return split(self.outboard)[0]
-
-    @property
-    def outboard_end(self) -> str:
-        """End by which the outboard body is held, "" for its origin."""
-        return split(self.outboard)[1]
 
     @property
     def rotation(self) -> Matrix:
@@ -195,11 +174,61 @@ class Hinge(Table):
         x, y, z = unit(self.axis2)
         return (x, y, z)
 
+    def misplaced(self) -> list[tuple[Location, str]]:
+        """What is wrong with the ends it joins; a table without ends has none to be wrong."""
+        return []
+
+    @property
+    def lets_go(self) -> bool:
+        """True when it is released by itself."""
+        return False
+
     @model_validator(mode="after")
-    def _settle(self) -> Hinge:
+    def _settle(self) -> Self:
         for key, value in scene_hinge.settled(self).items():
             object.__setattr__(self, key, value)
         return self
+
+
+class Hinge(HingeTable):
+    """A hinge between an inboard end (or the ground) and an outboard body."""
+
+    name: Annotated[str, texts.name("the hinge's name")]
+    inboard: Annotated[str, texts.end()]
+    outboard: Annotated[str, texts.end()]
+    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    release: Annotated[
+        Expression | None,
+        texts.condition('a time in s or a comparison such as "t >= 1"', time=True),
+    ] = None
+
+    @property
+    def inboard_body(self) -> str:
+        """Name of the inboard body, or "ground"."""
+        return split(self.inboard)[0]
+
+    @property
+    def inboard_end(self) -> str:
+        """End of the inboard body, "" for its origin or the ground."""
+        return split(self.inboard)[1]
+
+    @property
+    def outboard_body(self) -> str:
+        return split(self.outboard)[0]
+
+    @property
+    def outboard_end(self) -> str:
+        """End by which the outboard body is held, "" for its origin."""
+        return split(self.outboard)[1]
+
+    def misplaced(self) -> list[tuple[Location, str]]:
+        """Ends that cannot be joined."""
+        return scene_hinge.misplaced(self)
+
+    @property
+    def lets_go(self) -> bool:
+        """True when it is released by itself."""
+        return self.release is not None
 
 
 # --- load, event, spring --------------------------------------------------------------------------
@@ -223,7 +252,7 @@ class Load(Table):
         tuple[Expression, Expression, Expression],
         texts.expressions("three numbers or expressions in N m", 3),
     ] = _ZERO
-    axes: Annotated[str, texts.name('"inertial", "body" or the name of a body')] = "inertial"
+    axes: Annotated[str, texts.body('"inertial", "body" or the name of a body')] = "inertial"
 
 
 class Event(Table):

@@ -19,6 +19,8 @@ from pydantic_core import CoreSchema, core_schema
 from .rotations import norm, unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+#: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
+BODY = re.compile(rf"{NAME.pattern}(\[([0-9]{{1,8}}|last)\])?")
 NAME_SHAPE = "a letter, then letters, digits or _ (64 characters at most)"
 GROUND = "ground"
 
@@ -165,6 +167,21 @@ def number(of: str = "", minimum: float | None = None, above: float | None = Non
         return result
 
     return Rule(expected, check, schema)
+
+
+def whole(minimum: int, maximum: int) -> Rule:
+    """A whole number between two others, both included."""
+    expected = f"a whole number from {minimum} to {maximum}"
+
+    def check(value: Any) -> int:
+        value = plain(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise refuse(f"expected {expected}, found {found(value)}")
+        if not minimum <= value <= maximum:
+            raise refuse(f"expected {expected}, found {found(value)}")
+        return value
+
+    return Rule(expected, check, {"type": "integer", "minimum": minimum, "maximum": maximum})
 
 
 def _within(

@@ -10,6 +10,7 @@ from . import expression
 from .errors import ExpressionError
 from .expression import Expression
 from .scene_rules import (
+    BODY,
     GROUND,
     NAME,
     NAME_SHAPE,
@@ -57,7 +58,7 @@ def text(value: Any, expected: str) -> str:
 def end(ground: bool = True) -> Rule:
     """Reference to a body ("rod1", its own origin), one of its ends ("rod1.tip") or the ground."""
     expected = 'a body or an end of one ("rod1" or "rod1.tip")' + (' or "ground"' if ground else "")
-    shape = re.compile(rf"{NAME.pattern}(\.{NAME.pattern})?")
+    shape = re.compile(rf"{BODY.pattern}(\.{NAME.pattern})?")
 
     def check(value: Any) -> str:
         checked = text(value, expected)
@@ -70,6 +71,18 @@ def end(ground: bool = True) -> Rule:
         return checked
 
     return Rule(expected, check, {"type": "string", "pattern": _pattern(shape)})
+
+
+def body(expected: str) -> Rule:
+    """Reference to a body ("rod1", or "rope[3]" of a chain), or a word in its place."""
+
+    def check(value: Any) -> str:
+        checked = text(value, expected)
+        if not BODY.fullmatch(checked) or checked == GROUND:
+            raise refuse(f"expected {expected}, found {found(checked)}")
+        return checked
+
+    return Rule(expected, check, {"type": "string", "pattern": _pattern(BODY)})
 
 
 def choice(*options: str) -> Rule:

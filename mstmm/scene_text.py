@@ -23,11 +23,11 @@ def to_toml(scene: Scene) -> str:
     ]
     for table in TABLES:
         for element in data[table]:
-            lines += ["", f"[[{table}]]"]
+            lines += ["", f"[[{table}]]", f"name = {_value(element['name'])}"]
             lines += [
                 f"{key} = {_value(value)}"
                 for key, value in element.items()
-                if _is_written(table, element, key, value)
+                if key != "name" and _is_written(table, element, key, value)
             ]
     return "\n".join(lines) + "\n"
 

@@ -14,7 +14,7 @@ from .spec import ElementSpec
 
 if TYPE_CHECKING:
     from .scene import Scene
-    from .scene_parts import Hinge
+    from .scene_parts import HingeTable
 
 #: Table of the scene -> (kind of the definition, built-in types).
 _KINDS = {
@@ -24,23 +24,39 @@ _KINDS = {
 }
 
 
+def tables(scene: Scene) -> Iterator[tuple[str, Location, Any]]:
+    """(kind of definition, place, table) of everything that has a type, patterns of chains too."""
+    for table, (kind, _) in _KINDS.items():
+        for i, element in enumerate(getattr(scene, table)):
+            yield kind, (table, i), element
+    for i, chain in enumerate(scene.chain):
+        for table in ("body", "hinge"):
+            for k, element in enumerate(getattr(chain, table)):
+                yield _KINDS[table][0], ("chain", i, table, k), element
+
+
+def types(scene: Scene) -> set[tuple[str, str]]:
+    """(kind, type) of everything in a scene."""
+    return {(kind, element.type) for kind, _, element in tables(scene)}
+
+
 def problems(scene: Scene, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
     """Unknown types, and elements that do not fit the definition of their type."""
     found: list[Problem] = []
-    for table, (kind, builtin) in _KINDS.items():
-        mine = [name for k, name in known if k == kind]
-        for i, element in enumerate(getattr(scene, table)):
-            if element.type in builtin:
-                continue
-            spec = known.get((kind, element.type))
-            if spec is None:
-                found.append((
-                    (table, i, "type"),
-                    f'there is no {kind} type "{element.type}"'
-                    f"{near(element.type, [*builtin, *mine])}",
-                ))  # fmt: skip
-            else:
-                found += _element(scene, table, i, spec)
+    builtin = dict(_KINDS.values())
+    for kind, place, element in tables(scene):
+        if element.type in builtin[kind]:
+            continue
+        spec = known.get((kind, element.type))
+        if spec is None:
+            mine = [name for k, name in known if k == kind]
+            found.append((
+                (*place, "type"),
+                f'there is no {kind} type "{element.type}"'
+                f"{near(element.type, [*builtin[kind], *mine])}",
+            ))  # fmt: skip
+        else:
+            found += _element(scene, place, element, spec)
     return found
 
 
@@ -48,20 +64,17 @@ def problems_with(scene: Scene, spec: ElementSpec) -> list[Problem]:
     """What does not fit in the elements of this one type."""
     return [
         problem
-        for table, (kind, _) in _KINDS.items()
-        if kind == spec.kind
-        for i, element in enumerate(getattr(scene, table))
-        if element.type == spec.name
-        for problem in _element(scene, table, i, spec)
+        for kind, place, element in tables(scene)
+        if kind == spec.kind and element.type == spec.name
+        for problem in _element(scene, place, element, spec)
     ]
 
 
-def _element(scene: Scene, table: str, i: int, spec: ElementSpec) -> Iterator[Problem]:
-    element = getattr(scene, table)[i]
-    yield from _parameters((table, i), element.parameters, spec)
-    if table == "hinge":
-        yield from _counts(("hinge", i), element, spec)
-        yield from _indices(scene, element.name, spec)
+def _element(scene: Scene, place: Location, element: Any, spec: ElementSpec) -> Iterator[Problem]:
+    yield from _parameters(place, element.parameters, spec)
+    if spec.kind == "hinge":
+        yield from _counts(place, element, spec)
+        yield from _indices(scene, element, spec)
 
 
 def _parameters(
@@ -85,7 +98,7 @@ def _parameters(
             yield at, f"missing; expected a number{unit}{meaning}"
 
 
-def _counts(place: Location, hinge: Hinge, spec: ElementSpec) -> Iterator[Problem]:
+def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
     """Lengths of start values, drive and law."""
     lists: list[tuple[Location, Any, int]] = []
     if hinge.initial is not None:
@@ -111,30 +124,45 @@ def _counts(place: Location, hinge: Hinge, spec: ElementSpec) -> Iterator[Proble
             yield (*place, *at), f"{spec.name} has {count} entries here, found {len(values)}"
 
 
-def _indices(scene: Scene, hinge: str, spec: ElementSpec) -> Iterator[Problem]:
+def _indices(scene: Scene, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
     """Indices of this hinge's coordinates in all expressions of the scene."""
     for place, expression, own in _all_expressions(scene):
         for name in expression.names:
-            if name.quantity not in ("q", "u") or (name.owner or own) != hinge:
+            if name.quantity not in ("q", "u"):
+                continue
+            meant = own if len(name.parts) == 1 else _table(scene, name.hinge)
+            if meant is not hinge:
                 continue
             entries = spec.coordinates if name.quantity == "q" else spec.speeds
-            message = index_problem(name, hinge, len(entries))
+            message = index_problem(name, name.hinge or getattr(own, "name", "of a chain"),
+                                    len(entries))  # fmt: skip
             if message is not None:
                 yield place, message
 
 
-def _all_expressions(scene: Scene) -> Iterator[tuple[Location, Expression, str]]:
+def _table(scene: Scene, name: str) -> HingeTable | None:
+    """The table that describes the hinge of this name."""
+    index = scene.hinges.find(name)
+    if index is None or index < len(scene.hinge):
+        return None if index is None else scene.hinge[index]
+    chain, k = scene.hinges.member(index)
+    return scene.chain[chain].hinge_of(k)
+
+
+def _all_expressions(scene: Scene) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
     """(place, expression, hinge whose q and u need no prefix)."""
+    for kind, place, table in tables(scene):
+        if kind == "hinge":
+            for k, effort in enumerate(table.law.effort):
+                yield (*place, "law", "effort", k), effort, table
     for i, hinge in enumerate(scene.hinge):
-        for k, effort in enumerate(hinge.law.effort):
-            yield ("hinge", i, "law", "effort", k), effort, hinge.name
         if hinge.release is not None:
-            yield ("hinge", i, "release"), hinge.release, hinge.name
+            yield ("hinge", i, "release"), hinge.release, hinge
     for i, load in enumerate(scene.load):
         for key in ("force", "moment"):
             for k, entry in enumerate(getattr(load, key)):
-                yield ("load", i, key, k), entry, ""
+                yield ("load", i, key, k), entry, None
     for i, event in enumerate(scene.event):
-        yield ("event", i, "when"), event.when, ""
+        yield ("event", i, "when"), event.when, None
     for i, spring in enumerate(scene.spring):
-        yield ("spring", i, "law", "effort"), spring.law.effort, ""
+        yield ("spring", i, "law", "effort"), spring.law.effort, None

@@ -1,11 +1,18 @@
-"""The tree of a scene: which body hangs on which, in the order in which the sweeps visit them."""
+"""The tree of a scene: which body hangs on which, in the order in which the sweeps visit them.
+
+A chain is one node of the tree, whatever its length: its members follow one another.
+"""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
+
+from .scene_rules import split
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -18,9 +25,10 @@ Problem = tuple[tuple[str | int, ...], str]
 class Link:
     """One body in its place in the tree.
 
-    `body` and `hinge` are indices into the scene, `parent` and `children` are positions in
-    `Topology.links` (parent -1: the ground).  `inboard_end` is the end of the parent that holds
-    the hinge, `outboard_end` the end by which this body is held; "" is a body's own origin.
+    `body` and `hinge` are indices into the scene's `bodies` and `hinges`, `parent` and `children`
+    are positions in `Topology.links` (parent -1: the ground).  `inboard_end` is the end of the
+    parent that holds the hinge, `outboard_end` the end by which this body is held; "" is a body's
+    own origin.
     """
 
     body: int
@@ -32,85 +40,213 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class Run:
+    """`count` bodies in a row, each the child of the one before: a body of its own, or a chain.
+
+    `body`, `hinge` and `place` are those of the first, the others follow it.  `parent` is the place
+    of the body on whose `inboard_end` the first hangs; the others hang on `ends`, repeated.
+    """
+
+    body: int
+    hinge: int
+    count: int
+    place: int
+    parent: int
+    inboard_end: str
+    outboard_end: str
+    ends: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Topology:
     """Bodies depth first: parents before children, branch by branch, children in scene order.
 
-    `position[i]` is the place of the scene's body i in `links`.
+    The next member of a chain comes before what else hangs on a member.  `runs` are the tree in
+    that order; `links` and what follows from it are made when first asked for, an object per body.
     """
 
-    links: tuple[Link, ...]
-    position: tuple[int, ...]
+    runs: tuple[Run, ...]
 
     @property
+    def count(self) -> int:
+        """How many bodies there are."""
+        return self.runs[-1].place + self.runs[-1].count if self.runs else 0
+
+    @cached_property
+    def links(self) -> tuple[Link, ...]:
+        """Every body in its place."""
+        parents = self.parents
+        children: list[list[int]] = [[] for _ in parents]
+        for place, parent in enumerate(parents):
+            if parent != GROUND_INDEX:
+                children[parent].append(place)
+        return tuple(
+            Link(
+                run.body + k, run.hinge + k, parents[run.place + k],
+                run.inboard_end if k == 0 else run.ends[(k - 1) % len(run.ends)],
+                run.outboard_end, tuple(children[run.place + k]),
+            )
+            for run in self.runs
+            for k in range(run.count)
+        )  # fmt: skip
+
+    @cached_property
     def order(self) -> tuple[int, ...]:
         """Scene indices of the bodies, parents first."""
-        return tuple(link.body for link in self.links)
+        return tuple(run.body + k for run in self.runs for k in range(run.count))
 
-    @property
+    @cached_property
     def parents(self) -> tuple[int, ...]:
         """Position of each link's parent, -1 for the ground."""
-        return tuple(link.parent for link in self.links)
+        return tuple(
+            run.parent if k == 0 else run.place + k - 1
+            for run in self.runs
+            for k in range(run.count)
+        )
+
+    @cached_property
+    def position(self) -> tuple[int, ...]:
+        """Place in `links` of every body of the scene."""
+        position = [0] * self.count
+        for place, body in enumerate(self.order):
+            position[body] = place
+        return tuple(position)
+
+    @cached_property
+    def _by_body(self) -> tuple[list[int], list[Run]]:
+        runs = sorted(self.runs, key=lambda run: run.body)
+        return [run.body for run in runs], runs
+
+    @cached_property
+    def _by_hinge(self) -> tuple[list[int], list[Run]]:
+        runs = sorted(self.runs, key=lambda run: run.hinge)
+        return [run.hinge for run in runs], runs
+
+    @cached_property
+    def _places(self) -> list[int]:
+        return [run.place for run in self.runs]
+
+    def place_of_body(self, body: int) -> int:
+        """Place of the scene's body."""
+        firsts, runs = self._by_body
+        run = runs[bisect_right(firsts, body) - 1]
+        return run.place + body - run.body
+
+    def place_of_hinge(self, hinge: int) -> int:
+        """Place of the body whose inboard hinge is the scene's hinge."""
+        firsts, runs = self._by_hinge
+        run = runs[bisect_right(firsts, hinge) - 1]
+        return run.place + hinge - run.hinge
+
+    def at(self, place: int) -> tuple[int, int]:
+        """(body, hinge) of the scene at a place."""
+        run = self.runs[bisect_right(self._places, place) - 1]
+        k = place - run.place
+        return run.body + k, run.hinge + k
 
     @property
     def roots(self) -> tuple[int, ...]:
         """Positions of the bodies hinged to the ground."""
-        return tuple(i for i, link in enumerate(self.links) if link.parent == GROUND_INDEX)
+        return tuple(run.place for run in self.runs if run.parent == GROUND_INDEX)
 
     @property
     def is_chain(self) -> bool:
         """True for one unbranched chain from the ground."""
-        return len(self.roots) == 1 and all(len(link.children) <= 1 for link in self.links)
+        return all(run.parent == run.place - 1 for run in self.runs)
 
 
 def build(scene: Scene) -> Topology:
-    """The tree of a scene.  O(bodies + hinges), no recursion.
+    """The tree of a scene.  O(tables), no recursion.
 
     Raises SceneError, one line per problem, for closed loops, hinges written the wrong way round
     and bodies that no hinge connects to the ground.
     """
-    tree = _tree(scene)
+    tree = _tree(_Graph(scene))
     if tree is None:
         from .scene_errors import report
 
-        tables = {"body": scene.body, "hinge": scene.hinge}
+        tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
         raise report(list(problems(scene)), tables, "scene")
     return tree
 
 
-def _tree(scene: Scene) -> Topology | None:
+class _Graph:
+    """Nodes are the scene's bodies, then its chains; edges its hinges, then the chains' first."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.index = {body.name: i for i, body in enumerate(scene.body)}
+        self.nodes = len(scene.body) + len(scene.chain)
+        self.inboard = [hinge.inboard for hinge in scene.hinge]
+        self.inboard += [chain.inboard for chain in scene.chain]
+        self.outboard = [self.index[hinge.outboard_body] for hinge in scene.hinge]
+        self.outboard += range(len(scene.body), self.nodes)
+
+    def holder(self, edge: int) -> tuple[int, int]:
+        """(node on which an edge hangs, member of it where it is a chain); -1: the ground."""
+        name = split(self.inboard[edge])[0]
+        known = self.index.get(name)
+        if known is not None:
+            return known, 0
+        place = self.scene.bodies.place(name)
+        return (GROUND_INDEX, 0) if place is None else (len(self.index) + place[0], place[1])
+
+    def place(self, edge: int) -> tuple[str, int]:
+        """Table and number of an edge."""
+        hinges = len(self.scene.hinge)
+        return ("hinge", edge) if edge < hinges else ("chain", edge - hinges)
+
+    def name(self, node: int) -> str:
+        """What a message calls a node."""
+        bodies = len(self.scene.body)
+        return self.scene.body[node].name if node < bodies else self.scene.chain[node - bodies].name
+
+    def edge_name(self, edge: int) -> str:
+        table, number = self.place(edge)
+        name: str = getattr(self.scene, table)[number].name
+        return f"{name}[0].hinge" if table == "chain" else name
+
+
+def _tree(graph: _Graph) -> Topology | None:
     """The tree, or None if the hinges are not one."""
-    index = {body.name: i for i, body in enumerate(scene.body)}
-    children: list[list[int]] = [[] for _ in range(len(scene.body) + 1)]
-    hinge_of = [0] * len(scene.body)
-    if len(scene.hinge) != len(scene.body):
+    nodes = graph.nodes
+    if len(graph.outboard) != nodes:
         return None
-    for h, hinge in enumerate(scene.hinge):
-        child = index[hinge.outboard_body]
-        hinge_of[child] = h
-        children[index.get(hinge.inboard_body, GROUND_INDEX)].append(child)
+    # Per node (-1: the ground) its children, as (member that holds it, child).
+    children: list[list[tuple[int, int]]] = [[] for _ in range(nodes + 1)]
+    edge_of, holder_of = [0] * nodes, [(GROUND_INDEX, 0)] * nodes
+    for edge, child in enumerate(graph.outboard):
+        edge_of[child], holder_of[child] = edge, graph.holder(edge)
+        parent, member = holder_of[child]
+        children[parent].append((member, child))
     for siblings in children:
-        siblings.sort(reverse=True)
-    order: list[int] = []
-    stack = list(children[GROUND_INDEX])
+        # Popped from the end: what hangs farthest out on a chain comes first.
+        siblings.sort(key=lambda one: (one[0], -one[1]))
+    runs: list[Run] = []
+    first = [0] * (nodes + 1)
+    bodies, places = graph.scene.bodies, 0
+    stack = [child for _, child in children[GROUND_INDEX]]
     while stack:
-        body = stack.pop()
-        order.append(body)
-        stack.extend(children[body])
-    if len(order) != len(scene.body):
-        return None
-    position = [0] * len(order)
-    for place, body in enumerate(order):
-        position[body] = place
-    links = []
-    for body in order:
-        hinge = scene.hinge[hinge_of[body]]
-        parent = index.get(hinge.inboard_body, GROUND_INDEX)
-        links.append(Link(
-            body, hinge_of[body], GROUND_INDEX if parent == GROUND_INDEX else position[parent],
-            hinge.inboard_end, hinge.outboard_end,
-            tuple(position[c] for c in reversed(children[body])),
-        ))  # fmt: skip
-    return Topology(tuple(links), tuple(position))
+        node = stack.pop()
+        parent, member = holder_of[node]
+        at = GROUND_INDEX if parent == GROUND_INDEX else first[parent] + member
+        runs.append(_run(graph, node, edge_of[node], places, at))
+        first[node] = places
+        places += runs[-1].count
+        stack.extend(child for _, child in children[node])
+    return Topology(tuple(runs)) if places == len(bodies) else None
+
+
+def _run(graph: _Graph, node: int, edge: int, place: int, parent: int) -> Run:
+    scene = graph.scene
+    inboard_end = split(graph.inboard[edge])[1]
+    bodies, hinges = len(scene.body), len(scene.hinge)
+    if node < bodies:
+        outboard_end = scene.hinge[edge].outboard_end
+        return Run(node, edge, 1, place, parent, inboard_end, outboard_end)
+    chain = scene.chain[node - bodies]
+    body, hinge = scene.bodies.starts[node - bodies], scene.hinges.starts[edge - hinges]
+    return Run(body, hinge, chain.count, place, parent, inboard_end, "", chain.held_ends)
 
 
 # --- what is not a tree ---------------------------------------------------------------------------
@@ -118,9 +254,9 @@ def _tree(scene: Scene) -> Topology | None:
 
 @dataclass
 class _Component:
-    """Bodies that hinges connect, walked from one of them without regard to direction.
+    """Nodes that hinges connect, walked from one of them without regard to direction.
 
-    `via[node]` = (node before it, hinge); `closing` are the hinges that close a loop.
+    `via[node]` = (node before it, edge); `closing` are the edges that close a loop.
     """
 
     nodes: list[int]
@@ -131,19 +267,18 @@ class _Component:
 
 def problems(scene: Scene) -> Iterator[Problem]:
     """Places and messages of everything that keeps the hinges from being a tree."""
-    index = {body.name: i for i, body in enumerate(scene.body)}
-    edges: list[list[tuple[int, int, bool]]] = [[] for _ in range(len(scene.body) + 1)]
-    for h, hinge in enumerate(scene.hinge):
-        inboard = index.get(hinge.inboard_body, GROUND_INDEX)
-        outboard = index[hinge.outboard_body]
-        edges[inboard].append((outboard, h, False))
-        edges[outboard].append((inboard, h, True))
+    graph = _Graph(scene)
+    edges: list[list[tuple[int, int, bool]]] = [[] for _ in range(graph.nodes + 1)]
+    for edge, outboard in enumerate(graph.outboard):
+        inboard = graph.holder(edge)[0]
+        edges[inboard].append((outboard, edge, False))
+        edges[outboard].append((inboard, edge, True))
     seen = [False] * len(edges)
-    for start in range(GROUND_INDEX, len(scene.body)):
+    for start in range(GROUND_INDEX, graph.nodes):
         if not seen[start]:
             component = _walk(start, edges, seen)
-            yield from _loops(scene, component)
-            yield from _direction(scene, component, start)
+            yield from _loops(graph, component)
+            yield from _direction(graph, component, start)
 
 
 def _walk(start: int, edges: list[list[tuple[int, int, bool]]], seen: list[bool]) -> _Component:
@@ -153,61 +288,68 @@ def _walk(start: int, edges: list[list[tuple[int, int, bool]]], seen: list[bool]
     queue = deque([start])
     while queue:
         node = queue.popleft()
-        for other, hinge, backwards in edges[node]:
-            if hinge in used:
+        for other, edge, backwards in edges[node]:
+            if edge in used:
                 continue
-            used.add(hinge)
+            used.add(edge)
             if seen[other]:
-                component.closing.append((node, other, hinge))
+                component.closing.append((node, other, edge))
                 continue
             seen[other] = True
-            component.via[other] = (node, hinge)
+            component.via[other] = (node, edge)
             component.nodes.append(other)
             if backwards:
-                component.turned.append(hinge)
+                component.turned.append(edge)
             queue.append(other)
     return component
 
 
-def _loops(scene: Scene, component: _Component) -> Iterator[Problem]:
+def _loops(graph: _Graph, component: _Component) -> Iterator[Problem]:
     """Closed loops, by the hinges on each."""
     for one, other, closing in component.closing:
         ring = sorted({closing, *_path(component, one) ^ _path(component, other)})
-        names = ", ".join(f'"{scene.hinge[h].name}"' for h in ring[:8])
+        names = ", ".join(f'"{graph.edge_name(edge)}"' for edge in ring[:8])
         names += f" and {len(ring) - 8} more" if len(ring) > 8 else ""
         yield (
-            ("hinge", closing),
+            graph.place(closing),
             f"closes a loop of the hinges {names}; closed loops come in a later release, "
             "remove one of them for now",
         )
 
 
 def _path(component: _Component, node: int) -> set[int]:
-    """Hinges between a node and the start of its component."""
-    hinges = set()
+    """Edges between a node and the start of its component."""
+    edges = set()
     while node in component.via:
-        node, hinge = component.via[node]
-        hinges.add(hinge)
-    return hinges
+        node, edge = component.via[node]
+        edges.add(edge)
+    return edges
 
 
-def _direction(scene: Scene, component: _Component, start: int) -> Iterator[Problem]:
+def _direction(graph: _Graph, component: _Component, start: int) -> Iterator[Problem]:
     """Hinges written the wrong way round, or a part that is not held by the ground."""
     if start == GROUND_INDEX:
         if not component.closing:
-            for hinge in component.turned:
-                inboard = scene.hinge[hinge].inboard_body
+            for edge in component.turned:
+                inboard = split(graph.inboard[edge])[0]
                 yield (
-                    ("hinge", hinge),
+                    graph.place(edge),
                     f'points towards the ground: "{inboard}" is already held by another hinge; '
                     "swap inboard and outboard",
                 )
         return
-    names = [scene.body[i].name for i in sorted(component.nodes)]
+    names = [graph.name(i) for i in sorted(component.nodes)]
     more = f" (with {', '.join(names[1:5])}{', ...' if len(names) > 5 else ''})"
     more = more if names[1:] else ""
-    held = {scene.hinge[h].outboard_body for _, h in component.via.values()}
+    held = {graph.name(graph.outboard[edge]) for _, edge in component.via.values()}
     base = next((name for name in names if name not in held), names[0])
+    bodies = len(graph.scene.body)
+    if start >= bodies:
+        yield (
+            ("chain", start - bodies),
+            f'no hinge connects it{more} to the ground; hang it on the ground, inboard = "ground"',
+        )
+        return
     yield (
         ("body", start),
         f'no hinge connects it{more} to the ground; add a hinge of type "free" with '
