@@ -1,12 +1,14 @@
 """The user's kernel store: elements generated from files outside the package, one folder each.
 
 A folder `hinge_knee/` holds the stored element (JSON), its C text and, where a compiler was found,
-a shared library.  Loading reads these files and executes none of the definitions.  Hinges without
-a library are interpreted from their IR.
+an entry with its library (`entry.py`), built and checked as those of the cache are.  Loading reads
+these files and executes none of the definitions.  Hinges without a library are interpreted from
+their IR.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import replace
@@ -15,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import cffi
-import platformdirs
 
 from mstmm import abi
 from mstmm.errors import ElementError, EnvironmentFailure
@@ -24,8 +25,12 @@ from mstmm.spec import ElementSpec
 from mstmm.stored import element_from_json, element_to_json
 from mstmm.tape import compile_tape
 
-from . import prebuilt, toolchain
+from . import prebuilt
+from .build_extension import COMPILE_ARGS
+from .entry import ABOUT, Damaged
+from .library_build import Built, Order, fetched, found, remove
 from .prebuilt import Element
+from .toolchain import TIMEOUT
 
 Key = tuple[str, str]
 
@@ -33,7 +38,11 @@ Key = tuple[str, str]
 def folder() -> Path:
     """The store: $MSTMM_KERNELS, or a folder of the user's."""
     named = os.environ.get("MSTMM_KERNELS")
-    return Path(named) if named else Path(platformdirs.user_data_path("mstmm")) / "kernels"
+    if named:
+        return Path(named)
+    import platformdirs
+
+    return Path(platformdirs.user_data_path("mstmm")) / "kernels"
 
 
 def _place(key: Key) -> Path:
@@ -61,11 +70,8 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
         ) from error
     opened.cache_clear()
     try:
-        library = place / _library(spec)
-        if not library.exists():
-            source = place / f"{spec.kind}_{spec.name}.c"
-            toolchain.build([source], library)
-            _remove_old(place, library)
+        fetched(_library_place(spec), _order(spec), TIMEOUT)
+        _remove_old(place, _library_place(spec))
         return place, f"compiled{replaced}"
     except EnvironmentFailure as error:
         if spec.kind != "hinge":
@@ -84,14 +90,39 @@ def _replaces(place: Path, spec: ElementSpec) -> str:
     return f", replacing another definition of {spec.kind} {spec.name}"
 
 
-def _library(spec: ElementSpec) -> str:
-    return f"{spec.hash()[:16]}-{abi.ABI}{toolchain.library_suffix()}"
+#: Flags of users' kernels: those of the prebuilt ones, with the descriptor in sight.
+_FLAGS = tuple(flag for flag in COMPILE_ARGS if flag != "-fvisibility=hidden")
+
+
+def _library_place(spec: ElementSpec) -> Path:
+    return _place((spec.kind, spec.name)) / f"{spec.hash()[:16]}-{abi.ABI}"
+
+
+def _order(spec: ElementSpec) -> Order:
+    """How the library is made of the texts in the store, now or when it was found damaged."""
+    place = _place((spec.kind, spec.name))
+    decides = " ".join((spec.hash(), str(abi.ABI), *_FLAGS))
+
+    def sources(key: str) -> dict[str, str]:
+        names = ("mstmm.h", f"{spec.kind}_{spec.name}.c")
+        try:
+            return {name: (place / name).read_text(encoding="utf-8") for name in names}
+        except OSError as error:
+            raise EnvironmentFailure(
+                f"{place} lacks its C text ({error.strerror}); generate it again: "
+                "mstmm generate FILE"
+            ) from None
+
+    return Order(
+        f"{spec.kind}_{spec.name}", hashlib.sha256(decides.encode()).hexdigest(), sources,
+        _FLAGS, (abi.element_symbol(spec.kind, spec.name),), "MSTMM_KERNELS",
+    )  # fmt: skip
 
 
 def _remove_old(place: Path, current: Path) -> None:
-    for path in place.glob(f"*{toolchain.library_suffix()}"):
-        if path != current:
-            path.unlink(missing_ok=True)
+    for path in place.glob(f"*/{ABOUT}"):
+        if path.parent != current:
+            remove(path.parent)
 
 
 def specs() -> dict[Key, ElementSpec]:
@@ -130,15 +161,34 @@ def opened(key: Key, content: str) -> Element:
     """The element of the store with this hash, ready to be called."""
     stored = spec(key)
     assert stored is not None and stored.hash() == content
-    library = _place(key) / _library(stored)
-    if library.is_file():
-        return _from_library(stored, library)
+    try:
+        element = _compiled(stored)
+    except EnvironmentFailure:  # damaged, and it cannot be built again
+        if stored.kind != "hinge":
+            raise
+        element = None
+    if element is not None:
+        return element
     if stored.kind == "hinge":
         return _interpreted(stored)
     raise EnvironmentFailure(
         f"{stored.kind} {stored.name!r} is not compiled; install a C compiler and run: "
         "mstmm generate FILE"
     )
+
+
+def _compiled(stored: ElementSpec) -> Element | None:
+    """The element from its library, None if there is none.
+
+    A library that is damaged or does not open (of another machine) is built again from its text.
+    """
+    place, order = _library_place(stored), _order(stored)
+    try:
+        built: Built | None = found(place, order.key)
+        return None if built is None else _from_library(stored, built.path)
+    except (Damaged, EnvironmentFailure):
+        remove(place)
+    return _from_library(stored, fetched(place, order, TIMEOUT).path)
 
 
 def _from_library(stored: ElementSpec, library: Path) -> Element:

@@ -1,71 +1,154 @@
-"""The C compiler: found, asked for its version, and run on generated text.  Nothing else is."""
+"""The C compiler: found, told apart from others, and run on generated text.  Nothing else is."""
 
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
-import subprocess
+import signal
 import sys
-import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mstmm.errors import EnvironmentFailure
 
-from .build_extension import COMPILE_ARGS
-
 #: Seconds after which a compiler is taken for hanging.
-TIMEOUT = 120.0
+TIMEOUT = 300.0
+
+#: What a full disk, a used-up quota and a limit on files are called.
+_NO_ROOM = ("No space left on device", "Disk quota exceeded", "File too large")
+
+#: Variables by which gcc and clang find other headers and libraries.
+_VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
+
+_INSTALL = "install one (apt-get install gcc) or name one by the variable CC"
 
 
-def compiler() -> str | None:
-    """Path of the C compiler: $CC, else gcc, cc or clang; None if there is none."""
-    wanted = os.environ.get("CC")
-    for name in (wanted,) if wanted else ("gcc", "cc", "clang"):
-        found = shutil.which(name)
-        if found:
-            return found
-    return None
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: how it is called, and what tells it from another or an updated one."""
+
+    command: tuple[str, ...]
+    path: str
+    size: int
+    modified: int
+
+    def identity(self) -> dict[str, str]:
+        """All that may change what it makes of a text, without asking it (no process is run)."""
+        set_here = {name: os.environ[name] for name in _VARIABLES if os.environ.get(name)}
+        return {
+            "command": shlex.join(self.command), "path": self.path, "size": str(self.size),
+            "modified": str(self.modified), "libc": _libc(), **set_here,
+        }  # fmt: skip
+
+
+def compiler() -> Compiler:
+    """The compiler: $CC, else gcc, cc or clang.  EnvironmentFailure if there is none."""
+    try:
+        wanted = shlex.split(os.environ.get("CC") or "")
+    except ValueError:
+        raise EnvironmentFailure(f"CC={os.environ['CC']!r} is not a command; {_INSTALL}") from None
+    for words in [wanted] if wanted else [["gcc"], ["cc"], ["clang"]]:
+        program = shutil.which(words[0])
+        if program is not None:
+            return _identified((os.path.abspath(program), *words[1:]))
+    missing = f"CC names {wanted[0]}, which is not there" if wanted else "no gcc, cc or clang"
+    raise EnvironmentFailure(f"no C compiler found ({missing}); {_INSTALL}")
+
+
+def _identified(command: tuple[str, ...]) -> Compiler:
+    path = os.path.realpath(command[0])
+    try:
+        status = os.stat(path)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"the C compiler {path} cannot be looked at ({error.strerror}); {_INSTALL}"
+        ) from None
+    return Compiler(command, path, status.st_size, status.st_mtime_ns)
+
+
+def _libc() -> str:
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION") or "unknown"
+    except (AttributeError, OSError, ValueError):
+        return "unknown"
+
+
+def version(found: Compiler, folder: Path) -> str:
+    """First line of what `--version` answers.  `folder` takes a file for a moment."""
+    from .process import Hanging, head, run
+
+    said = folder / "version.txt"
+    try:
+        code = run([*found.command, "--version"], said, 10.0)
+    except (Hanging, OSError):
+        return "unknown"
+    finally:
+        lines = head(said).splitlines()
+        said.unlink(missing_ok=True)
+    return lines[0].strip() if code == 0 and lines else "unknown"
 
 
 def library_suffix() -> str:
     """Ending of shared libraries on this platform."""
-    return {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+    return ".dylib" if sys.platform == "darwin" else ".so"
 
 
-def build(sources: list[Path], target: Path) -> None:
-    """Compile `sources` into the shared library `target`; nothing is left behind on failure.
+def build(
+    found: Compiler, sources: Sequence[Path], target: Path, flags: Sequence[str], timeout: float
+) -> float:
+    """Compile `sources`, all in one folder, into the shared library `target`; returns seconds.
 
-    The library is built beside the target and renamed, so that no reader sees half a file.
-    Raises EnvironmentFailure with the compiler's first lines if it fails, hangs or is missing.
+    Everything the compiler writes, its temporary files too, lies in that folder: whoever removes
+    it leaves nothing behind.  Raises EnvironmentFailure, one line, if the compiler cannot be run,
+    fails, is killed, does not end within `timeout` s, or leaves no library.
     """
-    program = compiler()
-    if program is None:
-        raise EnvironmentFailure(
-            "no C compiler found (gcc, cc, clang, or the one named by CC); install one, "
-            "for example: apt-get install gcc"
-        )
-    handle, temporary = tempfile.mkstemp(suffix=library_suffix(), dir=target.parent)
-    os.close(handle)
-    flags = [flag for flag in COMPILE_ARGS if flag != "-fvisibility=hidden"]
-    command = [program, *flags, "-fPIC", "-shared", *map(str, sources), "-lm", "-o", temporary]
+    from .process import Hanging, head, run
+
+    folder = sources[0].parent
+    said = folder / "compiler.txt"
+    command = [*found.command, *flags, "-fPIC", "-shared", *map(str, sources), "-lm"]
+    begin = time.perf_counter()
     try:
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
-        if done.returncode != 0:
-            first = (
-                "\n".join(done.stderr.strip().splitlines()[:5]) or f"exit code {done.returncode}"
-            )
-            raise EnvironmentFailure(f"{program} could not compile {sources[0].name}: {first}")
-        os.replace(temporary, target)
-    except subprocess.TimeoutExpired:
-        raise EnvironmentFailure(f"{program} did not finish within {TIMEOUT:g} s") from None
+        code = run([*command, "-o", str(target)], said, timeout, TMPDIR=str(folder))
+    except Hanging:
+        raise EnvironmentFailure(
+            f"the C compiler {found.command[0]} did not finish within {timeout:g} s and was "
+            "stopped; see mstmm doctor"
+        ) from None
     except OSError as error:
-        raise EnvironmentFailure(f"{program} could not be run: {error}") from error
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+        raise EnvironmentFailure(
+            f"the C compiler {found.command[0]} could not be run ({error.strerror}); "
+            "see mstmm doctor"
+        ) from None
+    if code != 0:
+        raise EnvironmentFailure(_reason(found, code, head(said), sources[0].name))
+    if not target.is_file() or target.stat().st_size == 0:
+        raise EnvironmentFailure(
+            f"the C compiler {found.command[0]} reported success and left no library; "
+            "see mstmm doctor"
+        )
+    return time.perf_counter() - begin
+
+
+def _reason(found: Compiler, code: int, said: str, source: str) -> str:
+    """One line on why a compiler failed."""
+    program = found.command[0]
+    if any(text in said for text in _NO_ROOM) or code == -signal.SIGXFSZ:
+        return (
+            f"the C compiler {program} found no room on the disk; make room, or take another "
+            "folder (MSTMM_CACHE; of own elements MSTMM_KERNELS)"
+        )
+    if code < 0:
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+        hint = " (too little memory?)" if -code == signal.SIGKILL else ""
+        return f"the C compiler {program} was killed by {name}{hint}; see mstmm doctor"
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    first = next((line for line in lines if "error" in line), lines[-1] if lines else "no message")
+    shown = "".join(c if c.isprintable() else " " for c in first)[:300]
+    return (
+        f"the C compiler {program} could not compile {source} (exit code {code}: {shown}); "
+        "see mstmm doctor"
+    )

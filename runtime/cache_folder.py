@@ -1,0 +1,74 @@
+"""Where compiled libraries are kept, and why nobody else can put one there.
+
+What lies in this folder is loaded into the process.  So the folder belongs to the user who runs it
+and nobody else may write to it; anything else is refused, with the way out.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from mstmm.errors import EnvironmentFailure
+
+VARIABLE = "MSTMM_CACHE"
+
+_WAY_OUT = f"set {VARIABLE} to a folder of your own"
+
+
+def folder() -> Path:
+    """The cache: $MSTMM_CACHE, or the user's cache folder.  EnvironmentFailure without a home."""
+    named = os.environ.get(VARIABLE)
+    if named:
+        return Path(named).absolute()
+    import platformdirs
+
+    place = Path(platformdirs.user_cache_path("mstmm"))
+    if not place.is_absolute():  # no home folder: "~/.cache" would land where we happen to be
+        raise EnvironmentFailure(f"this user has no home folder for a cache; {_WAY_OUT}")
+    return place
+
+
+def private_folder() -> Path:
+    """The cache, made if it is missing (0700), and checked.
+
+    Raises EnvironmentFailure if it cannot be made, is not ours, or others may write to it.
+    """
+    place = folder()
+    try:
+        status = _status(place)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"the cache folder {place} cannot be used ({error.strerror}); {_WAY_OUT}"
+        ) from None
+    problem = objection(place, status)
+    if problem:
+        raise EnvironmentFailure(problem)
+    return place
+
+
+def _status(place: Path) -> os.stat_result:
+    try:
+        return os.stat(place)
+    except FileNotFoundError:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.mkdir(mode=0o700, exist_ok=True)
+        return os.stat(place)
+
+
+def objection(place: Path, status: os.stat_result) -> str:
+    """Why a folder is no place for libraries; "" if it is one."""
+    if not stat.S_ISDIR(status.st_mode):
+        return f"the cache {place} is not a folder; {_WAY_OUT}"
+    if status.st_uid != os.geteuid():
+        return (
+            f"the cache folder {place} belongs to user {status.st_uid}, you are user "
+            f"{os.geteuid()}: what it holds could be anybody's; {_WAY_OUT}"
+        )
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return (
+            f"others may write to the cache folder {place} (mode "
+            f"{stat.S_IMODE(status.st_mode):04o}); chmod 700 it after a look, or {_WAY_OUT}"
+        )
+    return ""

@@ -1,0 +1,108 @@
+"""One compiled library on disk: a folder with the library, its description and its C text.
+
+    fused-0123456789abcdef.../
+        fused.so        the library
+        entry.json      key, SHA-256 of the library, what it was made of and by which compiler
+        fused.c.gz      the text, to look at; nothing reads it
+
+The folder appears by one rename when all of it is written, so half an entry cannot be met; what
+was cut or changed afterwards is found by the checksum before anything is loaded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+#: Layout of the folder; an entry of another layout is built again.
+FORMAT = 1
+
+ABOUT = "entry.json"
+
+
+class Damaged(Exception):
+    """An entry that is not what its description says; the text says how, in a few words."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A library whose checksum was right when it was read, and its description."""
+
+    folder: Path
+    about: dict[str, Any]
+
+    @property
+    def library(self) -> Path:
+        return self.folder / str(self.about["library"])
+
+
+def read(folder: Path, key: str | None = None) -> Entry | None:
+    """The entry in `folder`, None if there is none.
+
+    Raises Damaged if it is not whole, or if it is not the entry of `key` (where that is given).
+    """
+    about = _described(folder)
+    if about is None:
+        return None
+    if key is not None and about["key"] != key:
+        raise Damaged("it belongs to another scene or compiler")
+    entry = Entry(folder, about)
+    try:
+        content = entry.library.read_bytes()
+    except OSError as error:
+        raise Damaged(f"its library cannot be read ({error.strerror})") from None
+    if len(content) != about["bytes"]:
+        raise Damaged(f"its library has {len(content)} bytes of {about['bytes']}")
+    if hashlib.sha256(content).hexdigest() != about["sha256"]:
+        raise Damaged("the checksum of its library is wrong")
+    return entry
+
+
+def _described(folder: Path) -> dict[str, Any] | None:
+    try:
+        about = json.loads((folder / ABOUT).read_bytes())
+    except FileNotFoundError:
+        if folder.is_dir():
+            raise Damaged("its description is missing") from None
+        return None
+    except (OSError, ValueError):
+        raise Damaged("its description cannot be read") from None
+    expected = {"format": int, "key": str, "library": str, "bytes": int, "sha256": str}
+    if not isinstance(about, dict) or about.get("format") != FORMAT:
+        raise Damaged("it has another layout")
+    if any(not isinstance(about.get(name), kind) for name, kind in expected.items()):
+        raise Damaged("its description is incomplete")
+    if Path(about["library"]).name != about["library"]:
+        raise Damaged("its description names a file elsewhere")
+    return about
+
+
+def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
+    """Describe the library that lies in `folder`.  Raises OSError."""
+    content = (folder / library).read_bytes()
+    described = {
+        "format": FORMAT, "library": library, "bytes": len(content),
+        "sha256": hashlib.sha256(content).hexdigest(), **about,
+    }  # fmt: skip
+    (folder / ABOUT).write_text(json.dumps(described, indent=1), encoding="utf-8")
+    return Entry(folder, described)
+
+
+def keep_text(folder: Path, sources: Mapping[str, str]) -> None:
+    """Leave the C text, compressed.  Raises OSError."""
+    for name, text in sources.items():
+        packed = gzip.compress(text.encode(), compresslevel=3, mtime=0)
+        (folder / f"{name}.gz").write_bytes(packed)
+
+
+def used(entry: Entry) -> None:
+    """Note that the entry was used now: the least recently used ones are removed first."""
+    with contextlib.suppress(OSError):  # a cache that can only be read serves just as well
+        os.utime(entry.folder / ABOUT)

@@ -1,0 +1,98 @@
+"""A lock between processes, by the operating system: it ends with its owner, however that ends.
+
+It saves work and never guards correctness: what is built goes into a folder of its own and is
+renamed when it is whole.  So whoever waits too long, or meets a file system without locks, builds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+#: Pause between two tries, s.
+_PAUSE = 0.02
+
+_HELD = (errno.EAGAIN, errno.EACCES)
+
+
+@contextlib.contextmanager
+def locked(path: Path, timeout: float) -> Iterator[str]:
+    """Hold the lock file `path`; waits at most `timeout` s for its owner.
+
+    Yields "", or a remark on why the lock is not held.  The file says who holds it.
+    """
+    handle, remark = _acquired(path, timeout)
+    try:
+        yield remark
+    finally:
+        if handle is not None:
+            with contextlib.suppress(OSError):
+                os.ftruncate(handle, 0)
+            os.close(handle)
+
+
+@contextlib.contextmanager
+def held_by_nobody(path: Path) -> Iterator[bool]:
+    """True, with the lock held, if nobody holds it (or the file is not there)."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+    except FileNotFoundError:
+        yield True
+        return
+    except OSError:
+        yield False
+        return
+    try:
+        yield _try(handle) is True
+    finally:
+        os.close(handle)
+
+
+def _acquired(path: Path, timeout: float) -> tuple[int | None, str]:
+    deadline = time.monotonic() + timeout
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        got = _try(handle)
+        if got and os.fstat(handle).st_nlink > 0:  # else: somebody tidied the file away meanwhile
+            _sign(handle)
+            return handle, ""
+        owner = "" if got else _owner(handle)
+        os.close(handle)
+        if got is None:
+            return None, "this file system has no locks"
+        if time.monotonic() >= deadline:
+            return None, f"{owner} held its lock for more than {timeout:g} s"
+        if not got:
+            time.sleep(_PAUSE)
+
+
+def _try(handle: int) -> bool | None:
+    """True if the lock is ours now, False if another's, None where there are no locks."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return False if error.errno in _HELD else None
+    return True
+
+
+def _sign(handle: int) -> None:
+    """Leave who we are, for the message of those who wait; a full disk does not matter."""
+    since = time.strftime("%Y-%m-%d %H:%M:%S")
+    text = json.dumps({"pid": os.getpid(), "host": os.uname().nodename, "since": since})
+    with contextlib.suppress(OSError):
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, text.encode(), 0)
+
+
+def _owner(handle: int) -> str:
+    try:
+        said = json.loads(os.pread(handle, 1000, 0))
+        return f"process {said['pid']} on {said['host']} (since {said['since']})"
+    except (OSError, ValueError, TypeError, KeyError):
+        return "another process"
