@@ -1,9 +1,14 @@
-"""Rotations as plain numbers: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.  No numpy."""
+"""Rotations as plain numbers: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.  No numpy.
+
+Every function but `to_quaternion` takes Duals for floats: their slopes are exact.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+
+from .dual import chained, fsum, hypot, moving, real, value_of
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -14,7 +19,7 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 def norm(v: Sequence[float]) -> float:
     """Euclidean length without overflow or underflow of the squares."""
-    return math.hypot(*v)
+    return hypot(v)
 
 
 def unit(v: Sequence[float]) -> tuple[float, ...]:
@@ -23,6 +28,8 @@ def unit(v: Sequence[float]) -> tuple[float, ...]:
 
     Raises ValueError for a vector without direction.
     """
+    if moving(v):
+        return _moving_unit(v)
     largest = max(abs(x) for x in v)
     if largest == 0 or not all(math.isfinite(x) for x in v):
         raise ValueError("a vector without direction")
@@ -36,6 +43,16 @@ def unit(v: Sequence[float]) -> tuple[float, ...]:
     return tuple(x / length for x in scaled)
 
 
+def _moving_unit(v: Sequence[float]) -> tuple[float, ...]:
+    """d(v/|v|) = (1 - n n^T) dv / |v|, where v has unit length to rounding as well."""
+    values = [value_of(x) for x in v]
+    n, length = unit(values), norm(values)
+    return tuple(
+        chained(n[i], [(v[j], ((i == j) - n[i] * n[j]) / length) for j in range(len(v))])
+        for i in range(len(v))
+    )
+
+
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
@@ -43,12 +60,12 @@ def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
 
 def dot(a: Sequence[float], b: Sequence[float]) -> float:
     """Scalar product, rounded once."""
-    return math.fsum(x * y for x, y in zip(a, b, strict=True))
+    return fsum([x * y for x, y in zip(a, b, strict=True)])
 
 
 def rows(matrix: Sequence[Sequence[float]]) -> Matrix:
     """The matrix as nested tuples."""
-    a, b, c = (tuple(float(x) for x in row) for row in matrix)
+    a, b, c = (tuple(real(x) for x in row) for row in matrix)
     return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))
 
 
@@ -81,6 +98,9 @@ def from_quaternion(q: Sequence[float]) -> Matrix:
 
 def _cos_sin(angle: float) -> tuple[float, float]:
     """cos and sin, exact where the angle is the double nearest to a multiple of pi/2."""
+    if moving([angle]):
+        c, s = _cos_sin(value_of(angle))
+        return chained(c, [(angle, -s)]), chained(s, [(angle, c)])
     quarter = round(angle / (math.pi / 2)) if abs(angle) < 1e6 else 0
     if quarter != 0 and angle == quarter * (math.pi / 2):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]

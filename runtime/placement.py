@@ -7,9 +7,9 @@ its elimination leaves exact zeros.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from mstmm.dual import atan2
 from mstmm.rotations import (
     IDENTITY,
     Matrix,
@@ -71,7 +71,7 @@ def alignment(hinge: Hinge) -> tuple[Matrix, Matrix, tuple[float, ...]]:
         normal = cross(axis, second)
         size = norm(normal)
         x = (normal[0] / size, normal[1] / size, normal[2] / size)
-        return _frame(axis, x), _frame(second, x), (math.atan2(size, dot(axis, second)),)
+        return _frame(axis, x), _frame(second, x), (atan2(size, dot(axis, second)),)
     if hinge.type in ("ball", "free", "elastic", "gimbal", "fixed"):
         return IDENTITY, IDENTITY, ()
     aligned = _about(axis, hinge.unit_axis2 if hinge.type == "planar" else None)

@@ -1,0 +1,167 @@
+"""Numbers that carry their derivatives: exact slopes of the arithmetic from a scene to its kernels.
+
+The code that turns the numbers of a scene into those of its kernels (frames, mass moments, axes)
+runs unchanged on Dual numbers.  Values are computed by the same operations in the same order, so
+they are bit for bit those of plain floats.
+
+A Dual that enters a C array travels as a marker, a double of about 2^1000 that stands for its entry
+in a list of marks; whoever reads the array back resolves it (`Marks.resolve`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+#: Slopes by number of the parameter; those that are exactly zero are left out.
+Slopes = Mapping[int, float]
+
+_EXPONENT, _STEP = 1000, 2.0**-52
+
+
+class Marks:
+    """The Duals that have entered C arrays, in order."""
+
+    def __init__(self) -> None:
+        self._entered: list[Dual] = []
+
+    def enter(self, number: Dual) -> float:
+        """The marker that stands for `number`."""
+        self._entered.append(number)
+        return math.ldexp(1 + (len(self._entered) - 1) * _STEP, _EXPONENT)
+
+    def resolve(self, number: float) -> float | Dual:
+        """What the number read from an array stands for: itself, if it is no marker."""
+        fraction = math.ldexp(number, -_EXPONENT) - 1
+        if not 0 <= fraction < len(self._entered) * _STEP:
+            return number
+        return self._entered[round(fraction / _STEP)]
+
+
+class Dual:
+    """value, and slope[k] = d value / d parameter k.
+
+    Ordered by value; equal to a float only where every slope is zero, so that a zero that moves is
+    no structural zero.
+    """
+
+    __slots__ = ("marks", "slope", "value")
+
+    def __init__(self, value: float, slope: Slopes, marks: Marks) -> None:
+        self.value, self.marks = value, marks
+        self.slope = {k: s for k, s in slope.items() if s != 0}
+
+    def __float__(self) -> float:
+        return self.marks.enter(self) if self.slope else self.value
+
+    def __bool__(self) -> bool:
+        return bool(self.slope) or self.value != 0
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Dual):
+            return self.value == other.value and self.slope == other.slope
+        return not self.slope and self.value == other
+
+    def __hash__(self) -> int:
+        return hash(self.value)
+
+    def __lt__(self, other: Any) -> bool:
+        return self.value < value_of(other)
+
+    def __le__(self, other: Any) -> bool:
+        return self.value <= value_of(other)
+
+    def __gt__(self, other: Any) -> bool:
+        return self.value > value_of(other)
+
+    def __ge__(self, other: Any) -> bool:
+        return self.value >= value_of(other)
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, {k: -s for k, s in self.slope.items()}, self.marks)
+
+    def __abs__(self) -> Dual:
+        return -self if math.copysign(1.0, self.value) < 0 else self
+
+    def __add__(self, other: Any) -> Any:
+        return chained(self.value + value_of(other), [(self, 1.0), (other, 1.0)])
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return chained(self.value - value_of(other), [(self, 1.0), (other, -1.0)])
+
+    def __rsub__(self, other: float) -> Any:
+        return chained(other - self.value, [(self, -1.0)])
+
+    def __mul__(self, other: Any) -> Any:
+        factor = value_of(other)
+        return chained(self.value * factor, [(self, factor), (other, self.value)])
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        divisor = value_of(other)
+        ratio = self.value / divisor
+        return chained(ratio, [(self, 1 / divisor), (other, -ratio / divisor)])
+
+    def __rtruediv__(self, other: float) -> Any:
+        ratio = other / self.value
+        return chained(ratio, [(self, -ratio / self.value)])
+
+
+# Below, numbers are typed as floats: a Dual stands in for one wherever scene numbers go.
+
+
+def value_of(number: Any) -> float:
+    """The number itself, as a float."""
+    return number.value if isinstance(number, Dual) else float(number)
+
+
+def real(number: Any) -> float:
+    """A float; a Dual stays what it is."""
+    kept: Any = number
+    return kept if isinstance(number, Dual) else float(number)
+
+
+def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
+    """`value` whose derivative with respect to each number is given; a float where none moves."""
+    slope: dict[int, float] = {}
+    marks = None
+    for number, partial in partials:
+        if isinstance(number, Dual):
+            marks = number.marks
+            for k, s in number.slope.items():
+                slope[k] = slope.get(k, 0.0) + partial * s
+    return value if marks is None else Dual(value, slope, marks)
+
+
+def moving(numbers: Iterable[object]) -> bool:
+    """Whether any of the numbers is a Dual."""
+    return any(isinstance(number, Dual) for number in numbers)
+
+
+def hypot(v: Sequence[float]) -> float:
+    """Euclidean length without overflow or underflow of the squares."""
+    if not moving(v):
+        return math.hypot(*v)
+    length = math.hypot(*map(value_of, v))
+    partials = [(x, value_of(x) / length if length else 0.0) for x in v]
+    return chained(length, partials)
+
+
+def fsum(numbers: Sequence[float]) -> float:
+    """Sum, rounded once."""
+    if not moving(numbers):
+        return math.fsum(numbers)
+    total = math.fsum(map(value_of, numbers))
+    return chained(total, [(x, 1.0) for x in numbers])
+
+
+def atan2(y: float, x: float) -> float:
+    """Angle of the point (x, y), rad."""
+    a, b = value_of(y), value_of(x)
+    square = a * a + b * b
+    partials = [(y, b / square), (x, -a / square)]
+    return chained(math.atan2(a, b), partials)
