@@ -5,12 +5,17 @@ from __future__ import annotations
 import importlib.util
 import os
 import secrets
+import tempfile
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# Libraries that the tests compile: nothing of the user's cache is read or changed.
+CACHE = tempfile.TemporaryDirectory(prefix="mstmm-cache-")
+os.environ.setdefault("MSTMM_CACHE", CACHE.name)
 
 # Drawn afresh for each run and printed at its head; MSTMM_TEST_SEED=<it> repeats the run.
 SEED = int(os.environ.get("MSTMM_TEST_SEED") or secrets.randbelow(2**32))
@@ -23,6 +28,10 @@ settings.load_profile("mstmm")
 # The comparisons with other programs need those programs, which live in an environment of their
 # own (CONTRIBUTING.md, "Tests"); there `pytest tests/peers` runs them.
 collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["peers"]
+
+
+def pytest_unconfigure() -> None:
+    CACHE.cleanup()
 
 
 def pytest_report_header() -> str:
