@@ -6,8 +6,10 @@ from typing import Annotated
 
 import typer
 
+from .cache import cache
 from .check import check
 from .demo import demo
+from .doctor import doctor
 from .generate import generate
 from .listing import list_elements
 from .show import show
@@ -55,3 +57,5 @@ app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)
 app.command("generate")(generate)
+app.command("cache")(cache)
+app.command("doctor")(doctor)

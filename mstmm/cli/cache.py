@@ -1,0 +1,122 @@
+"""`mstmm cache`: what is compiled and kept, is it whole, and away with it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .guard import ENVIRONMENT
+from .options import Json, not_negative, quoted
+
+if TYPE_CHECKING:
+    from mstmm.runtime.cache_upkeep import Listed
+
+ACTIONS = ("list", "verify", "clean")
+
+_DAY = 86400.0
+
+
+def cache(
+    action: Annotated[
+        str,
+        typer.Argument(
+            metavar="[list|verify|clean]",
+            help="list what is kept; verify its checksums; clean: remove it.",
+        ),
+    ] = "list",
+    unused: Annotated[
+        float,
+        typer.Option(
+            "--unused",
+            metavar="DAYS",
+            parser=not_negative,
+            help="clean: only what was not used for so many days.",
+        ),
+    ] = 0.0,
+    json: Json = False,
+) -> None:
+    """List, verify or remove the compiled libraries of fused scenes."""
+    if action not in ACTIONS:
+        raise typer.BadParameter(f"{quoted(action)}: expected {', '.join(ACTIONS)}")
+    if unused and action != "clean":
+        raise typer.BadParameter("--unused goes with clean")
+    from mstmm.runtime.cache_folder import private_folder
+
+    folder = private_folder()
+    if action == "clean":
+        _clean(folder, unused, json)
+    else:
+        _list(folder, json, verify=action == "verify")
+
+
+def _list(folder: Path, json: bool, verify: bool) -> None:
+    from mstmm.runtime.cache_upkeep import limit, listed, unfinished
+
+    from . import output
+
+    entries, cut_off = listed(folder), unfinished(folder)
+    damaged = [entry for entry in entries if entry.problem]
+    size = sum(entry.bytes for entry in entries)
+    if json:
+        output.emit_json({
+            "ok": not damaged, "folder": str(folder), "bytes": size, "limit": limit(),
+            "unfinished": cut_off, "entries": [_plain(entry) for entry in entries],
+        })  # fmt: skip
+    else:
+        if not verify and entries:
+            columns = ("library", "kB>", "last used", "compiled in s>", "compiler", "state")
+            output.console().print(output.table("", columns, map(_row, entries)))
+        _sum_up(folder, entries, size, limit(), cut_off)
+        for entry in damaged:
+            output.complain(
+                f"{entry.folder.name} is damaged: {entry.problem}; it is built again when it is "
+                "used, mstmm cache clean removes it"
+            )
+    if verify and damaged:
+        raise typer.Exit(ENVIRONMENT)
+
+
+def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off: int) -> None:
+    from . import output
+    from .report import count
+
+    whole = sum(1 for entry in entries if not entry.problem)
+    output.say(output.printable(
+        f"{folder}: {count(len(entries), 'library', 'libraries')}, {whole} whole; "
+        f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
+    ))  # fmt: skip
+    if cut_off:
+        output.say(f"{count(cut_off, 'build', 'builds')} under way or cut off")
+
+
+def _clean(folder: Path, unused: float, json: bool) -> None:
+    from mstmm.runtime.cache_upkeep import clean
+
+    from . import output
+    from .report import count
+
+    removed, size = clean(folder, unused * _DAY)
+    if json:
+        output.emit_json({"ok": True, "folder": str(folder), "removed": removed, "bytes": size})
+    else:
+        output.say(output.printable(
+            f"{folder}: removed {count(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
+        ))  # fmt: skip
+
+
+def _row(entry: Listed) -> tuple[str, ...]:
+    when = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.used))
+    return (
+        entry.folder.name, f"{entry.bytes / 1e3:.0f}", when, str(entry.about.get("seconds", "")),
+        str(entry.about.get("compiler_version", "")), entry.problem or "whole",
+    )  # fmt: skip
+
+
+def _plain(entry: Listed) -> dict[str, Any]:
+    return {
+        "name": entry.folder.name, "bytes": entry.bytes, "last_used": entry.used,
+        "problem": entry.problem, **entry.about,
+    }  # fmt: skip

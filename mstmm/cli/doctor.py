@@ -1,0 +1,37 @@
+"""`mstmm doctor`: has this machine what mstmm needs, and does it compute the right numbers?"""
+
+from __future__ import annotations
+
+import typer
+
+from .guard import ENVIRONMENT
+from .options import Json
+
+
+def doctor(json: Json = False) -> None:
+    """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
+    from mstmm.runtime import doctor as examination
+
+    from . import output
+
+    findings = examination.examine()
+    problems = [finding for finding in findings if not finding.ok]
+    if json:
+        plain = [vars(finding) for finding in findings]
+        report = {"ok": not problems, "interpreter": examination.summary(), "findings": plain}
+        output.emit_json(report)
+    else:
+        output.say(output.printable(examination.summary()))
+        width = max(len(finding.subject) for finding in findings)
+        for finding in findings:
+            mark = "ok     " if finding.ok else "PROBLEM"
+            output.say(output.printable(f"{mark}  {finding.subject:<{width}}  {finding.text}"))
+        output.say(_verdict(len(problems)))
+    if problems:
+        raise typer.Exit(ENVIRONMENT)
+
+
+def _verdict(problems: int) -> str:
+    if not problems:
+        return "All is well."
+    return f"{problems} problem{'s' if problems > 1 else ''}; each line says what to do."
