@@ -3,7 +3,8 @@
 The sweep across a hinge is an elimination in the hinge's own axes followed by a transport.  Where
 the transport is done in stages (axial screws), the elimination stands alone:
 
-    U = S H,  D = H^T U + J,  G = D^-1 U^T,  g = D^-1 (tau - H^T e),  S_Q = S - U G,  e_Q = e + U g
+    U = S H,  D = H^T U + J,  G = D^-1 U^T,  g = D^-1 (tau - H^T e)
+    S_Q = S - U G,  e_Q = e + G^T (tau - H^T e)
 
 Along a unit direction of H without rotor inertia J three things hold identically and are declared
 instead of computed: the row and column of S_Q vanish, e_Q there is the effort tau, and the column
@@ -56,13 +57,18 @@ def eliminate(
         Equation("diagonal of D", pivots.symbol, _diagonal(pivot)),
         Equation("D^-1 U^T", full, Solve(pivot, push.T, symmetric=True)),
         Equation("G, with G H = 1", gain.symbol, _with_unit_columns(full, units)),
+        Equation("surplus effort", _symbol("surplus", nu), tau.symbol - h.T * E.symbol),
         Equation(
             "g = D^-1 (tau - H^T e)",
             offset.symbol,
-            Solve(pivot, tau.symbol - h.T * E.symbol, symmetric=True),
+            Solve(pivot, _symbol("surplus", nu), symmetric=True),
         ),
         Equation("S_Q = S - U G", REDUCED_S.symbol, S.symbol - push * gain.symbol, zeros=zeros),
-        Equation("e + U g", _symbol("e_full", 6), E.symbol + push * offset.symbol),
+        Equation(
+            "e + G^T (tau - H^T e)",
+            _symbol("e_full", 6),
+            E.symbol + gain.symbol.T * _symbol("surplus", nu),
+        ),
         Equation("e_Q", REDUCED_E.symbol, _replace_rows(_symbol("e_full", 6), tau.symbol, units)),
     )
     given = inputs if subspace is not None else (h_given, rotor)

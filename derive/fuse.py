@@ -14,10 +14,12 @@ from fractions import Fraction
 from mstmm.errors import ElementError
 from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR, Port
-from mstmm.structure import BodyStructure, Entries, Key, Structure
+from mstmm.structure import BodyStructure, Entries, ExpressionStructure, Key, Structure
 
+from .balance import balance
 from .fused_loads import LoadPass
 from .inline import Inliner, Nodes
+from .schedule import schedule
 from .transport import Stage, stages_of
 
 #: (element, kernel name) -> its IR.
@@ -27,6 +29,8 @@ Kernels = Callable[[Key, str], KernelIR]
 UNDETERMINED, HINGE = 1, 4
 #: A pivot must exceed this share of the mean inertia of the body it moves.
 PIVOT_FLOOR = Fraction(1, 10**14)
+#: Operations that the order of the statements assumes to start in one cycle; measured.
+WIDTH = 4
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class BodyNodes:
 
 
 def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None) -> Fused:
-    """Kernels "accelerations" and "accelerations_power" of a scene.
+    """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads.
 
     Inputs p, t, q, u, memory, efforts; outputs qdot, udot, and with power the power of everything
     that is not stored and the potential of springs and laws.  With `numbers` the parameters are
@@ -96,6 +100,15 @@ class _Fusion:
         if self.numbers is not None:
             return self.graph.constant(self.numbers[entry])
         return self.graph.element("p", entry)
+
+    def expression(self, found: ExpressionStructure, **more: Sequence[Node]) -> Nodes:
+        """Values of expressions of the scene."""
+        given: dict[str, Sequence[Node]] = {
+            "t": [self.t], "q": self.q, "u": self.u, "constants": self.entries(found.constants),
+        }  # fmt: skip
+        given |= more
+        inputs = {port.name: given[port.name] for port in found.kernel.inputs}
+        return next(iter(self.inline.run(found.kernel, inputs).values()))
 
     def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
         """A step of the sweep for any hinge with `nu` speeds."""
@@ -145,8 +158,7 @@ class _Fusion:
         """Driven coordinates and speeds filled in; prescribed accelerations by (body, speed)."""
         if self.structure.drives is None:
             return {}
-        values = self.inline.run(self.structure.drives, {"t": [self.t]})
-        flat = next(iter(values.values()))
+        flat = self.expression(self.structure.drives)
         imposed = {}
         for k, (index, speed) in enumerate(self.structure.driven):
             body = self.structure.bodies[index]
@@ -290,13 +302,13 @@ class _Fusion:
         sums = [Port("power", (1,)), Port("potential", (1,))]
         values: dict[str, object] = {"qdot": qdot, "udot": udot}
         power: dict[str, object] = {"power": [self.power], "potential": [self.potential]}
-        kernel = self.graph.kernel
+        found = [self.graph.kernel("accelerations", inputs, outputs, values)]
+        if s.laws or s.driven or s.loads or s.forces:
+            wide = self.graph.kernel(
+                "accelerations_power", inputs, [*outputs, *sums], values | power
+            )
+            found.append(wide)
         return Fused(
-            {
-                "accelerations": kernel("accelerations", inputs, outputs, values),
-                "accelerations_power": kernel(
-                    "accelerations_power", inputs, [*outputs, *sums], values | power
-                ),
-            },
+            {kernel.name: schedule(balance(kernel), WIDTH) for kernel in found},
             tuple(self.failures),
         )

@@ -43,8 +43,7 @@ class LoadPass:
         for effort, speed in zip(f.efforts, f.u, strict=True):
             f.power = f.power + effort * speed
         if f.structure.values is not None:
-            inputs = {"t": [f.t], "q": f.q, "u": f.u}
-            self.values = next(iter(f.inline.run(f.structure.values, inputs).values()))
+            self.values = f.expression(f.structure.values)
         for law in f.structure.laws:
             self._law(law)
         for load in f.structure.loads:
@@ -158,8 +157,7 @@ class LoadPass:
         if force.effort is not None:
             moves = {name: ends[name] for name in ("x_F", "v_F", "x_T", "v_T")}
             length = f.frames("length", **moves)["l"]
-            inputs = {"t": [f.t], "q": f.q, "u": f.u, "length": length}
-            effort = next(iter(f.inline.run(force.effort, inputs).values()))
+            effort = f.expression(force.effort, length=length)
         found = f.inline.run(
             f.kernels(force.element, "wrench"),
             {"p": f.entries(force.p), "t": [f.t], "effort": effort, **ends},

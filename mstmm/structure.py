@@ -21,6 +21,14 @@ Key = tuple[str, str]
 
 
 @dataclass(frozen=True)
+class ExpressionStructure:
+    """Expressions of the scene; their numbers are read from the kernel's input "constants"."""
+
+    kernel: KernelIR
+    constants: Entries
+
+
+@dataclass(frozen=True)
 class BodyStructure:
     """One body with its inboard hinge, in the engine's internal frames.
 
@@ -82,7 +90,7 @@ class ForceStructure:
     offset_f: Entries
     offset_t: Entries
     p: Entries
-    effort: KernelIR | None
+    effort: ExpressionStructure | None
 
 
 @dataclass(frozen=True)
@@ -99,8 +107,8 @@ class Structure:
     laws: tuple[LawStructure, ...] = ()
     loads: tuple[LoadStructure, ...] = ()
     forces: tuple[ForceStructure, ...] = ()
-    values: KernelIR | None = None
-    drives: KernelIR | None = None
+    values: ExpressionStructure | None = None
+    drives: ExpressionStructure | None = None
     driven: tuple[tuple[int, int], ...] = ()
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
 

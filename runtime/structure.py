@@ -8,10 +8,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.ir import (
+    Assign,
+    Constant,
+    KernelIR,
+    Operand,
+    Port,
+    Statement,
+    Store,
+)
+from mstmm.ir import (
+    Element as ArrayEntry,
+)
 from mstmm.structure import (
     BodyStructure,
     Entries,
     Entry,
+    ExpressionStructure,
     ForceStructure,
     Key,
     LawStructure,
@@ -25,6 +38,8 @@ from .prebuilt import Element
 
 #: Numbers behind the parameters of a user's body: internal frame in its own (rotation, origin).
 _USER_FRAME = 12
+#: Numbers of expressions that decide which terms there are.
+_STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
 
 
 class _Reader:
@@ -60,6 +75,35 @@ class _Reader:
     def _entry(self, value: float, axes: bool) -> Entry:
         if value == 0.0 or (axes and abs(value) == 1.0):
             return value + 0.0  # -0.0 and 0.0 are one structure
+        return self._place(value)
+
+    def expression(self, name: str) -> ExpressionStructure | None:
+        """Expressions of the scene with their numbers taken out; None if there are none."""
+        kernel = self.packed.expressions.get(name)
+        if kernel is None:
+            return None
+        texts: list[str] = []
+
+        def taken(operand: Operand) -> Operand:
+            if not isinstance(operand, Constant) or operand.text in _STRUCTURAL:
+                return operand
+            texts.append(operand.text)
+            return ArrayEntry("constants", (len(texts) - 1,))
+
+        statements: list[Statement] = []
+        for statement in kernel.statements:
+            if isinstance(statement, Assign):
+                arguments = tuple(map(taken, statement.args))
+                statements.append(Assign(statement.number, statement.op, arguments))
+            elif isinstance(statement, Store):
+                statements.append(Store(statement.port, statement.index, taken(statement.value)))
+            else:
+                statements.append(statement)
+        inputs = (*kernel.inputs, Port("constants", (len(texts),)))
+        ir = KernelIR(kernel.name, inputs, kernel.outputs, tuple(statements))
+        return ExpressionStructure(ir, tuple(self._place(Constant(x).number) for x in texts))
+
+    def _place(self, value: float) -> int:
         self.numbers.append(value)
         return len(self.numbers) - 1
 
@@ -79,9 +123,10 @@ def structure_of(packed: Packed, known: Known) -> tuple[Structure, NDArray[np.fl
     forces = tuple(_force(reader, k) for k in range(model.n_forces))
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
+    values, prescribed = reader.expression("values"), reader.expression("drives")
     structure = Structure(
         int(model.nq), int(model.nu), len(reader.numbers), int(model.n_memory), gravity, bodies,
-        laws, loads, forces, packed.expressions.get("values"), packed.expressions.get("drives"),
+        laws, loads, forces, values, prescribed,
         tuple((int(d.body), int(d.speed)) for d in drives),
         {key: _hash(reader, reader.elements[key]) for key in sorted(used)},
     )  # fmt: skip
@@ -135,5 +180,5 @@ def _force(reader: _Reader, index: int) -> ForceStructure:
         element, int(record.body_f), int(record.body_t), reader.entries(record.axes_f, axes=True),
         reader.entries(record.axes_t, axes=True), reader.entries(record.offset_f),
         reader.entries(record.offset_t), reader.entries(reader.unpack(record.p, count)),
-        reader.packed.expressions.get(f"effort {index}"),
+        reader.expression(f"effort {index}"),
     )  # fmt: skip
