@@ -15,7 +15,6 @@ from mstmm.structure import BodyStructure, Entries
 
 from .inline import Nodes
 
-
 #: Axes of which the sweep has screws; a turn about y is carried as any other.
 AXES = ("x", "", "z")
 
