@@ -15,7 +15,7 @@ from typing import Any
 import jinja2
 
 import mstmm.templates
-from mstmm import abi
+from mstmm import abi, fused_abi
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
 from mstmm.spec import ElementSpec, Param
 from mstmm.stored import element_to_json
@@ -117,7 +117,9 @@ def _environment() -> jinja2.Environment:
 
 
 def _render(name: str, **values: Any) -> str:
-    return _environment().get_template(name).render(abi=abi, tape=_tape_view(), **values)
+    return _environment().get_template(name).render(
+        abi=abi, fused_abi=fused_abi, tape=_tape_view(), **values
+    )
 
 
 def _tape_view() -> dict[str, Any]:

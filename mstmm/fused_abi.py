@@ -1,0 +1,53 @@
+"""The border of a fused library, as data: ABI number, descriptor, flags of the compiler.
+
+Both the printer of the C text and the opener of the library read it; no other module says it again.
+"""
+
+from __future__ import annotations
+
+#: Number of the layout below; changed with every change of it, and checked when a library opens.
+ABI = 2
+
+#: Name of the one variable that a library exports.
+SYMBOL = "mstmm_fused_library"
+
+#: Contraction to fused multiply-add is wanted; -ffast-math would break the inlined sine, and -O1
+#: takes minutes.  Scalar statements are not to be merged into vectors (measured: slower), but they
+#: are to be reordered with an eye on registers.
+FLAGS = (
+    "-O2", "-std=gnu17", "-march=native", "-ffp-contract=fast", "-fno-math-errno",
+    "-fno-trapping-math", "-fno-tree-slp-vectorize", "-fschedule-insns", "-fsched-pressure",
+)  # fmt: skip
+
+_STATE = (
+    "const double *p, const double *t, const double *q, const double *u, const double *memory, "
+    "const double *efforts, double *qdot, double *udot"
+)
+
+#: `failures` holds (reason, element, code) of guard codes 1, 2, ... as mstmm_failure has them.
+#: Functions that a library does not hold are NULL.  A kernel returns 0 or a guard's code; then what
+#: it wrote means nothing.  In lanes entry i of an array stands at [i * lanes + lane], for p too;
+#: codes[lane] is set, and the result is non-zero if any lane failed.
+DECLARATIONS = f"""\
+/* n states, each array row by row: entry i of a state at [state * width + i].  With a stride of 0
+ * all states share one row, otherwise the stride is the distance of rows.  efforts may be NULL. */
+typedef struct {{
+    long long n;
+    const double *p, *t, *q, *u, *memory, *efforts;
+    long long p_stride, t_stride, memory_stride, efforts_stride;
+    double *qdot, *udot;
+    int *codes;
+}} mstmm_batch;
+
+typedef struct {{
+    int abi, nq, nu, np, n_memory, lanes;
+    const char *key;
+    int n_failures;
+    const int *failures;
+    int (*accelerations)({_STATE});
+    int (*accelerations_power)({_STATE}, double *power, double *potential);
+    int (*accelerations_lanes)({_STATE}, int *codes);
+    /* Fills codes (n); returns the number of states that failed. */
+    long long (*accelerations_many)(const mstmm_batch *batch);
+}} mstmm_fused;
+"""

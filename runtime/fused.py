@@ -1,0 +1,156 @@
+"""A fused library, opened: the compiled accelerations of one scene, for one state and for many."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import EnvironmentFailure
+from mstmm.fused_abi import ABI, SYMBOL
+
+from . import prebuilt
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int32]
+
+
+def open_library(path: Path, key: str) -> FusedLibrary:
+    """Open a library that was built under `key`.
+
+    Raises EnvironmentFailure if the file cannot be loaded (missing, cut short, made for another
+    machine), is no fused library, has another ABI number, or carries another key; then it is
+    closed again.
+    """
+    try:
+        loaded = ctypes.CDLL(os.fspath(path), mode=os.RTLD_NOW | os.RTLD_LOCAL)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"the compiled library {path} cannot be loaded ({error}); remove it: mstmm cache clean"
+        ) from error
+    try:
+        return FusedLibrary(_descriptor(loaded, path, key), loaded)
+    except EnvironmentFailure:
+        _close(loaded)
+        raise
+
+
+def _descriptor(loaded: ctypes.CDLL, path: Path, key: str) -> Any:
+    """`const mstmm_fused *` of a loaded library; EnvironmentFailure if it is not the one meant."""
+    ffi, _ = prebuilt.module()
+    try:
+        start = ctypes.c_int.in_dll(loaded, SYMBOL)
+    except ValueError:
+        raise EnvironmentFailure(
+            f"{path} is no fused library: it has no {SYMBOL}; remove it: mstmm cache clean"
+        ) from None
+    # The ABI number comes first in every layout, so that it can be read before the rest is.
+    if start.value != ABI:
+        raise EnvironmentFailure(
+            f"{path} was built for layout {start.value}, this mstmm has {ABI}; "
+            "remove it: mstmm cache clean"
+        )
+    descriptor = ffi.cast("const mstmm_fused *", ctypes.addressof(start))
+    found = prebuilt.text(ffi, descriptor.key)
+    if found != key:
+        raise EnvironmentFailure(
+            f"{path} was built for the key {found[:12]}, expected {key[:12]}; "
+            "remove it: mstmm cache clean"
+        )
+    return descriptor
+
+
+def _close(loaded: ctypes.CDLL) -> None:
+    import _ctypes
+
+    _ctypes.dlclose(loaded._handle)
+
+
+class FusedLibrary:
+    """The functions of one fused library.  Safe to call from several threads.
+
+    `failures[code - 1]` is (reason, element, code) of a guard code, as the looped engine has them;
+    `descriptor` is `const mstmm_fused *` of the prebuilt module.
+    """
+
+    def __init__(self, descriptor: Any, loaded: ctypes.CDLL) -> None:
+        self.descriptor, self._loaded = descriptor, loaded
+        self.ffi, _ = prebuilt.module()
+        self.nq, self.nu = int(descriptor.nq), int(descriptor.nu)
+        self.np, self.n_memory = int(descriptor.np), int(descriptor.n_memory)
+        self.lanes = int(descriptor.lanes)
+        numbers = [int(descriptor.failures[i]) for i in range(3 * descriptor.n_failures)]
+        self.failures = [
+            (numbers[i], numbers[i + 1], numbers[i + 2]) for i in range(0, len(numbers), 3)
+        ]
+
+    def pointer(self, array: Array) -> Any:
+        """`double *` to a contiguous array of doubles."""
+        return self.ffi.from_buffer("double[]", array)
+
+    def evaluate(
+        self, p: Array, t: float, q: Array, u: Array, memory: Array, efforts: Array
+    ) -> tuple[int, Array, Array]:
+        """(code, qdot, udot) of one state; contiguous arrays of the library's sizes."""
+        call = Call(self, p)
+        call.t[0], call.q[:], call.u[:] = t, q, u
+        call.memory[: self.n_memory], call.efforts[:] = memory[: self.n_memory], efforts
+        return call(), call.qdot, call.udot
+
+    def many(
+        self, p: Array, t: Array, q: Array, u: Array, memory: Array, efforts: Array | None
+    ) -> tuple[Codes, Array, Array]:
+        """(codes, qdot, udot) of n states: q (n, nq), u (n, nu), efforts (n, nu) or None.
+
+        t (n,) or (1,), p (n, np) or (np,), memory (n, m) or (m,) with m at least n_memory; one row
+        serves all states.  The numbers of a state depend on no other state.  All arrays are
+        contiguous.
+        """
+        n = len(q)
+        codes = np.zeros(n, dtype=np.int32)
+        qdot, udot = np.empty((n, self.nq)), np.empty((n, self.nu))
+        batch = self.ffi.new("mstmm_batch *")
+        kept = [self.pointer(array) for array in (p, t, q, u, memory, qdot, udot)]
+        batch.n = n
+        batch.p, batch.t, batch.q, batch.u, batch.memory, batch.qdot, batch.udot = kept
+        batch.p_stride = p.shape[1] if p.ndim == 2 else 0
+        batch.t_stride = 1 if len(t) > 1 else 0
+        batch.memory_stride = memory.shape[1] if memory.ndim == 2 else 0
+        given = None if efforts is None else self.pointer(efforts)
+        batch.efforts = self.ffi.NULL if given is None else given
+        batch.efforts_stride = self.nu
+        errors = self.ffi.from_buffer("int[]", codes)
+        batch.codes = errors
+        if n:
+            self.descriptor.accelerations_many(batch)
+        return codes, qdot, udot
+
+
+class Call:
+    """One state's arrays with their pointers made once; write q, u, ... and call it.
+
+    Not for several threads at a time: every thread makes its own.
+    """
+
+    def __init__(self, library: FusedLibrary, p: Array) -> None:
+        self.p = np.array(p, dtype=np.float64)
+        self.t = np.zeros(1)
+        self.q, self.u = np.zeros(library.nq), np.zeros(library.nu)
+        self.memory, self.efforts = np.zeros(library.n_memory), np.zeros(library.nu)
+        self.qdot, self.udot = np.zeros(library.nq), np.zeros(library.nu)
+        self._library = library
+        self._function = library.descriptor.accelerations
+        self._pointers = tuple(
+            library.pointer(array)
+            for array in (
+                self.p, self.t, self.q, self.u, self.memory, self.efforts, self.qdot, self.udot,
+            )
+        )  # fmt: skip
+
+    def __call__(self) -> int:
+        """Fill qdot and udot; returns 0, or a guard code and then nothing in them is meant."""
+        return int(self._function(*self._pointers))
