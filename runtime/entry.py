@@ -12,7 +12,6 @@ was cut or changed afterwards is found by the checksum before anything is loaded
 from __future__ import annotations
 
 import contextlib
-import gzip
 import hashlib
 import json
 import os
@@ -97,6 +96,8 @@ def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
 
 def keep_text(folder: Path, sources: Mapping[str, str]) -> None:
     """Leave the C text, compressed.  Raises OSError."""
+    import gzip
+
     for name, text in sources.items():
         packed = gzip.compress(text.encode(), compresslevel=3, mtime=0)
         (folder / f"{name}.gz").write_bytes(packed)

@@ -10,7 +10,6 @@ import contextlib
 import errno
 import os
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -139,6 +138,8 @@ def _fetched_alone(place: Path, order: Order, compiler: Compiler, timeout: float
 @contextlib.contextmanager
 def _workshop(parent: Path) -> Iterator[Path]:
     """A folder in the place's own file system, gone in the end; locked as long as we live."""
+    import tempfile
+
     from .lock import locked
 
     outer = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=parent))
@@ -214,6 +215,8 @@ def _unwritable(place: Path, order: Order, error: OSError) -> str:
 
 def remove(place: Path) -> int:
     """Remove an entry so that it is gone at once; returns its bytes.  Never raises OSError."""
+    import tempfile
+
     size = tree_size(place)
     try:
         aside = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=place.parent))

@@ -42,11 +42,12 @@ def problem(library: Path, symbols: Sequence[str]) -> str:
         return f"it did not return within {_TIMEOUT:g} s"
     except OSError:
         return ""
-    if code == 0:
+    finally:
+        lines = head(said).splitlines()
         said.unlink(missing_ok=True)
+    if code == 0:
         return ""
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         return f"it crashes ({name})"
-    lines = head(said).splitlines()
     return lines[-1].strip()[:300] if lines else f"its test ended with code {code}"

@@ -18,7 +18,9 @@ from mstmm.errors import EnvironmentFailure
 TIMEOUT = 300.0
 
 #: What a full disk, a used-up quota and a limit on files are called.
-_NO_ROOM = ("No space left on device", "Disk quota exceeded", "File too large")
+_NO_ROOM = (
+    "No space left on device", "Disk quota exceeded", "File too large", "File size limit exceeded",
+)  # fmt: skip
 
 #: Variables by which gcc and clang find other headers and libraries.
 _VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
