@@ -42,9 +42,9 @@ class Inliner:
         call = self.graph.call
 
         def value(operand: Operand) -> Node:
-            if isinstance(operand, Temporary):
+            if type(operand) is Temporary:
                 return known[operand.number]
-            if isinstance(operand, Constant):
+            if type(operand) is Constant:
                 return self._constant(operand)
             return names[operand.port][ports[operand.port].offset(operand.index)]
 

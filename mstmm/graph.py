@@ -34,7 +34,7 @@ _COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
 class Node:
     """One value of a `Graph`.  Made by the graph's methods and by + - * / ** on other nodes."""
 
-    __slots__ = ("args", "graph", "leaf", "looped", "number", "op")
+    __slots__ = ("args", "graph", "leaf", "looped", "number", "op", "value")
 
     def __init__(
         self,
@@ -47,11 +47,8 @@ class Node:
     ) -> None:
         self.graph, self.number, self.op, self.args = graph, number, op, args
         self.leaf, self.looped = leaf, looped
-
-    @property
-    def value(self) -> Fraction | None:
-        """The exact number if this node is a rational constant, else None."""
-        return self.leaf if isinstance(self.leaf, Fraction) else None
+        #: The exact number if this node is a rational constant, else None.
+        self.value: Fraction | None = leaf if isinstance(leaf, Fraction) else None
 
     def __add__(self, other: Node | Number) -> Node:
         return self.graph.add(self, self.graph.node(other))
@@ -96,6 +93,7 @@ class Graph:
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
+        self._whole: dict[int, Node] = {}
         self._count = 0
         self._guards: list[_GuardRequest] = []
         self._solves: list[Solve] = []
@@ -119,7 +117,14 @@ class Graph:
 
     def constant(self, value: Number) -> Node:
         """An exact rational (a float becomes the fraction it is)."""
-        return self._make("constant", leaf=Fraction(value))
+        if type(value) is Fraction:
+            return self._make("constant", leaf=value)
+        if type(value) is not int:
+            return self._make("constant", leaf=Fraction(value))
+        found = self._whole.get(value)
+        if found is None:
+            found = self._whole[value] = self._make("constant", leaf=Fraction(value))
+        return found
 
     @property
     def pi(self) -> Node:
@@ -241,13 +246,10 @@ class Graph:
 
     def call(self, op: str, *args: Node | Number) -> Node:
         """Any operation of `ir.OPERATIONS` by name."""
-        nodes = tuple(self.node(a) for a in args)
-        simple: dict[str, Callable[..., Node]] = {
-            "neg": self.neg, "add": self.add, "sub": self.sub, "mul": self.mul, "div": self.div,
-            "pow": self.power,
-        }  # fmt: skip
-        if op in simple:
-            return simple[op](*nodes)
+        nodes = tuple([a if type(a) is Node else self.node(a) for a in args])
+        arithmetic = _ARITHMETIC.get(op)
+        if arithmetic is not None:
+            return arithmetic(self, *nodes)
         if len(nodes) != OPERATIONS[op]:
             raise ValueError(f"{op} takes {OPERATIONS[op]} operands, not {len(nodes)}")
         if nodes[0].value == 0 and op in ("sin", "tan", "asin", "atan", "sinh", "tanh", "sqrt"):
@@ -321,6 +323,13 @@ class Graph:
             name, tuple(inputs), tuple(outputs), tuple(writer.statements), size_symbol, purpose,
             tuple(sources),
         )  # fmt: skip
+
+
+#: Operations that fold by methods of their own.
+_ARITHMETIC: dict[str, Callable[..., Node]] = {
+    "neg": Graph.neg, "add": Graph.add, "sub": Graph.sub, "mul": Graph.mul, "div": Graph.div,
+    "pow": Graph.power,
+}  # fmt: skip
 
 
 class _Writer:
