@@ -117,7 +117,7 @@ class Engine:
     def _finite(self, what: str, array: Array, times: Array) -> None:
         if not np.isfinite(array).all():
             row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
-            name = self.packed.layout.u_names[column]
+            name = self.packed.layout.u_name(column)
             raise NumericalFailure(f"the {what} of {name} is not finite at t = {times[row]:.9g} s")
 
     def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
@@ -156,7 +156,7 @@ class Engine:
         that are not asked for have no columns.
         """
         n, place = len(t), {name: i for i, name in enumerate(PARTS)}
-        bodies, numbers = len(self.packed.topology.links), int(self.lib.MSTMM_PROBE_NUMBERS)
+        bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
         shapes = [
             (len(probes), numbers), (bodies, 6), (self.nu,), (self.nu,),
             (int(self.lib.MSTMM_SUM_NUMBERS),),
@@ -190,7 +190,7 @@ class Engine:
     def hinge_name(self, position: int) -> str:
         """Name of the inboard hinge of the body at this place of the topology."""
         packed = self.packed
-        return packed.scene.hinge[packed.topology.links[position].hinge].name
+        return packed.scene.hinges.name(packed.topology.at(position)[1])
 
     def failure_text(self, failure: Any, t: float) -> str:
         """A failure of the engine as a sentence: element, cause, time, one way out."""

@@ -126,7 +126,7 @@ def _refuse_undetermined(model: Model, slope: Array, free: list[int]) -> None:
     if not loose:
         return
     share = np.abs(np.array(loose)).max(axis=0)
-    names = [model.layout.u_names[free[j]] for j in np.nonzero(share > 0.1)[0]]
+    names = [model.layout.u_name(int(free[j])) for j in np.nonzero(share > 0.1)[0]]
     raise NumericalFailure(
         "the equilibrium is undetermined along "
         + ", ".join(names)

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.scene import Scene
+
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -37,12 +47,88 @@ class HingeSlots:
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Layout of q (nq) and u (nu) by hinge name, in the scene's order."""
+class Group:
+    """Hinges that repeat a pattern: one hinge of its own, or those of a chain.
 
-    hinges: dict[str, HingeSlots] = field(default_factory=dict)
-    nq: int = 0
-    nu: int = 0
+    `hinges` are the pattern with its places in q and u, `nq` and `nu` its length; `first` is the
+    number of the first hinge, `count` how many there are.
+    """
+
+    first: int
+    count: int
+    hinges: tuple[HingeSlots, ...]
+    nq: int
+    nu: int
+
+    @property
+    def q(self) -> int:
+        return self.hinges[0].q
+
+    @property
+    def u(self) -> int:
+        return self.hinges[0].u
+
+    def q_places(self) -> Integers:
+        """First coordinate of every hinge."""
+        return self._spread([h.q for h in self.hinges], self.nq)
+
+    def u_places(self) -> Integers:
+        """First speed of every hinge."""
+        return self._spread([h.u for h in self.hinges], self.nu)
+
+    def quaternions(self) -> Integers:
+        """First quaternion entry of every hinge that has one."""
+        there = np.array([h.quaternion is not None for h in self.hinges])
+        first = [h.q + (h.quaternion or 0) for h in self.hinges]
+        k = np.arange(self.count)
+        return self._spread(first, self.nq)[there[k % len(self.hinges)]]
+
+    def _spread(self, pattern: Sequence[int], length: int) -> Integers:
+        k = np.arange(self.count)
+        repeats, which = np.divmod(k, len(self.hinges))
+        return np.asarray(np.array(pattern, dtype=np.int64)[which] + repeats * length)
+
+
+class Layout:
+    """Layout of q (nq) and u (nu) by hinge: the scene's hinges, then those of its chains.
+
+    `hinges` gives the slots of a hinge by its name; of chains they are made when asked for.
+    """
+
+    def __init__(self, scene: Scene, groups: tuple[Group, ...], nq: int, nu: int) -> None:
+        self.groups, self.nq, self.nu = groups, nq, nu
+        self._numbers = scene.hinges
+        self.hinges: Mapping[str, HingeSlots] = _ByName(self)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def slots(self, hinge: int) -> HingeSlots:
+        """Slots of the hinge of this number."""
+        group = self.groups[bisect_right(self._firsts, hinge) - 1]
+        k = hinge - group.first
+        if group.count == 1:
+            return group.hinges[0]
+        repeats, which = divmod(k, len(group.hinges))
+        slots = group.hinges[which]
+        return replace(
+            slots, name=self._numbers.name(hinge),
+            q=slots.q + repeats * group.nq, u=slots.u + repeats * group.nu,
+        )  # fmt: skip
+
+    @cached_property
+    def _firsts(self) -> list[int]:
+        return [group.first for group in self.groups]
+
+    @cached_property
+    def q_places(self) -> Integers:
+        """First coordinate of every hinge, by number."""
+        return _joined([group.q_places() for group in self.groups])
+
+    @cached_property
+    def u_places(self) -> Integers:
+        """First speed of every hinge, by number."""
+        return _joined([group.u_places() for group in self.groups])
 
     @property
     def q_names(self) -> list[str]:
@@ -54,7 +140,44 @@ class Layout:
         """`hinge.speed` for every entry of u."""
         return [f"{h.name}.{n}" for h in self.hinges.values() for n in h.u_names]
 
-    @property
-    def quaternions(self) -> list[int]:
+    def q_name(self, entry: int) -> str:
+        """`hinge.coordinate` of one entry of q."""
+        slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
+        return f"{slots.name}.{slots.q_names[entry - slots.q]}"
+
+    def u_name(self, entry: int) -> str:
+        """`hinge.speed` of one entry of u."""
+        slots = self.hinge_of_speed(entry)
+        return f"{slots.name}.{slots.u_names[entry - slots.u]}"
+
+    def hinge_of_speed(self, entry: int) -> HingeSlots:
+        """The hinge to which an entry of u belongs."""
+        return self.slots(int(np.searchsorted(self.u_places, entry, side="right")) - 1)
+
+    @cached_property
+    def quaternions(self) -> Integers:
         """First index in q of every unit quaternion (w, x, y, z)."""
-        return [h.q + h.quaternion for h in self.hinges.values() if h.quaternion is not None]
+        return _joined([group.quaternions() for group in self.groups])
+
+
+def _joined(parts: list[Integers]) -> Integers:
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
+
+
+class _ByName(Mapping[str, HingeSlots]):
+    """Slots by the hinge's name."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def __getitem__(self, name: str) -> HingeSlots:
+        number = self.layout._numbers.find(name)
+        if number is None:
+            raise KeyError(name)
+        return self.layout.slots(number)
+
+    def __iter__(self) -> Iterator[str]:
+        return self.layout._numbers.names()
+
+    def __len__(self) -> int:
+        return len(self.layout)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
-from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import Scene
 
 from . import parameters as named_parameters
@@ -18,6 +19,7 @@ from .engine import Engine
 from .layout import Layout
 from .pack import Known, pack
 from .simulate import Settings
+from .start import start_values
 
 if TYPE_CHECKING:
     from .result import Result
@@ -42,7 +44,6 @@ class Model:
         self.scene, self.known = scene, known
         self.engine_choice, self._product_accuracy = why, product_accuracy
         self._engine = Engine(pack(scene, known, product_accuracy))
-        self._static = self._without_motion()
 
     @property
     def layout(self) -> Layout:
@@ -61,18 +62,7 @@ class Model:
         """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
         from .simulate import SceneSystem
 
-        q, u = np.zeros(self.nq), np.zeros(self.nu)
-        for hinge in self.scene.hinge:
-            slots = self.layout.hinges[hinge.name]
-            kind = HINGE_TYPES.get(
-                "free" if slots.quaternion is not None and hinge.type == "fixed" else hinge.type
-            )
-            if kind is not None and slots.nq:
-                q[slots.q_slice] = kind.start
-            if hinge.initial is not None and hinge.initial.q:
-                q[slots.q_slice] = hinge.initial.q
-            if hinge.initial is not None and hinge.initial.u:
-                u[slots.u_slice] = hinge.initial.u
+        q, u = start_values(self.scene, self.layout)
         y = SceneSystem(self._engine).start(0.0, q, u)
         return y[: self.nq], y[self.nq : self.nq + self.nu]
 
@@ -138,15 +128,17 @@ class Model:
         matrix = np.array(columns).reshape(self.nu, self.nu).T
         return np.asarray((matrix + matrix.T) / 2)
 
-    def _without_motion(self) -> Engine:
+    @cached_property
+    def _static(self) -> Engine:
         """The same tree without gravity, laws, drives and loads: inertia alone."""
-        bare = pack(self.scene, self.known)
-        model = bare.model
+        packed, ffi = self._engine.packed, self._engine.ffi
+        model = ffi.new("mstmm_model *", packed.model[0])
         for k in range(3):
             model.gravity[k] = 0.0
         model.n_laws = model.n_drives = model.n_values = 0
         model.n_loads = model.n_forces = model.needs_pose = 0
-        return Engine(bare)
+        model.product = ffi.NULL
+        return Engine(replace(packed, model=model))
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10

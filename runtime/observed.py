@@ -61,7 +61,7 @@ class Observed:
 
     def _observe(self, part: str, reference: str | None) -> None:
         run = self.run
-        bodies = len(self.engine.packed.topology.links)
+        bodies = self.engine.packed.topology.count
         wanted = list(self.references)
         size = len(run.t) * (24 * len(wanted) + 6 * bodies + 2 * self.engine.nu + 10)
         parts = PARTS if size <= _BATCH else (part,)

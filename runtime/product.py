@@ -23,11 +23,11 @@ def attach(packed: Packed, accuracy: float) -> None:
     scene, lib, ffi = packed.scene, packed.lib, packed.ffi
     _refuse(packed)
     record = ffi.new("mstmm_product *")
-    record.kind = getattr(lib, f"MSTMM_PRODUCT_{_KINDS[scene.hinge[0].type]}")
+    record.kind = getattr(lib, f"MSTMM_PRODUCT_{_KINDS[scene.hinges[0].type]}")
     record.accuracy = accuracy
     # Its numbers stand between the blocks and what lies behind them: one workspace per thread.
     record.place = packed.model.scratch
-    packed.model.scratch += len(scene.body) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
+    packed.model.scratch += len(scene.bodies) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
     packed.model.product = record
     packed.kept.append(record)
 
@@ -38,9 +38,9 @@ def _refuse(packed: Packed) -> None:
     way_out = 'use sweep = "riccati"'
     if not packed.topology.is_chain:
         raise SceneError(f"the product of transfer matrices needs an unbranched chain; {way_out}")
-    types = [scene.hinge[link.hinge].type for link in packed.topology.links]
+    types = [scene.hinges[link.hinge].type for link in packed.topology.links]
     for hinge, kind in zip(packed.topology.links, types, strict=True):
-        name = scene.hinge[hinge.hinge].name
+        name = scene.hinges[hinge.hinge].name
         if kind not in _KINDS:
             raise SceneError(
                 f'hinge "{name}": there is no classical matrix for the type {kind}; {way_out}'
@@ -50,12 +50,12 @@ def _refuse(packed: Packed) -> None:
                 f'hinge "{name}": type {kind} behind type {types[0]} has no classical matrix: '
                 f"its condition does not determine the free accelerations before it; {way_out}"
             )
-    for body in scene.body:
+    for body in scene.bodies:
         if body.type != "rigid" or body.mass == 0:
             raise SceneError(
                 f'body "{body.name}": the classical matrix needs a rigid body with mass; {way_out}'
             )
-    for joint in scene.hinge:
+    for joint in scene.hinges:
         if joint.drive is not None or any(joint.law.inertia):
             raise SceneError(
                 f'hinge "{joint.name}": drives and rotor inertia have no matrix; {way_out}'

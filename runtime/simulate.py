@@ -94,9 +94,10 @@ class SceneSystem:
             bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
         )
         run.memory = engine.pointer(self.memory)
-        quaternions = ffi.new("int[]", packed.layout.quaternions or [0])
-        run.quaternions, run.n_quaternions = quaternions, len(packed.layout.quaternions)
-        self.kept += [model, quaternions]
+        first = np.append(packed.layout.quaternions, 0).astype(np.int32)
+        run.quaternions = ffi.from_buffer("int[]", first)
+        run.n_quaternions = len(packed.layout.quaternions)
+        self.kept += [model, first]
         if conditions:
             self._events(conditions, actions)
         self.workspace = np.zeros(int(model.workspace))
@@ -319,4 +320,4 @@ def busiest(system: SceneSystem, t: float, y: Array) -> str:
     rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
     if not rates.any():
         return ""
-    return f"; the fastest change is that of {engine.packed.layout.u_names[int(rates.argmax())]}"
+    return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"

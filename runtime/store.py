@@ -20,7 +20,9 @@ import cffi
 
 from mstmm import abi
 from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import Scene
+from mstmm.scene_types import types
 from mstmm.spec import ElementSpec
 from mstmm.stored import element_from_json, element_to_json
 from mstmm.tape import compile_tape
@@ -236,10 +238,12 @@ def _interpreted(stored: ElementSpec) -> Element:
 
 def needed(scene: Scene) -> list[Key]:
     """Types of a scene that are not built in."""
-    pairs = [("body", b.type) for b in scene.body]
-    pairs += [("hinge", h.type) for h in scene.hinge if h.builtin is None]
-    pairs += [("force", s.type) for s in scene.spring]
-    return sorted({key for key in pairs if key not in prebuilt.elements()})
+    elements = prebuilt.elements()
+    return sorted(
+        key
+        for key in types(scene)
+        if key not in elements and not (key[0] == "hinge" and key[1] in HINGE_TYPES)
+    )
 
 
 def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpec]]:

@@ -64,9 +64,10 @@ def resolver(
         quantity, index = name.quantity, name.index or 0
         if name.text == "t":
             return graph.element("t", 0)
-        if quantity in ("q", "u") and (name.owner or own is not None):
-            hinge = name.owner or (own.name if own else "")
-            first = layout.hinges[hinge].q if quantity == "q" else layout.hinges[hinge].u
+        if quantity in ("q", "u") and (name.hinge or own is not None):
+            hinge = name.hinge or (own.name if own else "")
+            slots = layout.hinges[hinge]
+            first = slots.q if quantity == "q" else slots.u
             return graph.element(quantity, first + index)
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)

@@ -1,0 +1,42 @@
+"""The state in which a scene begins, as its hinges say it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene import Hinge, Scene
+
+from .layout import HingeSlots, Layout
+
+Array = NDArray[np.float64]
+
+
+def start_values(scene: Scene, layout: Layout) -> tuple[Array, Array]:
+    """(q, u) of the scene; driven coordinates still as `initial` has them."""
+    q, u = np.zeros(layout.nq), np.zeros(layout.nu)
+    for group in layout.groups:
+        places = group.q_places(), group.u_places()
+        for k, slots in enumerate(group.hinges):
+            one_q, one_u = _values(scene.hinges[group.first + k], slots)
+            for target, first, values in ((q, places[0], one_q), (u, places[1], one_u)):
+                if len(values):
+                    mine = first[k :: len(group.hinges)]
+                    target[mine[:, None] + np.arange(len(values))] = values
+    return q, u
+
+
+def _values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
+    """q and u of one hinge."""
+    q, u = np.zeros(slots.nq), np.zeros(slots.nu)
+    held = slots.quaternion is not None and hinge.type == "fixed"
+    kind = HINGE_TYPES.get("free" if held else hinge.type)
+    if kind is not None and slots.nq:
+        q[:] = kind.start
+    if hinge.initial is not None and hinge.initial.q:
+        q[:] = hinge.initial.q
+    if hinge.initial is not None and hinge.initial.u:
+        u[:] = hinge.initial.u
+    return q, u
+
