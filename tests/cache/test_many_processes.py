@@ -1,0 +1,224 @@
+"""Sixteen processes at once, some of them killed: no half entry, no wrong number, no crash."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cache.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
+from mstmm.runtime import cache, lock
+from mstmm.runtime import entry as entries
+from mstmm.runtime.cache_upkeep import clean, unfinished
+from mstmm.runtime.library_build import remove_leftovers
+
+BUILDER = Path(__file__).parent / "builder.py"
+
+
+class Crowd:
+    """The processes of builder.py, their ids and what they said."""
+
+    def __init__(self, factors: list[int]) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, str(BUILDER), *map(str, factors)], stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.output = self.process.stdout
+        lines = [self.output.readline().split() for _ in factors]
+        assert all(line[0] == "child" for line in lines)
+        self.pids = [int(line[1]) for line in lines]
+
+    def said(self) -> list[str]:
+        """The lines of all that lived to say something."""
+        rest = self.output.read()
+        assert self.process.wait() == 0
+        self.output.close()
+        return rest.splitlines()
+
+
+def counting_compiler(folder: Path, pause: str = "") -> Path:
+    """A compiler that leaves a mark per run and takes its time."""
+    marks = folder / "marks"
+    marks.mkdir()
+    return false_compiler(folder, f'touch {marks}/$$\n{pause}\nexec $REAL "$@"')
+
+
+def runs(folder: Path) -> int:
+    return len(list((folder / "marks").iterdir()))
+
+
+def test_sixteen_want_the_same(
+    cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", str(counting_compiler(tmp_path, "sleep 0.1")))
+    said = Crowd([3] * 16).said()
+    assert Counter(line.split()[2] for line in said) == {"compiled": 1, "cached": 15}
+    assert all(line.split()[:2] == ["3", "21"] for line in said)
+    assert runs(tmp_path) == 2  # one compilation, one question for the version
+    assert_tidy(cache_folder, 1)
+
+
+def test_sixteen_want_five_and_some_are_killed(
+    cache_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    rng: np.random.Generator,
+) -> None:
+    """Killed at moments drawn afresh, while compiling, waiting, renaming, or before."""
+    monkeypatch.setenv("CC", str(false_compiler(tmp_path, 'sleep 0.05\nexec $REAL "$@"')))
+    factors = [i % 5 + 1 for i in range(16)]
+    crowd = Crowd(factors)
+    doomed = rng.choice(crowd.pids, 7, replace=False)
+    for pid in doomed:
+        time.sleep(float(rng.uniform(0.0, 0.12)))
+        with contextlib.suppress(ProcessLookupError):  # it has done its work already
+            os.kill(int(pid), signal.SIGKILL)
+    said = crowd.said()
+    assert 9 <= len(said) <= 16
+    for line in said:
+        factor, value, how, *note = line.split()
+        assert float(value) == 7.0 * int(factor) and how in ("compiled", "cached"), line
+        assert not note, line
+    for folder in entry_folders(cache_folder):  # whatever was left is whole
+        assert entries.read(folder) is not None
+    for number in range(1, 6):
+        built = cache.library(Kernel(number).recipe)
+        assert scaled(built.path, built.key) == 7.0 * number
+    _wait_for_orphans(cache_folder)
+    remove_leftovers(cache_folder, age=0.0)
+    assert_tidy(cache_folder, 5)
+
+
+def _wait_for_orphans(folder: Path) -> None:
+    """Compilers of killed processes go on for a moment, in folders of their own."""
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:
+        commands = (path / "cmdline" for path in Path("/proc").glob("[0-9]*"))
+        if not any(str(folder).encode() in _content(path) for path in commands):
+            return
+        time.sleep(0.02)
+    raise AssertionError("a compiler is still running")
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def test_lock_ends_with_its_killed_owner(
+    cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    marks = counting_compiler(tmp_path, 'case "$*" in *--version*) ;; *) sleep 600;; esac')
+    monkeypatch.setenv("CC", str(marks))
+    crowd = Crowd([3])
+    _until(lambda: runs(tmp_path) > 0)
+    orphan = int(next((tmp_path / "marks").iterdir()).name)
+    os.kill(crowd.pids[0], signal.SIGKILL)
+    assert crowd.said() == []
+    try:
+        assert unfinished(cache_folder) == 1 and entry_folders(cache_folder) == []
+        monkeypatch.delenv("CC")
+        path = cache._placed(Kernel().recipe)[0]
+        with lock.locked(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
+            assert remark == ""  # nobody waits for the dead
+        built = cache.library(Kernel().recipe)
+        assert scaled(built.path, built.key) == 21.0
+        assert unfinished(cache_folder) == 1  # young: it could be somebody's
+        (left,) = cache_folder.glob(".building-*")
+        os.utime(left, (1e9, 1e9))
+        cache.library(Kernel(factor=8).recipe)
+        assert_tidy(cache_folder, 2)
+    finally:
+        os.killpg(orphan, signal.SIGKILL)
+
+
+def _until(condition: object) -> None:
+    assert callable(condition)
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_owner_that_takes_too_long_is_named_and_not_waited_for(cache_folder: Path) -> None:
+    kernel = Kernel()
+    place = cache._placed(kernel.recipe)[0]
+    with lock.locked(place.parent / f".{place.name}.lock", timeout=0.0) as remark:
+        assert remark == ""
+        built = cache.library(kernel.recipe, timeout=1.0)
+    assert built.how == "compiled" and scaled(built.path, built.key) == 21.0
+    assert f"process {os.getpid()} on" in built.note and "1 s" in built.note
+    assert_tidy(cache_folder, 1)
+
+
+def test_file_system_without_locks(cache_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def without(handle: int, operation: int) -> None:
+        raise OSError(95, "Operation not supported")
+
+    monkeypatch.setattr("fcntl.flock", without)
+    built = cache.library(Kernel().recipe)
+    assert scaled(built.path, built.key) == 21.0 and "no locks" in built.note
+    assert_tidy(cache_folder, 1)
+
+
+def test_slower_of_two_builders_takes_what_is_there(
+    cache_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a lock both compile; the second finds the place taken."""
+    kernel = Kernel()
+    plain = kernel.recipe
+    inner: list[cache.Built] = []
+
+    def sources(key: str) -> dict[str, str]:
+        if not inner:
+            inner.append(cache.library(kernel.recipe, timeout=60.0))
+        return dict(plain.sources(key))
+
+    monkeypatch.setattr(lock, "_try", lambda handle: None)
+    recipe = cache.Recipe(plain.name, plain.identity, sources, plain.flags)
+    built = cache.library(recipe)
+    assert built.path == inner[0].path and scaled(built.path, built.key) == 21.0
+    assert_tidy(cache_folder, 1)
+
+
+def test_threads_of_one_process(cache_folder: Path) -> None:
+    kernel = Kernel()
+    found: list[str] = []
+
+    def work() -> None:
+        built = cache.library(kernel.recipe)
+        assert scaled(built.path, built.key) == 21.0
+        found.append(built.how)
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert Counter(found) == {"compiled": 1, "cached": 7}
+    assert_tidy(cache_folder, 1)
+
+
+def test_removed_while_others_use_it(cache_folder: Path) -> None:
+    built = cache.library(Kernel().recipe)
+
+    def opener(path: Path, key: str) -> float:
+        if not removed:
+            removed.append(clean(cache_folder)[0])
+        return scaled(path, key)
+
+    removed: list[int] = []
+    value, again = cache.opened(Kernel().recipe, opener)
+    assert value == 21.0 and removed == [1] and again.path == built.path
+    assert_tidy(cache_folder, 1)
