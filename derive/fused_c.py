@@ -43,8 +43,6 @@ typedef double real;
 #define MSTMM_LITERAL(number) number
 """
 
-_PARTS = {"scalar": ("accelerations", "accelerations_power"), "lanes": ("accelerations_lanes",)}
-
 
 def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[str, str]:
     """File name -> C text of a fused library that carries `key`.
@@ -58,16 +56,14 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
     texts += [support("sincos"), support("four" if part == "scalar" else "lanes")]
     texts += [DECLARATIONS, _sizes(sizes)]
     if part == "scalar":
-        texts += [
-            function_text(kernels[name], f"mstmm_{name}", NUMBERS) for name in _PARTS[part]
-        ]
+        functions = {name: f"mstmm_{name}" for name in kernels}
+        texts += [function_text(kernels[k], name, NUMBERS) for k, name in functions.items()]
         texts.append("#define MSTMM_LANES 1\n")
-        functions = {name: f"mstmm_{name}" for name in _PARTS[part]}
     else:
         texts.append(function_text(kernels["accelerations"], "lanes_accelerations", LANES))
         texts += [_lanes_entry(kernels["accelerations"]), support("many")]
-        names = ("accelerations_lanes", "accelerations_many")
-        functions = {name: f"mstmm_{name}" for name in names}
+        names = ["accelerations_lanes", "accelerations_many"]
+    functions = {name: f"mstmm_{name}" for name in names}
     texts += [_descriptor(fused.failures, key, functions), _self_test(kernels, part)]
     return {"fused.c": "\n".join(texts)}
 
@@ -192,7 +188,8 @@ def _descriptor(
 def _self_test(kernels: dict[str, KernelIR], part: str) -> str:
     """A call of every kernel on ones: what the processor cannot run ends here, not in a run."""
     lines, calls = [], []
-    for name in _PARTS[part]:
+    names = ["accelerations_lanes"] if part == "lanes" else list(kernels)
+    for name in names:
         kernel = kernels[name.removesuffix("_lanes")]
         words = []
         for port in (*kernel.inputs, *kernel.outputs):
