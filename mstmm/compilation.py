@@ -15,8 +15,9 @@ from .spec import ElementSpec
 if TYPE_CHECKING:
     from .derive.registry import Element
     from .runtime.model import Model
+    from .runtime.pack import Known, Packed
 
-ENGINES = ("auto", "looped")
+ENGINES = ("auto", "fused", "looped")
 SWEEPS = ("riccati", "product")
 
 
@@ -36,14 +37,17 @@ def compile_scene(
 
     Args:
         scene: validated scene (`load_scene`, or `Scene(...)`).
-        engine: "auto" or "looped" (element kernels driven by a loop; any size, no compiler).
+        engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
+            of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
+            up to about 60 bodies), or "auto": fused code that is in the cache is used, and a run
+            or batch long enough to repay the compiler has it built.
         sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
             matrices, chains only, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
-    leave a motion of the start undetermined.
+    leave a motion of the start undetermined; EnvironmentFailure if engine="fused" cannot be had.
     """
     if engine not in ENGINES:
         raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
@@ -51,15 +55,26 @@ def compile_scene(
         raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
     if not accuracy > 0:
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
+    from .fusion import Fusion
     from .runtime import store
     from .runtime.model import Model
 
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
-    why = "looped: the only engine of this release"
     product = accuracy if sweep == "product" else None
-    model = Model(scene, known=elements, why=why, product_accuracy=product)
+    if engine == "fused" and product is not None:
+        raise SceneError('sweep = "product" has no fused code; use engine = "auto" or "looped"')
+    refused = "asked for" if engine == "looped" else ""
+
+    def fusing(packed: Packed, known: Known) -> Fusion:
+        return Fusion(packed, known, definitions, refused)
+
+    model = Model(scene, elements, fusing, product)
     model.refuse_undetermined_start()
+    if engine == "fused":
+        model.fusion.build()
+    elif engine == "auto":
+        model.fusion.find()
     return model
 
 

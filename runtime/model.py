@@ -16,8 +16,9 @@ from mstmm.scene import Scene
 
 from . import parameters as named_parameters
 from .engine import Engine
+from .fusing import Fusing, NotFused
 from .layout import Layout
-from .pack import Known, pack
+from .pack import Known, Packed, pack
 from .simulate import Settings
 from .start import start_values
 
@@ -38,12 +39,28 @@ class Model:
         self,
         scene: Scene,
         known: Known | None = None,
-        why: str = "",
+        fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
     ) -> None:
         self.scene, self.known = scene, known
-        self.engine_choice, self._product_accuracy = why, product_accuracy
+        self._fusing, self._product_accuracy = fusing, product_accuracy
         self._engine = Engine(pack(scene, known, product_accuracy))
+        self.fusion: Fusing = fusing(self._engine.packed, known or {}) if fusing else NotFused()
+
+    @property
+    def engine(self) -> str:
+        """The engine in use: "fused" or "looped"."""
+        return "looped" if self.fusion.library is None else "fused"
+
+    @property
+    def engine_choice(self) -> str:
+        """The engine in use and why, in words."""
+        f = self.fusion
+        if f.library is not None:
+            return f"fused: {f.note}"
+        if f.obstacle:
+            return f"looped: {f.obstacle}"
+        return "looped: fused code of this scene is not compiled yet; a long run or batch builds it"
 
     @property
     def layout(self) -> Layout:
@@ -163,10 +180,13 @@ class Model:
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
         """
-        return Model(
-            named_parameters.changed(self.scene, changes), self.known, self.engine_choice,
+        changed = Model(
+            named_parameters.changed(self.scene, changes), self.known, self._fusing,
             self._product_accuracy,
         )  # fmt: skip
+        if self.fusion.library is not None:
+            changed.fusion.build()  # the library at hand, unless a structural zero was touched
+        return changed
 
     def simulate(
         self,

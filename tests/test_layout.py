@@ -20,7 +20,7 @@ SETUPTOOLS = PROJECT["tool"]["setuptools"]
 ROOMS = ("derive", "templates", "generated", "runtime")
 
 # The modules that join derivation and numbers: a command line, a compile, a comparison.
-BRIDGES = {"__init__", "__main__", "cli", "compilation", "crosscheck"}
+BRIDGES = {"__init__", "__main__", "cli", "compilation", "crosscheck", "fusion"}
 
 
 def room_folder(package: str) -> Path:

@@ -1,0 +1,202 @@
+"""The fused code of one scene: looked for in the cache, built when that pays, or out of reach.
+
+Together with `compilation` this joins the rooms: the structure and the numbers come from runtime,
+the text from derive, the library from the cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import ElementError, EnvironmentFailure
+from .fused_abi import ABI, FLAGS
+from .ir import KernelIR, from_json
+from .runtime.cache import Built, Recipe, find, opened
+from .runtime.fused import FusedLibrary, open_library
+from .runtime.structure import structure_of
+from .spec import ElementSpec
+from .structure import Key, Structure
+
+if TYPE_CHECKING:
+    from .derive.fuse import Fused
+    from .runtime.pack import Known, Packed
+
+#: More bodies than this are not fused: the compiler's time grows with their square while the
+#: advantage over the looped engine shrinks.
+MOST_BODIES = 64
+#: Seconds that a compiler takes for the scalar code, by bodies and their square, and seconds that
+#: one evaluation saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
+#: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
+_SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.2, 0.04, 0.002
+_SAVED_PER_BODY = 1e-7
+
+#: What decides the text besides structure and kernels: the modules that print it.
+_PRINTERS = (
+    "fuse.py", "fused_loads.py", "transport.py", "inline.py", "balance.py", "schedule.py",
+    "fused_c.py", "fused_sincos.py", "straight_c.py", "c_text.py",
+)  # fmt: skip
+
+
+class Fusion:
+    """Fused libraries of one packed scene; `numbers` is the vector p that they read."""
+
+    def __init__(
+        self,
+        packed: Packed,
+        known: Known,
+        definitions: Mapping[Key, ElementSpec],
+        obstacle: str = "",
+    ) -> None:
+        self._definitions = definitions
+        self.obstacle = obstacle or _obstacle(packed)
+        self.library: FusedLibrary | None = None
+        self.lanes: FusedLibrary | None = None
+        self.note = ""
+        if not self.obstacle:
+            self.structure, self.numbers = structure_of(packed, known)
+
+    def find(self) -> FusedLibrary | None:
+        """The scalar library if it is in the cache; no compiler is started."""
+        return self._get("scalar", build=False)
+
+    def build(self) -> FusedLibrary:
+        """The scalar library, compiled if it is not in the cache.
+
+        Raises EnvironmentFailure if there is no compiler, it fails, or the scene cannot be fused.
+        """
+        found = self._get("scalar", build=True)
+        if found is None:
+            raise EnvironmentFailure(f"this scene cannot be fused: {self.obstacle}")
+        return found
+
+    def ready(self, evaluations: float) -> FusedLibrary | None:
+        """The scalar library if it is there, or if so many evaluations are worth a compiler run."""
+        return self._ready("scalar", evaluations)
+
+    def ready_lanes(self, evaluations: float) -> FusedLibrary | None:
+        """The same for the library that computes several states side by side."""
+        return self._ready("lanes", evaluations)
+
+    def _ready(self, part: str, evaluations: float) -> FusedLibrary | None:
+        found = self._get(part, build=False)
+        if found is None and not self.obstacle and evaluations > self._break_even():
+            try:
+                found = self._get(part, build=True)
+            except EnvironmentFailure as error:
+                self.obstacle = self.note = str(error)
+        return found
+
+    def _break_even(self) -> float:
+        n = len(self.structure.bodies)
+        seconds = _SECONDS + n * (_SECONDS_PER_BODY + n * _SECONDS_PER_PAIR)
+        return seconds / (_SAVED_PER_BODY * max(1, n))
+
+    def _get(self, part: str, build: bool) -> FusedLibrary | None:
+        attribute = "library" if part == "scalar" else "lanes"
+        found: FusedLibrary | None = getattr(self, attribute)
+        if found is not None or self.obstacle:
+            return found
+        recipe = self._recipe(part)
+        try:
+            if build or find(recipe) is not None:
+                found, built = opened(recipe, open_library)
+                self.note = _note(built)
+        except EnvironmentFailure:
+            if build:
+                raise
+        setattr(self, attribute, found)
+        return found
+
+    def _recipe(self, part: str) -> Recipe:
+        identity = {
+            "structure": self.structure.identity(), "part": part, "abi": str(ABI),
+            "printers": _printers_hash(), "kernels": _manifest_hash(),
+        }  # fmt: skip
+        return Recipe("fused", identity, partial(self._sources, part), FLAGS)
+
+    def _sources(self, part: str, key: str) -> dict[str, str]:
+        from .derive.fused_c import fused_sources
+
+        return fused_sources(self.fused(self.structure), key, part)
+
+    def fused(self, structure: Structure) -> Fused:
+        """The IR of a structure whose elements this scene has; no compiler, no cache."""
+        from .derive.fuse import fuse
+
+        return fuse(structure, kernels_of(self._definitions))
+
+
+def _note(built: Built) -> str:
+    more = f"; {built.note}" if built.note else ""
+    if built.how == "cached":
+        return f"its code was in the cache{more}"
+    return f"its code was compiled in {built.seconds:.2f} s and kept{more}"
+
+
+def _obstacle(packed: Packed) -> str:
+    """Why a scene is not fused; empty if it can be."""
+    count = int(packed.model.n_bodies)
+    if packed.releases:
+        return "a hinge is released during the run, which changes the structure"
+    if count > MOST_BODIES:
+        return f"{count} bodies; fused code pays up to about {MOST_BODIES}"
+    if packed.model.product != packed.ffi.NULL:
+        return "the product of classical matrices is looped"
+    if any(packed.model.bodies[i].tape != packed.ffi.NULL for i in range(count)):
+        return "a hinge is interpreted because it was generated without a compiler"
+    return ""
+
+
+@cache
+def _printers_hash() -> str:
+    folder = files("mstmm.derive")
+    found = hashlib.sha256()
+    for name in _PRINTERS:
+        found.update(folder.joinpath(name).read_bytes())
+    for path in sorted(Path(str(files("mstmm.templates"))).glob("fused_*.c")):
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+@cache
+def _manifest_hash() -> str:
+    return hashlib.sha256(
+        files("mstmm.generated").joinpath("manifest.json").read_bytes()
+    ).hexdigest()
+
+
+def kernels_of(definitions: Mapping[Key, ElementSpec]) -> Callable[[Key, str], KernelIR]:
+    """Kernels by element and name: of users' definitions, else of the prebuilt elements.
+
+    The function raises ElementError if there is no such kernel.
+    """
+
+    def kernel(key: Key, name: str) -> KernelIR:
+        if key not in definitions:
+            return _prebuilt(key, name)
+        for found in definitions[key].kernels:
+            if found.name == name:
+                return found
+        raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
+
+    return kernel
+
+
+@cache
+def _stored(key: Key) -> dict[str, Any]:
+    text = files("mstmm.generated").joinpath(f"{key[0]}_{key[1]}.json").read_text(encoding="utf-8")
+    return {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
+
+
+@cache
+def _prebuilt(key: Key, name: str) -> KernelIR:
+    found = _stored(key).get(name)
+    if found is None:
+        raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
+    return from_json(json.dumps(found))

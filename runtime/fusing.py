@@ -1,0 +1,63 @@
+"""What a model knows of the fused code of its scene; how it is made is not this room's affair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .fused import FusedLibrary
+
+Array = NDArray[np.float64]
+
+
+class Fusing(Protocol):
+    """Fused libraries of a scene: `library` for one state, `lanes` for several side by side.
+
+    `numbers` is the vector p they read; `note` says where the library came from, `obstacle` why
+    there can be none.  `ready(n)` gives a library if it is there or if n evaluations are worth a
+    compiler run; `find()` only looks; `build()` raises EnvironmentFailure where there can be none.
+    """
+
+    library: FusedLibrary | None
+    lanes: FusedLibrary | None
+    numbers: Array
+    note: str
+    obstacle: str
+
+    def find(self) -> FusedLibrary | None: ...
+    def build(self) -> FusedLibrary: ...
+    def ready(self, evaluations: float) -> FusedLibrary | None: ...
+    def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
+    def fused(self, structure: Any) -> Any: ...
+
+
+@dataclass
+class NotFused:
+    """A scene that runs on the looped engine alone."""
+
+    obstacle: str = "this model was made without the means to compile fused code"
+    library: FusedLibrary | None = None
+    lanes: FusedLibrary | None = None
+    note: str = ""
+    numbers: Array = field(default_factory=lambda: np.zeros(0))
+
+    def find(self) -> None:
+        return None
+
+    def build(self) -> FusedLibrary:
+        from mstmm.errors import EnvironmentFailure
+
+        raise EnvironmentFailure(f'{self.obstacle}; use mstmm.compile(scene, engine="fused")')
+
+    def ready(self, evaluations: float) -> None:
+        return None
+
+    def ready_lanes(self, evaluations: float) -> None:
+        return None
+
+    def fused(self, structure: Any) -> Any:
+        return self.build()
