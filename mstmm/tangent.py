@@ -132,20 +132,22 @@ def tangent(
     ports: Iterable[str],
     outputs: Iterable[str] | None = None,
     values: bool = True,
+    guards: bool = True,
 ) -> KernelIR:
     """The kernel that computes `kernel`'s outputs y(x) and d_y = (dy/dx) d_x.
 
     Behind the inputs of `kernel` stands one `d_<port>` for each of `ports` (names of inputs, in
     the order of the kernel), of the same shape: the direction.  Behind its outputs stands one
     `d_<port>` for each of `outputs` (default: all), which accumulates where the output does.  With
-    `values` False the outputs themselves are left out, and what only they need.  Guards stay.
+    `values` False the outputs themselves are left out, with `guards` False the guards (for callers
+    that run `kernel` as well), and what only they need.
 
     A run-time sized `solve` x = A^-1 b is differentiated as A^-1 db, by a second solve.
 
     Raises ValueError for names that the kernel does not have, and where A itself depends on
     `ports`: the right side db - dA x is then no array that a `solve` can read.
     """
-    return _Tangent(kernel, set(ports), outputs, values).run()
+    return _Tangent(kernel, set(ports), outputs, values, guards).run()
 
 
 Index = tuple[int | str, ...]
@@ -155,9 +157,14 @@ class _Tangent:
     """One pass over a kernel: its statements replayed on a graph, then their derivatives."""
 
     def __init__(
-        self, kernel: KernelIR, ports: set[str], outputs: Iterable[str] | None, values: bool
+        self,
+        kernel: KernelIR,
+        ports: set[str],
+        outputs: Iterable[str] | None,
+        values: bool,
+        guards: bool,
     ) -> None:
-        self.kernel, self.graph = kernel, Graph()
+        self.kernel, self.graph, self.guards = kernel, Graph(), guards
         names = [port.name for port in kernel.outputs]
         solved = {s.port for s in kernel.statements if isinstance(s, Solve)}
         wanted = (set(names) if outputs is None else set(outputs)) | solved
@@ -203,6 +210,8 @@ class _Tangent:
             if isinstance(statement, Assign):
                 self._assign(statement)
             elif isinstance(statement, Guard):
+                if not self.guards:
+                    continue
                 condition = self._value(statement.condition)
                 self.graph.guard(condition, statement.code, statement.message)
             elif isinstance(statement, Solve):

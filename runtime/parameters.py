@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
-_TABLES = ("body", "hinge", "load", "event", "spring")
+TABLES = ("body", "hinge", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -20,7 +20,7 @@ def _data(scene: Scene) -> dict[str, Any]:
 
 
 def _named(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    for table in _TABLES:
+    for table in TABLES:
         for element in data.get(table, []):
             yield element["name"], element
 
@@ -58,10 +58,30 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     for path, value in changes.items():
         if not _set(data, path, value):
             known = known or read(scene)
-            near = difflib.get_close_matches(path, known, 1, 0.5)
-            hint = f'; did you mean "{near[0]}"?' if near else ""
-            raise SceneError(f'parameter "{path}": there is no such number in the scene{hint}')
+            raise _unknown(path, known)
     return Scene.from_data(data)
+
+
+def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
+    """The names in full, with the index 0 where a list of one stands without an index.
+
+    Raises SceneError for a name that the scene does not have.
+    """
+    known = read(scene)
+    alone = {name.replace("[0]", ""): name for name in known}
+    found = []
+    for name in names:
+        full = name if name in known else alone.get(name, "")
+        if not full or (full != name and full.replace("[0]", "[1]") in known):
+            raise _unknown(name, known)
+        found.append(full)
+    return found
+
+
+def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
+    near = difflib.get_close_matches(name, known, 1, 0.5)
+    hint = f'; did you mean "{near[0]}"?' if near else ""
+    return SceneError(f'parameter "{name}": there is no such number in the scene{hint}')
 
 
 def _set(data: dict[str, Any], path: str, value: float) -> bool:

@@ -1,0 +1,109 @@
+"""Named numbers of a scene as Duals, and what they do to the numbers p of the fused kernel.
+
+The way from a scene to p (frames, mass moments, axes) is not differentiated by hand: the same code
+runs once more on a scene whose chosen numbers are Duals, and p comes out with exact slopes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from mstmm.dual import Dual, Marks, value_of
+from mstmm.expression import Expression, number
+from mstmm.scene import Hinge, Scene
+from mstmm.structure import Structure
+
+from . import parameters
+from .pack import Known, pack
+from .structure import structure_of
+
+Array = NDArray[np.float64]
+Change = Callable[[float], Any]
+
+_PART = re.compile(r"[^.\[\]]+|\[\d+\]")
+
+
+def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure, Array, Array]:
+    """(structure, p, dp/dnames) with p (np,) and its slopes (np, names).
+
+    The structure is that of the scene, except that a structural zero or axis that a named number
+    moves is a place in p.  Raises SceneError for a name that the scene does not have.
+    """
+    marks = Marks()
+    structure, raw = structure_of(pack(_seeded(scene, names, marks), known), known)
+    found = [marks.resolve(x) for x in raw.tolist()]
+    values = np.array([value_of(x) for x in found])
+    _check(structure_of(pack(scene, known), known)[1].tolist(), values.tolist())
+    moved = np.zeros((len(found), len(names)))
+    for place, dual in enumerate(found):
+        if isinstance(dual, Dual):
+            for k, slope in dual.slope.items():
+                moved[place, k] = slope
+    return structure, values, moved
+
+
+def _check(plain: Sequence[float], found: Sequence[float]) -> None:
+    """Every number of the scene must be there again, bit for bit: a Dual that something else than
+    its own arithmetic has read would show here.
+    """
+    lost = Counter(plain) - Counter(found)
+    if lost:
+        raise AssertionError(f"numbers of the scene have been lost: {sorted(lost)}")
+
+
+def _seeded(scene: Scene, names: Sequence[str], marks: Marks) -> Scene:
+    """The scene, not validated again, with a Dual of slope 1 in place of every named number."""
+    for k, name in enumerate(parameters.resolved(scene, names)):
+
+        def dual(value: Any, k: int = k) -> Any:
+            if isinstance(value, Expression):
+                constant = value.evaluate(lambda _: math.nan)
+                return number(float(Dual(constant, {k: 1.0}, marks)))
+            return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0}, marks)
+
+        scene = _changed(scene, name, dual)
+    return scene
+
+
+def _changed(scene: Scene, name: str, change: Change) -> Scene:
+    parts: list[str | int] = [
+        int(part[1:-1]) if part.startswith("[") else part for part in _PART.findall(name)
+    ]
+    fields: dict[str, Any] = {key: getattr(scene, key) for key in type(scene).model_fields}
+    if parts[0] == "gravity":
+        fields["gravity"] = _replaced(scene.gravity, parts[1:], change)
+    else:
+        for table in parameters.TABLES:
+            fields[table] = tuple(
+                _element(element, parts[1:], change) if element.name == parts[0] else element
+                for element in fields[table]
+            )
+    # Constructed afresh: a copy would keep what the scene has cached of its old numbers.
+    return Scene.model_construct(**fields)
+
+
+def _element(element: BaseModel, parts: Sequence[str | int], change: Change) -> BaseModel:
+    changed = _replaced(element, parts, change)
+    if isinstance(changed, Hinge) and changed.type == "planar" and parts[0] == "normal":
+        return changed.model_copy(update={"axis": changed.normal})
+    return changed
+
+
+def _replaced(target: Any, parts: Sequence[str | int], change: Change) -> Any:
+    """`target` with the number at the end of the path changed."""
+    if not parts:
+        return change(target)
+    key, rest = parts[0], parts[1:]
+    if isinstance(target, tuple):
+        return tuple(_replaced(x, rest, change) if i == key else x for i, x in enumerate(target))
+    if isinstance(target, Mapping):
+        return {**target, key: _replaced(target[key], rest, change)}
+    return target.model_copy(update={key: _replaced(getattr(target, str(key)), rest, change)})

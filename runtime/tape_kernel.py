@@ -1,0 +1,49 @@
+"""A KernelIR run by the interpreter that is always there: arrays in, arrays out, no compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.ir import KernelIR
+from mstmm.tape import compile_tape
+
+from . import prebuilt
+from .values import c_tape
+
+Array = NDArray[np.float64]
+
+
+class TapeKernel:
+    """One kernel of fixed size as a tape.  One thread at a time."""
+
+    def __init__(self, kernel: KernelIR) -> None:
+        self._ffi, self._lib = prebuilt.module()
+        self._kept: list[object] = []
+        tape = compile_tape(kernel)
+        self._tape = c_tape(self._ffi, tape, self._kept)
+        self._work = self._reals(tape.slots)
+        self._inputs = {p.name: self._reals(p.length()) for p in kernel.inputs}
+        self._outputs = {p.name: self._reals(p.length()) for p in kernel.outputs}
+        pointer, new = self._pointer, self._ffi.new
+        self._in = new("real *[]", [pointer(x) for x in self._inputs.values()] or 1)
+        self._out = new("real *[]", [pointer(x) for x in self._outputs.values()] or 1)
+
+    def _reals(self, length: int) -> Array:
+        return np.zeros(max(1, length))
+
+    def _pointer(self, array: Array) -> object:
+        found: object = self._ffi.from_buffer("real[]", array)
+        return found
+
+    def run(self, values: Mapping[str, Array]) -> tuple[int, dict[str, Array]]:
+        """(code, outputs): 0, or the code of the guard that failed; the outputs are views that
+        the next run overwrites.  Inputs that are not given keep their last values (0 at first)."""
+        for name, array in self._inputs.items():
+            if name in values:
+                array[: len(values[name])] = values[name]
+        work = self._pointer(self._work)
+        code = int(self._lib.mstmm_tape_run(self._tape, self._in, work, self._out))
+        return code, self._outputs
