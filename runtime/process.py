@@ -7,66 +7,107 @@ import os
 import select
 import signal
 import subprocess
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+#: Bytes of a program's output that are kept; the rest is read and dropped.
+_KEPT = 20_000
+
+#: Where the system does not announce the end of a process: pause between two looks, s.
+_PAUSE = 0.01
 
 
 class Hanging(Exception):
     """The program did not end within its time; it and all it started were killed."""
 
 
-def run(command: Sequence[str], said: Path, timeout: float, **environment: str) -> int:
-    """Run `command` in the folder of the file `said`, which receives all that it prints.
+@dataclass(frozen=True)
+class Ended:
+    """Exit code of a program, -n where signal n ended it, and the beginning of what it said."""
 
-    Returns its exit code, -n where signal n ended it.  The program gets a process group of its own;
-    whenever it does not end by itself and well (timeout in s, Ctrl-C, a failure), the whole group
-    is killed, so that no compiler pass goes on writing.  Raises Hanging, and OSError if the program
-    cannot be started.
+    code: int
+    said: str
+
+    def signal(self) -> str:
+        """Name of the signal that ended it."""
+        known = -self.code in set(signal.Signals)
+        return signal.Signals(-self.code).name if known else f"signal {-self.code}"
+
+
+def run(command: Sequence[str], folder: Path, timeout: float, **environment: str) -> Ended:
+    """Run `command` in `folder` for at most `timeout` s, with changes to the environment.
+
+    The program gets a process group of its own; whenever it does not end by itself and well (time,
+    Ctrl-C, a failure), the whole group is killed, so that no compiler pass goes on writing.
+    Raises Hanging, and OSError if the program cannot be started.
     """
-    # A file takes the output: reading a pipe could wait for ever on a grandchild that kept it open.
-    with said.open("wb") as output:
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
-            cwd=said.parent, env=_environment(environment), start_new_session=True,
-        )  # fmt: skip
+    # A pipe, for the disk may be full; we stop reading when the program itself has ended, for a
+    # grandchild could keep the pipe open for ever.
+    reader, writer = os.pipe()
     try:
-        _wait(process, timeout)
+        os.set_blocking(reader, False)
+        try:
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=writer, stderr=subprocess.STDOUT,
+                cwd=folder, env={**os.environ, "LC_ALL": "C", **environment},
+                start_new_session=True,
+            )  # fmt: skip
+        finally:
+            os.close(writer)
+        try:
+            said = _said_until_the_end(process, reader, timeout)
+        finally:
+            if process.returncode != 0:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
     finally:
-        if process.returncode != 0:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-    return process.returncode
+        os.close(reader)
+    return Ended(process.returncode, said.decode("utf-8", "replace"))
 
 
-def _environment(changes: Mapping[str, str]) -> dict[str, str]:
-    return {**os.environ, "LC_ALL": "C", **changes}
+def _said_until_the_end(process: subprocess.Popen[bytes], reader: int, timeout: float) -> bytes:
+    """What the program writes; Hanging if it does not end in time."""
+    said = bytearray()
+    deadline = time.monotonic() + timeout
+    poll = select.poll()
+    poll.register(reader, select.POLLIN)
+    with _announced_end(process, poll) as announced:
+        while True:
+            left = deadline - time.monotonic()
+            ready = {handle for handle, _ in poll.poll(max(0.0, min(left, announced)) * 1000)}
+            if reader in ready and not _take(reader, said):
+                poll.unregister(reader)  # all have closed it: nothing more to come
+            if process.poll() is not None:
+                _take(reader, said)
+                return bytes(said)
+            if left <= 0:
+                raise Hanging
 
 
-def _wait(process: subprocess.Popen[bytes], timeout: float) -> None:
-    """Wait without the pauses of up to 50 ms that Popen.wait(timeout) sleeps."""
+@contextlib.contextmanager
+def _announced_end(process: subprocess.Popen[bytes], poll: select.poll) -> Iterator[float]:
+    """Let `poll` wake up when the process ends; yields the longest pause to make in between, s."""
     try:
         handle = os.pidfd_open(process.pid)
     except (AttributeError, OSError):  # not on this system
-        try:
-            process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            raise Hanging from None
+        yield _PAUSE
         return
     try:
-        poll = select.poll()
         poll.register(handle, select.POLLIN)
-        if not poll.poll(timeout * 1000):
-            raise Hanging
-        process.wait()
+        yield 3600.0
     finally:
         os.close(handle)
 
 
-def head(said: Path, size: int = 20_000) -> str:
-    """The beginning of what a program printed."""
-    try:
-        with said.open("rb") as file:
-            return file.read(size).decode("utf-8", "replace")
-    except OSError:
-        return ""
+def _take(reader: int, said: bytearray) -> bool:
+    """Read what is there; False when the other side is closed."""
+    with contextlib.suppress(BlockingIOError):
+        for _ in range(64):  # then look at the clock again: some programs never stop talking
+            chunk = os.read(reader, 65536)
+            if not chunk:
+                return False
+            said += chunk[: max(0, _KEPT - len(said))]
+    return True

@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .process import Hanging, head, run
+from .process import Hanging, run
 
 #: Name of the function `int (void)` that a library may export: 0 if all is right.
 OWN_TEST = "mstmm_self_test"
@@ -33,21 +32,19 @@ def problem(library: Path, symbols: Sequence[str]) -> str:
     """What is wrong with a library, in a few words; "" if nothing is, or if it cannot be tried."""
     if not sys.executable:  # Python inside another program
         return ""
-    said = library.parent / "self-test.txt"
     try:
-        code = run(
-            [sys.executable, "-I", "-S", "-c", _SCRIPT, str(library), *symbols], said, _TIMEOUT
+        ended = run(
+            [sys.executable, "-I", "-S", "-c", _SCRIPT, str(library), *symbols],
+            library.parent,
+            _TIMEOUT,
         )
     except Hanging:
         return f"it did not return within {_TIMEOUT:g} s"
     except OSError:
         return ""
-    finally:
-        lines = head(said).splitlines()
-        said.unlink(missing_ok=True)
-    if code == 0:
+    if ended.code == 0:
         return ""
-    if code < 0:
-        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-        return f"it crashes ({name})"
-    return lines[-1].strip()[:300] if lines else f"its test ended with code {code}"
+    if ended.code < 0:
+        return f"it crashes ({ended.signal()})"
+    lines = ended.said.splitlines()
+    return lines[-1].strip()[:300] if lines else f"its test ended with code {ended.code}"

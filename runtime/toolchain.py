@@ -11,8 +11,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mstmm.errors import EnvironmentFailure
+
+if TYPE_CHECKING:
+    from .process import Ended
 
 #: Seconds after which a compiler is taken for hanging.
 TIMEOUT = 300.0
@@ -79,18 +83,15 @@ def _libc() -> str:
 
 
 def version(found: Compiler, folder: Path) -> str:
-    """First line of what `--version` answers.  `folder` takes a file for a moment."""
-    from .process import Hanging, head, run
+    """First line of what `--version` answers, asked in `folder`."""
+    from .process import Hanging, run
 
-    said = folder / "version.txt"
     try:
-        code = run([*found.command, "--version"], said, 10.0)
+        ended = run([*found.command, "--version"], folder, 10.0)
     except (Hanging, OSError):
         return "unknown"
-    finally:
-        lines = head(said).splitlines()
-        said.unlink(missing_ok=True)
-    return lines[0].strip() if code == 0 and lines else "unknown"
+    lines = ended.said.splitlines()
+    return lines[0].strip() if ended.code == 0 and lines else "unknown"
 
 
 def library_suffix() -> str:
@@ -107,14 +108,13 @@ def build(
     it leaves nothing behind.  Raises EnvironmentFailure, one line, if the compiler cannot be run,
     fails, is killed, does not end within `timeout` s, or leaves no library.
     """
-    from .process import Hanging, head, run
+    from .process import Hanging, run
 
     folder = sources[0].parent
-    said = folder / "compiler.txt"
     command = [*found.command, *flags, "-fPIC", "-shared", *map(str, sources), "-lm"]
     begin = time.perf_counter()
     try:
-        code = run([*command, "-o", str(target)], said, timeout, TMPDIR=str(folder))
+        ended = run([*command, "-o", str(target)], folder, timeout, TMPDIR=str(folder))
     except Hanging:
         raise EnvironmentFailure(
             f"the C compiler {found.command[0]} did not finish within {timeout:g} s and was "
@@ -125,8 +125,8 @@ def build(
             f"the C compiler {found.command[0]} could not be run ({error.strerror}); "
             "see mstmm doctor"
         ) from None
-    if code != 0:
-        raise EnvironmentFailure(_reason(found, code, head(said), sources[0].name))
+    if ended.code != 0:
+        raise EnvironmentFailure(_reason(found, ended, sources[0].name))
     if not target.is_file() or target.stat().st_size == 0:
         raise EnvironmentFailure(
             f"the C compiler {found.command[0]} reported success and left no library; "
@@ -135,22 +135,21 @@ def build(
     return time.perf_counter() - begin
 
 
-def _reason(found: Compiler, code: int, said: str, source: str) -> str:
+def _reason(found: Compiler, ended: Ended, source: str) -> str:
     """One line on why a compiler failed."""
     program = found.command[0]
-    if any(text in said for text in _NO_ROOM) or code == -signal.SIGXFSZ:
+    if any(text in ended.said for text in _NO_ROOM) or ended.code == -signal.SIGXFSZ:
         return (
             f"the C compiler {program} found no room on the disk; make room, or take another "
             "folder (MSTMM_CACHE; of own elements MSTMM_KERNELS)"
         )
-    if code < 0:
-        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-        hint = " (too little memory?)" if -code == signal.SIGKILL else ""
-        return f"the C compiler {program} was killed by {name}{hint}; see mstmm doctor"
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    if ended.code < 0:
+        hint = " (too little memory?)" if -ended.code == signal.SIGKILL else ""
+        return f"the C compiler {program} was killed by {ended.signal()}{hint}; see mstmm doctor"
+    lines = [line.strip() for line in ended.said.splitlines() if line.strip()]
     first = next((line for line in lines if "error" in line), lines[-1] if lines else "no message")
     shown = "".join(c if c.isprintable() else " " for c in first)[:300]
     return (
-        f"the C compiler {program} could not compile {source} (exit code {code}: {shown}); "
+        f"the C compiler {program} could not compile {source} (exit code {ended.code}: {shown}); "
         "see mstmm doctor"
     )
