@@ -10,19 +10,23 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mstmm.errors import EnvironmentFailure, MstmmError
+from mstmm.scene import Scene
+
+if TYPE_CHECKING:
+    from .model import Model
+
+#: (scene, engine) -> model.
+Compile = Callable[[Scene, str], "Model"]
 
 #: Packages that take part in a run, or in a derivation.
 PACKAGES = ("mstmm", "numpy", "scipy", "cffi", "sympy", "jinja2", "pydantic")
-
-#: Flags of the compiler's trial: those of a fused library.
-_FLAGS = ("-O2", "-std=gnu17", "-march=native", "-fno-math-errno", "-fno-trapping-math")
 
 #: Least room, bytes, that is not worth a remark.
 _LITTLE_ROOM = 50_000_000
@@ -38,9 +42,17 @@ class Finding:
     data: dict[str, Any] = field(default_factory=dict)
 
 
-def examine() -> list[Finding]:
-    """All findings, in the order in which a reader understands them."""
-    return [finding for part in _PARTS for finding in part()]
+def examine(compiled: Compile, flags: Sequence[str]) -> list[Finding]:
+    """All findings, in the order in which a reader understands them.
+
+    `compiled(scene, engine)` gives the model of a scene (mstmm.compile); `flags` are those that
+    fused code is compiled with.
+    """
+    parts = (
+        _versions(), _processor(), _compiler(flags), _cache(), _prebuilt(compiled),
+        _built_here(compiled, flags),
+    )  # fmt: skip
+    return [finding for part in parts for finding in part]
 
 
 # --- what is there --------------------------------------------------------------------------------
@@ -71,7 +83,7 @@ def _processor() -> Iterator[Finding]:
     yield Finding("processor", True, text, dict(found))
 
 
-def _compiler() -> Iterator[Finding]:
+def _compiler(flags: Sequence[str]) -> Iterator[Finding]:
     from . import toolchain
 
     try:
@@ -84,7 +96,7 @@ def _compiler() -> Iterator[Finding]:
         answer = toolchain.version(found, Path(folder))
     text = f"{' '.join(found.command)}: {answer}"
     yield Finding("compiler", True, text, {**found.identity(), "version": answer})
-    yield Finding("flags", True, " ".join(_FLAGS), {"flags": list(_FLAGS)})
+    yield Finding("flags", True, " ".join(flags), {"flags": list(flags)})
 
 
 def _cache() -> Iterator[Finding]:
@@ -124,7 +136,7 @@ def _cache() -> Iterator[Finding]:
 # --- trial runs -----------------------------------------------------------------------------------
 
 
-def _prebuilt() -> Iterator[Finding]:
+def _prebuilt(compiled: Compile) -> Iterator[Finding]:
     from . import prebuilt
 
     try:
@@ -133,17 +145,21 @@ def _prebuilt() -> Iterator[Finding]:
         yield Finding("kernels", False, str(error))
         return
     yield Finding("kernels", True, f"{len(names)} prebuilt elements", {"elements": names})
-    yield _tried("prebuilt kernels", _pendulum)
+    yield _tried("looped engine", lambda: _pendulum(compiled, "looped"))
 
 
-def _own_compile() -> Iterator[Finding]:
+def _built_here(compiled: Compile, flags: Sequence[str]) -> Iterator[Finding]:
+    """A kernel compiled for the trial, then a scene by the way that every scene goes."""
     from . import toolchain
 
     try:
         toolchain.compiler()
     except EnvironmentFailure:
         return  # said above
-    yield _tried("compiling", _tiny_library)
+    trial = _tried("compiling", lambda: _tiny_library(flags))
+    yield trial
+    if trial.ok:
+        yield _tried("fused engine", lambda: _pendulum(compiled, "fused"))
 
 
 def _tried(subject: str, trial: Callable[[], str]) -> Finding:
@@ -155,7 +171,7 @@ def _tried(subject: str, trial: Callable[[], str]) -> Finding:
         return Finding(subject, False, f"{type(error).__name__}: {error}; install mstmm again")
 
 
-def _tiny_library() -> str:
+def _tiny_library(flags: Sequence[str]) -> str:
     """Compile a kernel with the flags of fused code, open it, and compare with what it must say."""
     from .library_build import Order, fetched
     from .toolchain import TIMEOUT
@@ -167,7 +183,7 @@ def _tiny_library() -> str:
     )
     with tempfile.TemporaryDirectory(prefix="mstmm-doctor-") as folder:
         order = Order(
-            "trial", "0" * 64, lambda key: {"trial.c": text}, _FLAGS, ("trial",), "TMPDIR"
+            "trial", "0" * 64, lambda key: {"trial.c": text}, tuple(flags), ("trial",), "TMPDIR"
         )
         built = fetched(Path(folder) / "trial", order, min(TIMEOUT, 60.0))
         worst = _trial_error(built.path)
@@ -193,27 +209,22 @@ def _trial_error(path: Path) -> float:
     return worst
 
 
-def _pendulum() -> str:
+def _pendulum(compiled: Compile, engine: str) -> str:
     """A rod on a pin: one period by the complete elliptic integral brings it back."""
     import numpy as np
     from scipy.special import ellipk
 
-    from mstmm.scene import Scene
-
-    from .model import Model
-
     mass, arm, inertia, g, start = 1.3, 0.45, 0.09, 9.81, 1.1
-    body = {
-        "name": "rod",
-        "mass": mass,
-        "center_of_mass": [arm, 0, 0],
+    rod = {
+        "name": "rod", "mass": mass, "center_of_mass": [arm, 0, 0],
         "inertia": [0.001, inertia, inertia],
-    }
-    hinge = {
+    }  # fmt: skip
+    pivot = {
         "name": "pivot", "type": "pin", "inboard": "ground", "outboard": "rod", "axis": [0, 0, 1],
         "initial": {"q": [start]},
     }  # fmt: skip
-    model = Model(Scene.model_validate({"gravity": [g, 0, 0], "body": [body], "hinge": [hinge]}))
+    scene = Scene.model_validate({"gravity": [g, 0, 0], "body": [rod], "hinge": [pivot]})
+    model = compiled(scene, engine)
     square = mass * g * arm / (inertia + mass * arm**2)  # rad^2/s^2
     angles = np.linspace(-3.0, 3.0, 25)[:, None]
     found = model.accelerations(angles, np.zeros_like(angles))
@@ -227,11 +238,6 @@ def _pendulum() -> str:
             "(after a period); install mstmm again: pip install --force-reinstall mstmm"
         )
     return f"a pendulum keeps its closed form (accelerations {worst:.0e}, a period {drift:.0e} rad)"
-
-
-_PARTS: tuple[Callable[[], Iterator[Finding]], ...] = (
-    _versions, _processor, _compiler, _cache, _prebuilt, _own_compile,
-)  # fmt: skip
 
 
 def summary() -> str:

@@ -10,11 +10,13 @@ from .options import Json
 
 def doctor(json: Json = False) -> None:
     """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
+    from mstmm.compilation import compile_scene
+    from mstmm.derive.fused_c import FLAGS
     from mstmm.runtime import doctor as examination
 
     from . import output
 
-    findings = examination.examine()
+    findings = examination.examine(compile_scene, FLAGS)
     problems = [finding for finding in findings if not finding.ok]
     if json:
         plain = [vars(finding) for finding in findings]
