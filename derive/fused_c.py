@@ -62,8 +62,8 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
     else:
         texts.append(function_text(kernels["accelerations"], "lanes_accelerations", LANES))
         texts += [_lanes_entry(kernels["accelerations"]), support("many")]
-        names = ["accelerations_lanes", "accelerations_many"]
-    functions = {name: f"mstmm_{name}" for name in names}
+        names = ("accelerations_lanes", "accelerations_many")
+        functions = {name: f"mstmm_{name}" for name in names}
     texts += [_descriptor(fused.failures, key, functions), _self_test(kernels, part)]
     return {"fused.c": "\n".join(texts)}
 
