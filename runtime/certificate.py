@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mstmm.scene import Hinge, Scene
 
-from .conditioning import PivotLoss, SingularDistance, pivot_loss, singular_distance
+from .conditioning import LARGEST, PivotLoss, SingularDistance, pivot_loss, singular_distance
 from .error_estimate import ANGLE, PART, SAFETY, ErrorEstimate
 from .stability import StepCheck
 
@@ -67,6 +67,7 @@ class Certificate:
             be larger by any factor.
         error: estimate of the error from a second run; None unless asked for (certify=True).
         finite: every number of q and u is finite.
+        too_large: the scene has too many bodies for the pivots to be looked at.
         end: the run's own message.
     """
 
@@ -81,6 +82,7 @@ class Certificate:
     error: ErrorEstimate | None
     finite: bool
     end: str
+    too_large: bool = False
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -99,6 +101,8 @@ class Certificate:
             rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
         if self.pivot is not None:
             rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
+        elif self.too_large:
+            rows.append(("pivot ratio", f"not computed for more than {LARGEST} bodies"))
         if self.singular is not None:
             rows.append(
                 ("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"')
@@ -122,6 +126,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
         statistics is not None and statistics.stability_limited,
         None if statistics is None else statistics.sum_local_error, error,
         bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()), run.message,
+        len(result.model.scene.bodies) > LARGEST,
     )  # fmt: skip
 
 
@@ -152,11 +157,12 @@ def _momentum(result: Result) -> list[Drift]:
     scene, found = result.model.scene, list[Drift]()
     if not len(result.t) or not _isolated(scene):
         return found
-    some = scene.body[:: max(1, len(scene.body) // _SOME)]
-    reach = max((_largest(result.position(body.name)) for body in some), default=0.0)
+    some = range(0, len(scene.bodies), max(1, len(scene.bodies) // _SOME))
+    reach = max((_largest(result.position(scene.bodies.name(i))) for i in some), default=0.0)
     force, moment = _support(result, reach)
     kinetic = np.sqrt(2 * _largest(result.energies()["kinetic"]))
     mass = sum(body.mass for body in scene.body)
+    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
     linear, angular = result.momentum(), result.angular_momentum()
     speed = kinetic * np.sqrt(mass)
     scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
@@ -176,8 +182,16 @@ def _isolated(scene: Scene) -> bool:
     """Nothing but hinges and gravity acts between the scene and the ground."""
     loads = any(not e.is_zero for load in scene.load for e in (*load.force, *load.moment))
     springs = any("ground" in (spring.from_, spring.to) for spring in scene.spring)
-    roots = [hinge for hinge in scene.hinge if hinge.inboard_body == "ground"]
-    return not loads and not springs and all(_passive(hinge) for hinge in roots)
+    return not loads and not springs and all(_passive(hinge) for hinge in _roots(scene))
+
+
+def _roots(scene: Scene) -> list[Hinge]:
+    """Hinges on the ground."""
+    firsts = zip(scene.chain, scene.hinges.starts, strict=False)
+    return [
+        *(hinge for hinge in scene.hinge if hinge.inboard_body == "ground"),
+        *(scene.hinges[first] for chain, first in firsts if chain.inboard == "ground"),
+    ]
 
 
 def _passive(hinge: Hinge) -> bool:
@@ -192,12 +206,11 @@ def _passive(hinge: Hinge) -> bool:
 def _support(result: Result, reach: float) -> tuple[list[bool], list[bool]]:
     """Which components of force, and of moment about the origin, the ground never passes on."""
     scene = result.model.scene
-    roots = [hinge for hinge in scene.hinge if hinge.inboard_body == "ground"]
+    roots = _roots(scene)
     if all(hinge.type in ("free", "elastic") for hinge in roots):  # passive ones: rounding only
         return [True] * 3, [True] * 3
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
-    loads = result._observed.part("loads")
-    largest = [_largest(loads[:, :, :3]), _largest(loads[:, :, 3:])]
+    largest = list(result._observed.largest_loads())
     largest[1] += largest[0] * reach
     for hinge in roots:
         f = result.force(hinge.name)

@@ -10,13 +10,15 @@ part in D over D.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.scene import Hinge
+
 from . import prebuilt
-from .pack import kernel_type
+from .pack import Packed, kernel_type
 
 if TYPE_CHECKING:
     from .model import Model
@@ -29,6 +31,9 @@ SAMPLES = 12
 
 #: Bodies times samples of that look, at most, but for one sample.
 _WORK = 20_000
+
+#: Scenes with more bodies than this are not looked at: it would take longer than the run.
+LARGEST = 200_000
 
 _UPPER = np.triu_indices(6)
 
@@ -55,14 +60,17 @@ class SingularDistance:
 
 
 def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
-    """The worst of some samples spread over the run; None where nothing moves freely."""
-    if not len(run.t) or not model.nu:
+    """The worst of some samples spread over the run; None where nothing moves freely, and for
+    scenes of more than LARGEST bodies."""
+    if not len(run.t) or not model.nu or len(model.scene.bodies) > LARGEST:
         return None
     worst, pivots = PivotLoss(0.0, "", 0.0), _Pivots(model)
     count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
         one = slice(k, k + 1)
-        seen = model._engine.observe(run.t[one], run.q[one], run.u[one], run.memory[one])
+        seen = model._engine.observe(
+            run.t[one], run.q[one], run.u[one], run.memory[one], parts=("udot",)
+        )
         if seen.failures:
             continue
         ratios = pivots.ratios(model._engine.workspace_array(), run.memory[k])
@@ -78,11 +86,11 @@ class _Pivots:
 
     def __init__(self, model: Model) -> None:
         packed, lib = model._engine.packed, model._engine.lib
-        self.parents = np.array([link.parent for link in packed.topology.links])
+        records = packed.records
+        self.parents = records.column("parent").astype(np.int64)
         count = len(self.parents)
-        bodies = [packed.model.bodies[i] for i in range(count)]
-        speeds = np.array([body.nu for body in bodies])[:, None]
-        blocks = np.array([body.block for body in bodies])[:, None]
+        speeds = records.column("nu").astype(np.int64)[:, None]
+        blocks = records.column("block").astype(np.int64)[:, None]
         self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
         self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
@@ -91,12 +99,9 @@ class _Pivots:
         first = blocks + lib.MSTMM_BLOCK_FIXED + 10 * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
         self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
-        self.rotor, self.imposed = np.zeros((count, 6)), np.zeros((count, 6), dtype=bool)
-        self.release = np.array([body.release for body in bodies])
-        for i, body in enumerate(bodies):
-            self.rotor[i, : body.nu] = [body.rotor[k] for k in range(body.nu)]
-            if body.n_imposed:
-                self.imposed[i, : body.nu] = [body.imposed_mask[k] for k in range(body.nu)]
+        self.release = records.column("release").astype(np.int64)
+        self.rotor = _pointed(packed, "rotor", "real *", count)
+        self.imposed = _pointed(packed, "imposed_mask", "int *", count) != 0
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
         """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.
@@ -129,6 +134,17 @@ class _Pivots:
         return np.asarray(known[self.release] != 0.0) & (self.release >= 0)
 
 
+def _pointed(packed: Packed, field: str, pointer: str, count: int) -> Array:
+    """(n, 6) numbers per speed to which a field of the bodies' records points."""
+    addresses, first, which = np.unique(
+        packed.records.column(field), return_index=True, return_inverse=True
+    )
+    rows, speeds = np.zeros((len(addresses), 6)), packed.records.column("nu")[first]
+    for row, address, nu in zip(rows, addresses.tolist(), speeds.tolist(), strict=True):
+        row[:nu] = packed.ffi.unpack(packed.ffi.cast(pointer, address), nu) if nu else []
+    return np.asarray(rows[which.reshape(count)])
+
+
 def _carried_motion(turn: Array, shift: Array) -> Array:
     """(n, 6, 6): twist of P in its own axes from that of the parent with the hinge locked."""
     back = turn.transpose(0, 2, 1)
@@ -147,29 +163,41 @@ def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
     found: list[SingularDistance] = []
-    for hinge in model.scene.hinge:
-        measures = _measures(model, run, hinge.name)
-        if measures is None or not len(measures):
-            continue
-        k = int(np.abs(measures).argmin())
-        changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
-        k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
-        found.append(SingularDistance(value, hinge.name, float(run.t[k])))
+    for group in model.layout.groups:
+        for k in range(min(group.count, len(group.hinges))):
+            function = _measure(model, model.scene.hinges[group.first + k])
+            if function is None:
+                continue
+            for number in range(group.first + k, group.first + group.count, len(group.hinges)):
+                measures = _measures(model, run, number, function)
+                if len(measures):
+                    found.append(_smallest(model, run, number, measures))
     return min(found, key=lambda one: one.measure, default=None)
 
 
-def _measures(model: Model, run: Trajectory, name: str) -> Array | None:
-    """The hinge's own kernel `singularity` at every sample."""
+def _smallest(model: Model, run: Trajectory, number: int, measures: Array) -> SingularDistance:
+    k = int(np.abs(measures).argmin())
+    changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
+    k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
+    return SingularDistance(value, model.scene.hinges.name(number), float(run.t[k]))
+
+
+def _measure(model: Model, hinge: Hinge) -> Any:
+    """The kernel `singularity` of a hinge's type, None if it has none."""
     packed = model._engine.packed
-    hinge = next(h for h in model.scene.hinge if h.name == name)
     key = ("hinge", kernel_type(hinge, packed.releases))
     element = (model.known or {}).get(key) or prebuilt.elements().get(key)
     function = None if element is None else element.functions.get("singularity")
     if function is None:
         return None
-    ffi, slots = packed.ffi, packed.layout.hinges[name]
-    call = ffi.cast("int (*)(const double *, const double *, double *)", function)
-    p = packed.model.bodies[packed.hinge_position[name]].hinge_p
+    return packed.ffi.cast("int (*)(const double *, const double *, double *)", function)
+
+
+def _measures(model: Model, run: Trajectory, number: int, call: Any) -> Array:
+    """The measure of one hinge at every sample."""
+    packed = model._engine.packed
+    ffi, slots = packed.ffi, packed.layout.slots(number)
+    p = packed.model.bodies[packed.topology.place_of_hinge(number)].hinge_p
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
     measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
     for k, row in enumerate(coordinates):

@@ -6,14 +6,16 @@ into memory, each body and each kind of quantity is a batch of its own.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.errors import SceneError
-from mstmm.scene import split
+from mstmm.scene import Scene, split
 from mstmm.scene_errors import near
+from mstmm.scene_parts import BodyTable
 
 from .engine import PARTS, Probe
 
@@ -36,17 +38,18 @@ class Observed:
     def __init__(self, model: Model, run: Trajectory) -> None:
         self.engine, self.run = model._engine, run
         self.failures: tuple[str, ...] = ()
-        self.references = references(model)
-        self.known = frozenset(self.references)
+        self.references = References(model.scene)
         self._points: dict[str, Array] = {}
         self._parts: dict[str, Array] = {}
 
     def points(self, reference: str) -> Array:
         """(n, 24): motion of "body" or "body.end", see `Observation`."""
         if reference not in self._points:
-            if reference not in self.known and split(reference)[0] != "ground":
+            known = self.references.canonical(reference)
+            if known is None and split(reference)[0] != "ground":
                 raise SceneError(self._unknown(reference))
-            self._observe("points", reference)
+            self._observe("points", known or reference)
+            self._points[reference] = self._points[known or reference]
         return self._points[reference]
 
     def part(self, name: str) -> Array:
@@ -55,18 +58,48 @@ class Observed:
             self._observe(name, None)
         return self._parts[name]
 
+    def columns(self, name: str, which: Any) -> Array:
+        """Some columns `which` of loads, efforts or udot; of large ones no more is kept."""
+        return np.concatenate([part[(slice(None), *which)] for part in self._pieces(name)])
+
+    def largest_loads(self) -> tuple[float, float]:
+        """The largest component of force (N) and of moment (N*m) of any hinge."""
+        found = [0.0, 0.0]
+        for part in self._pieces("loads"):
+            for k in (0, 1):
+                numbers = part[:, :, 3 * k : 3 * k + 3]
+                numbers = np.abs(numbers[np.isfinite(numbers)])
+                found[k] = max(found[k], float(np.max(numbers, initial=0.0)))
+        return found[0], found[1]
+
+    def _pieces(self, name: str) -> Iterator[Array]:
+        """A part, piece by piece in time where all of it would not fit into memory."""
+        width = {"loads": 6 * self.engine.packed.topology.count}.get(name, self.engine.nu)
+        run, rows = self.run, max(1, _BATCH // max(1, width))
+        if name in self._parts or len(run.t) <= rows:
+            yield self.part(name)
+            return
+        for first in range(0, len(run.t), rows):
+            some = slice(first, first + rows)
+            seen = self.engine.observe(
+                run.t[some], run.q[some], run.u[some], run.memory[some], (), (name,)
+            )
+            self.failures = self.failures or seen.failures
+            yield getattr(seen, name)
+
     def _unknown(self, reference: str) -> str:
         hint = near(reference, self.references)
         return f'"{reference}": there is no such body or end in the scene{hint}'
 
     def _observe(self, part: str, reference: str | None) -> None:
         run = self.run
-        bodies = self.engine.packed.topology.count
-        wanted = list(self.references)
-        size = len(run.t) * (24 * len(wanted) + 6 * bodies + 2 * self.engine.nu + 10)
+        bodies, nu = self.engine.packed.topology.count, self.engine.nu
+        size = len(run.t) * (24 * len(self.references) + 6 * bodies + 2 * nu + 10)
         parts = PARTS if size <= _BATCH else (part,)
-        if size > _BATCH or reference not in self.known:
+        if size > _BATCH or (reference is not None and reference not in self.references):
             wanted = [] if reference is None else [reference]
+        else:
+            wanted = list(self.references)
         probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
         seen = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
         for array in (seen.points, *(getattr(seen, name) for name in PARTS)):
@@ -77,13 +110,44 @@ class Observed:
         self._parts |= {name: getattr(seen, name) for name in parts if name != "points"}
 
 
-def references(model: Model) -> tuple[str, ...]:
+class References(Collection[str]):
     """Every body and every end of the scene: "rod1", "rod1.tip"."""
-    return tuple(
-        name
-        for body in model.scene.body
-        for name in (body.name, *(f"{body.name}.{end}" for end in body.ends))
-    )
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.bodies = scene, scene.bodies
+
+    def canonical(self, reference: str) -> str | None:
+        """The reference with the number of a chain's member; None if there is no such end."""
+        name, at = split(reference)
+        number = self.bodies.find(name)
+        ends = self.bodies.ends(name)
+        if number is None or ends is None or (at and at not in ends):
+            return None
+        return self.bodies.name(number) + (f".{at}" if at else "")
+
+    def __contains__(self, reference: object) -> bool:
+        return isinstance(reference, str) and self.canonical(reference) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        for body in self.scene.body:
+            yield from _with_ends(body.name, body)
+        for chain in self.scene.chain:
+            for k in range(chain.count):
+                yield from _with_ends(f"{chain.name}[{k}]", chain.body_of(k))
+
+    def __len__(self) -> int:
+        found = sum(1 + len(body.ends) for body in self.scene.body)
+        for chain in self.scene.chain:
+            repeats, rest = divmod(chain.count, len(chain.body))
+            ends = [1 + len(body.ends) for body in chain.body]
+            found += repeats * sum(ends) + sum(ends[:rest])
+        return found
+
+
+def _with_ends(name: str, body: BodyTable) -> Iterator[str]:
+    yield name
+    for end in body.ends:
+        yield f"{name}.{end}"
 
 
 def quaternions(matrices: Array) -> Array:

@@ -19,7 +19,7 @@ from .laws import pack_laws
 from .layout import Layout
 from .placement import Placement
 from .product import attach
-from .records import Lookup
+from .records import Lookup, Records
 
 __all__ = ["Known", "Packed", "kernel_type", "pack", "releasable", "resize"]
 
@@ -34,6 +34,7 @@ class Packed:
     ffi: Any
     lib: Any
     model: Any
+    records: Records
     placements: Mapping[str, Placement]
     positions: Mapping[str, int]
     hinge_position: Mapping[str, int]
@@ -104,13 +105,13 @@ class _Packing:
             scene, tree, self.layout, self.elements, self.releases, self.ffi, self.lib, self.kept,
             self._c_tape,
         )  # fmt: skip
+        records, model.scratch = bodies.fill()
         packed = Packed(
-            scene, tree, self.layout, self.ffi, self.lib, model, bodies.placements,
+            scene, tree, self.layout, self.ffi, self.lib, model, records, bodies.placements,
             Lookup(scene.bodies, tree.place_of_body), Lookup(scene.hinges, tree.place_of_hinge),
             self.releases, 0, (), kept=self.kept,
         )  # fmt: skip
         self.kept.append(model)
-        records, model.scratch = bodies.fill()
         model.bodies, model.n_bodies = records.array, records.count
         for k in range(3):
             model.gravity[k] = scene.gravity[k]

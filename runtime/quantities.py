@@ -134,11 +134,11 @@ class Quantities:
         self.slots(hinge)
         place = self.observed.engine.packed.hinge_position[hinge]
         first = 0 if kind == "force" else 3
-        return self.observed.part("loads")[:, place, first : first + 3]
+        return self.observed.columns("loads", (place, slice(first, first + 3)))
 
     def effort(self, hinge: str) -> Array:
         """(n, nu): what laws and drives put in along the speeds."""
-        return self.observed.part("efforts")[:, self.slots(hinge).u_slice]
+        return self.observed.columns("efforts", (self.slots(hinge).u_slice,))
 
     def sum(self, name: str) -> Array:
         """One of SUMS: (n,) or (n, 3)."""
@@ -188,7 +188,7 @@ class Quantities:
         return self._tables[owner]
 
     def _owns(self, owner: str) -> bool:
-        return owner in self.layout.hinges or owner in self.observed.known
+        return owner in self.layout.hinges or owner in self.observed.references
 
     def _body(self, table: Table, reference: str) -> None:
         for kind, about in BODY.items():
@@ -220,7 +220,7 @@ class Quantities:
         simple = hinge.quaternion is None and hinge.type in self._builtin
 
         def udot() -> Array:
-            return self.observed.part("udot")[:, u]
+            return self.observed.columns("udot", (u,))
 
         def speeds() -> Array:
             return self.run.u[:, u]

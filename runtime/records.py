@@ -50,7 +50,8 @@ class Records:
 
     def copy(self, places: slice, prototypes: Records, which: Integers) -> None:
         """Records `places` become copies of the prototypes of these numbers."""
-        self.numbers[places] = prototypes.numbers[which]
+        whole = np.dtype((np.void, self.numbers.shape[1]))
+        self.numbers[places].view(whole)[:, 0] = prototypes.numbers.view(whole)[:, 0][which]
 
 
 class Lookup(Mapping[str, T]):
