@@ -9,16 +9,15 @@ the quaternion of a ball or free hinge it is the rotation vector in outboard axe
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.ir import Constant, KernelIR, Store
-from mstmm.structure import Structure
 from mstmm.tangent import PREFIX, tangent
 
 from .pack import pack
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Structure -> the kernel "accelerations".
-Fuse = Callable[[Structure], KernelIR]
+#: More bodies than this are not differentiated: work and results grow with their square.
+MOST_BODIES = 1000
 
 
 @dataclass(frozen=True)
@@ -65,16 +64,17 @@ class Derivatives:
 class Differentiation:
     """Tangent kernels of one model with one set of parameters, made when they are asked for."""
 
-    def __init__(self, model: Model, fuse: Fuse, names: Sequence[str]) -> None:
+    def __init__(self, model: Model, names: Sequence[str]) -> None:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
+        _refuse(model)
         if names:
             self.structure, self.p, self.slopes = slopes(model.scene, known, names)
         else:
             self.structure, self.p = structure_of(pack(model.scene, known), known)
             self.slopes = np.zeros((len(self.p), 0))
-        self._kernel = fuse(self.structure)
+        self._kernel = model.fusion.fused(self.structure).kernels["accelerations"]
         self._tapes: dict[tuple[str, str], TapeKernel | None] = {}
         self._lock = threading.Lock()
 
@@ -147,6 +147,22 @@ class Differentiation:
             rate_q[columns, columns] = back @ bend[rows, columns]
             rate_u[columns, columns] = back @ n[rows, columns]
         return rate_q, rate_u
+
+
+def _refuse(model: Model) -> None:
+    """SceneError for a scene whose accelerations are no single smooth function."""
+    packed = model._engine.packed
+    if packed.releases:
+        names = ", ".join(f'"{name}"' for name in packed.releases)
+        raise SceneError(
+            f"derivatives: hinge {names} is released during the run, so that the accelerations "
+            "change their form; take the release out"
+        )
+    if packed.model.n_bodies > MOST_BODIES:
+        raise SceneError(
+            f"derivatives: {packed.model.n_bodies} bodies; expected {MOST_BODIES} or fewer, as "
+            "work and results grow with their square"
+        )
 
 
 def _vanishes(kernel: KernelIR) -> bool:

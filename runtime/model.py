@@ -23,6 +23,7 @@ from .simulate import Settings
 from .start import start_values
 
 if TYPE_CHECKING:
+    from .derivatives import Derivatives, Differentiation
     from .result import Result
 
 Array = NDArray[np.float64]
@@ -46,6 +47,7 @@ class Model:
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self._engine = Engine(pack(scene, known, product_accuracy))
         self.fusion: Fusing = fusing(self._engine.packed, known or {}) if fusing else NotFused()
+        self._differentiations: dict[tuple[str, ...], Differentiation] = {}
 
     @property
     def engine(self) -> str:
@@ -169,6 +171,30 @@ class Model:
 
         start = self.initial_state()[0] if q is None else self._engine.batch("q", q, self.nq)[0]
         return equilibrium(self, start, t, tolerance)
+
+    def derivatives(
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        t: ArrayLike = 0.0,
+        efforts: ArrayLike | None = None,
+        parameters: Sequence[str] = (),
+    ) -> Derivatives:
+        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers of the scene.
+
+        Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
+        respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
+        vectors in outboard axes for quaternions).  No compiler is needed.
+
+        Raises SceneError for a name that the scene does not have and for scenes with releases,
+        NumericalFailure where `accelerations` does and where a derivative does not exist.
+        """
+        from .derivatives import Differentiation, derivatives
+
+        names = tuple(parameters)
+        if names not in self._differentiations:
+            self._differentiations[names] = Differentiation(self, names)
+        return derivatives(self, self._differentiations[names], q, u, t, efforts)
 
     @property
     def parameters(self) -> dict[str, float]:
