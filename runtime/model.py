@@ -180,7 +180,7 @@ class Model:
         efforts: ArrayLike | None = None,
         parameters: Sequence[str] = (),
     ) -> Derivatives:
-        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers of the scene.
+        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers.
 
         Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
         respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
