@@ -141,8 +141,8 @@ def _prebuilt(compiled: Compile) -> Iterator[Finding]:
 
     try:
         names = sorted(f"{kind} {name}" for kind, name in prebuilt.elements())
-    except EnvironmentFailure as error:
-        yield Finding("kernels", False, str(error))
+    except Exception as error:  # whatever a broken library does
+        yield _broken("kernels", error)
         return
     yield Finding("kernels", True, f"{len(names)} prebuilt elements", {"elements": names})
     yield _tried("looped engine", lambda: _pendulum(compiled, "looped"))
@@ -165,10 +165,15 @@ def _built_here(compiled: Compile, flags: Sequence[str]) -> Iterator[Finding]:
 def _tried(subject: str, trial: Callable[[], str]) -> Finding:
     try:
         return Finding(subject, True, trial())
-    except MstmmError as error:
-        return Finding(subject, False, str(error))
     except Exception as error:  # whatever is broken, the other findings are still wanted
-        return Finding(subject, False, f"{type(error).__name__}: {error}; install mstmm again")
+        return _broken(subject, error)
+
+
+def _broken(subject: str, error: Exception) -> Finding:
+    if isinstance(error, MstmmError):
+        return Finding(subject, False, str(error))
+    text = f"{type(error).__name__}: {error}; install mstmm again"
+    return Finding(subject, False, text)
 
 
 def _tiny_library(flags: Sequence[str]) -> str:

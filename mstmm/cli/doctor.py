@@ -11,7 +11,7 @@ from .options import Json
 def doctor(json: Json = False) -> None:
     """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
     from mstmm.compilation import compile_scene
-    from mstmm.derive.fused_c import FLAGS
+    from mstmm.fused_abi import FLAGS
     from mstmm.runtime import doctor as examination
 
     from . import output
