@@ -104,7 +104,7 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
     return mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, -1, run->real.t);
   int status = mstmm_stages(work);
   if (status) return status;
-  if (work->tableau->error) *error = mstmm_error_norm(work, absolute);
+  if (work->tableau->n_errors) *error = mstmm_error_norm(work, absolute);
   if (isnan(*error) || isinf(*error))
     return mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_worst_component(work), run->real.t_new);
   if (run->fixed_step == 0.0 && *error >= 1.0) return 0;

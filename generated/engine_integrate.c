@@ -248,13 +248,13 @@ static int phase_fire(const mstmm_work *work) {
 
 static int phase_accept(const mstmm_work *work) {
   mstmm_run *run = work->run;
-  const int64_t n = work->system->n_state;
+  const int64_t row = work->row;
   const int status = accept(work, run->real.t_new, work->y_new);
   if (status < 0) return status;
   move_to(work, run->real.t_new, work->y_new);
   run->count.first_stage_valid = status == 0 && !run->count.at_break;
   if (run->count.first_stage_valid)
-    memcpy(work->k, work->k + work->tableau->n_stages * n, (size_t)n * sizeof(double));
+    memcpy(work->k, work->k + work->tableau->n_stages * row, (size_t)row * sizeof(double));
   run->count.phase = PHASE_SAMPLE;
   return 0;
 }

@@ -27,6 +27,10 @@ typedef struct mstmm_system {
   int (*fire)(void *context, int event, double t, double *y);
   int n_memory;
   double *memory; /* constant within a step; changed by accept and fire alone */
+  /* The right-hand side at `lanes` states side by side (2, 4 or 8; 0: there is none):
+   * t[lane], y[i * lanes + lane], dy alike; codes[lane] as rhs returns; nonzero if any failed */
+  int lanes;
+  int (*rhs_lanes)(void *context, const double *t, const double *y, double *dy, int *codes);
 } mstmm_system;
 
 enum {
@@ -37,22 +41,29 @@ enum {
 };
 
 /* s = n_stages stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage of
- * the next step, then n_extra stages for dense output alone.  All matrices row by row. */
+ * the next step, then n_extra stages for dense output alone.
+ *
+ * Weights stand in sparse rows: row r holds the terms starts[r] .. starts[r + 1] - 1, each a weight
+ * and the stage it belongs to.  Rows: stages 1 .. s - 1, the step, the error, the second error,
+ * the extra stages, and the n_dense polynomials of dense output,
+ * y(theta) = y + h sum_i k_i sum_j dense[i][j] phi_j(theta) with phi = theta, theta(1-theta),
+ * theta^2(1-theta), theta^2(1-theta)^2, ... */
 typedef struct mstmm_tableau {
   int n_stages, n_extra, n_dense;
-  int error_order;         /* order of the error estimate; the step goes with norm^(-1/(order+1)) */
-  const double *a;         /* s x s, strictly lower */
-  const double *b;         /* s */
-  const double *c;         /* s */
-  const double *error;     /* s + 1, or NULL: fixed steps only */
-  const double *error_low; /* s + 1, or NULL: combined as in the 8(5,3) pair of Hairer and Wanner */
-  const double *a_extra;   /* n_extra x (s + 1 + n_extra) */
-  const double *c_extra;   /* n_extra */
-  /* (s + 1 + n_extra) x n_dense: y(theta) = y + h sum_i k_i sum_j dense[i][j] phi_j(theta) with
-   * phi = theta, theta(1-theta), theta^2(1-theta), theta^2(1-theta)^2, ... */
-  const double *dense;
+  int n_errors;    /* 0: fixed steps only; 2: combined as in the 8(5,3) pair of Hairer and Wanner */
+  int error_order; /* order of the error estimate; the step goes with norm^(-1/(order+1)) */
+  const int *starts, *columns;
+  const double *weights;
+  const double *c;       /* s */
+  const double *c_extra; /* n_extra */
   double stability_limit; /* h |lambda| at the end of the stable real axis */
   double beta;            /* exponent of the previous error in the step controller (0: plain) */
+  /* An iterated method: after k_0 its stages are n_iterations blocks of n_nodes (at most 8), and
+   * those of a block depend on the block before alone, so that they are evaluated side by side.
+   * n_nodes = 0 for other methods. */
+  int n_nodes, n_iterations;
+  const double *mix;  /* n_nodes x 8: mix[8 j + i] = weight of node j in node i, zeros behind */
+  const int *is_read; /* n_iterations: 1 where the step, the error or dense output need the block */
 } mstmm_tableau;
 
 enum {
@@ -88,7 +99,7 @@ typedef struct mstmm_run_real {
 } mstmm_run_real;
 
 typedef struct mstmm_run_count {
-  int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense; /* compared on restoring */
+  int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense, lanes; /* compared on restoring */
   int64_t phase, status;
   int64_t fail_status, code, component, event;
   int64_t break_index, output_index, grid_index;

@@ -8,56 +8,81 @@
 
 /* ---- sizes and workspace ---- */
 
-static double *take(double **at, int64_t count) {
-  double *const start = *at;
-  *at += count;
+enum { ALIGNMENT = 64 };
+
+/* What is being cut, and how much of it is used; base NULL only counts. */
+typedef struct cutting {
+  double *base;
+  int64_t used;
+} cutting;
+
+static double *take(cutting *at, int64_t count) {
+  double *const start = at->base ? at->base + at->used : NULL;
+  at->used += (count + WIDE - 1) / WIDE * WIDE;
   return start;
 }
 
-/* Returns the size of the workspace; *kept is its size up to the first stage. */
-static int64_t cut(mstmm_run *run, mstmm_work *work, int64_t *kept) {
-  const mstmm_system *system = run->system;
-  const mstmm_tableau *tableau = run->tableau;
-  const int64_t n = system->n_state, ne = system->n_events;
-  double *const start = run->workspace;
-  double *at = start;
-  *work = (mstmm_work){.run = run, .system = system, .tableau = tableau};
+static double *aligned(double *workspace) {
+  const uintptr_t rest = (uintptr_t)workspace % ALIGNMENT;
+  return rest ? workspace + (ALIGNMENT - rest) / sizeof(double) : workspace;
+}
+
+/* Cuts `base` into the arrays of *work, whose sizes are there.  Returns the doubles needed; *kept
+ * is what must be kept between steps. */
+static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
+  const mstmm_system *system = work->system;
+  const mstmm_tableau *tableau = work->tableau;
+  const int64_t ne = system->n_events, row = (system->n_state + WIDE - 1) / WIDE * WIDE;
+  const int64_t lanes = tableau->n_nodes ? WIDE * row : 0;
+  cutting at = {.base = base, .used = 0};
+  work->row = row;
+  work->y = take(&at, row);
   work->truth = take(&at, ne);
   work->last_fire = take(&at, ne);
-  work->y = take(&at, n);
-  work->k = take(&at, n);
-  *kept = at - start;
-  take(&at, (tableau->n_stages + tableau->n_extra) * n);
-  work->y_new = take(&at, n);
-  work->y_stage = take(&at, n);
-  work->y_event = take(&at, n);
-  work->dense = take(&at, tableau->n_dense * n);
+  work->k = take(&at, row);
+  *kept = at.used;
+  take(&at, (tableau->n_stages + tableau->n_extra) * row);
+  work->y_new = take(&at, row);
+  work->y_stage = take(&at, row);
+  work->y_event = take(&at, row);
+  work->dense = take(&at, tableau->n_dense * row);
+  work->atol = take(&at, row);
+  work->lanes_y = take(&at, lanes);
+  work->lanes_k = take(&at, lanes);
   work->g_before = take(&at, ne);
   work->g_left = take(&at, ne);
   work->g_right = take(&at, ne);
   work->g_trial = take(&at, ne);
   work->memory = take(&at, system->n_memory);
-  return at - start;
+  return at.used;
 }
 
 void mstmm_work_cut(mstmm_run *run, mstmm_work *work) {
+  const int64_t n = run->system->n_error;
   int64_t kept;
-  cut(run, work, &kept);
+  *work = (mstmm_work){.run = run, .system = run->system, .tableau = run->tableau};
+  cut(aligned(run->workspace), work, &kept);
+  for (int64_t i = 0; i < n; i++) work->atol[i] = run->atol ? run->atol[i] : 0.0;
 }
 
 static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tableau) {
+  const int lanes = system->lanes;
   return system->n_state >= 0 && system->n_error >= 0 && system->n_error <= system->n_state &&
          system->n_events >= 0 && system->n_memory >= 0 && system->rhs &&
          (!system->n_events || (system->events && system->fire)) &&
-         (!system->n_memory || system->memory) && tableau->n_stages >= 1 &&
-         tableau->n_extra >= 0 && tableau->n_dense >= 1;
+         (!system->n_memory || system->memory) &&
+         (lanes == 0 || ((lanes == 2 || lanes == 4 || lanes == WIDE) && system->rhs_lanes)) &&
+         tableau->n_stages >= 1 && tableau->n_extra >= 0 && tableau->n_dense >= 1 &&
+         tableau->n_nodes >= 0 && tableau->n_nodes <= WIDE &&
+         (!tableau->n_nodes ||
+          tableau->n_stages == 1 + tableau->n_nodes * tableau->n_iterations);
 }
 
 int64_t mstmm_workspace_size(const mstmm_system *system, const mstmm_tableau *tableau) {
-  const int64_t n = system->n_state, ne = system->n_events;
+  mstmm_work work = {.system = system, .tableau = tableau};
+  int64_t kept;
   if (!sizes_are_sound(system, tableau)) return 0;
-  const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
-  return rows * n + 6 * ne + system->n_memory + 1;
+  return cut(NULL, &work, &kept) + ALIGNMENT / (int64_t)sizeof(double);
 }
 
 void mstmm_pass_breaks(mstmm_run *run) {
@@ -82,7 +107,7 @@ static int bad_argument(const mstmm_run *run) {
   if (!(run->fixed_step >= 0.0) || !(run->rtol >= 0.0) || !(run->first_step >= 0.0) ||
       !(run->min_step >= 0.0) || !(run->max_step >= 0.0) || run->max_steps < 0)
     return 3;
-  if (run->fixed_step == 0.0 && (!run->tableau->error || (system->n_error && !run->atol))) return 3;
+  if (run->fixed_step == 0.0 && (!run->tableau->n_errors || (system->n_error && !run->atol))) return 3;
   for (int i = 0; run->atol && i < system->n_error; i++)
     if (!(run->atol[i] > 0.0)) return 3;
   if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks)) return 4;
@@ -104,10 +129,16 @@ static void clear(mstmm_run *run) {
   run->count.n_stages = run->tableau->n_stages;
   run->count.n_extra = run->tableau->n_extra;
   run->count.n_dense = run->tableau->n_dense;
+  run->count.lanes = run->system->lanes;
   run->count.component = -1;
   run->count.event = -1;
   run->real.t = run->t_start;
   run->real.smallest_step = INFINITY;
+}
+
+static void clear_workspace(mstmm_run *run) {
+  const int64_t size = mstmm_workspace_size(run->system, run->tableau);
+  memset(run->workspace, 0, (size_t)size * sizeof(double));
 }
 
 int mstmm_run_start(mstmm_run *run, const double *y0) {
@@ -120,6 +151,7 @@ int mstmm_run_start(mstmm_run *run, const double *y0) {
     run->count.status = mstmm_note(run, MSTMM_BAD_ARGUMENT, bad, -1, run->t_start);
     return MSTMM_BAD_ARGUMENT;
   }
+  clear_workspace(run);
   mstmm_work_cut(run, &work);
   memcpy(work.y, y0, (size_t)run->system->n_state * sizeof *y0);
   for (int i = 0; i < run->system->n_events; i++) {
@@ -137,7 +169,7 @@ int mstmm_run_start(mstmm_run *run, const double *y0) {
 }
 
 const double *mstmm_run_y(const mstmm_run *run) {
-  return run->workspace + 2 * run->system->n_events;
+  return aligned(run->workspace);
 }
 
 /* ---- the state as numbers ---- */
@@ -149,10 +181,9 @@ static int between_steps(const mstmm_run *run) {
 
 /* Doubles of workspace in a saved state: all of it within a step, little between steps. */
 static int64_t saved_workspace(const mstmm_run *run) {
-  mstmm_run copy = *run;
-  mstmm_work work;
+  mstmm_work work = {.system = run->system, .tableau = run->tableau};
   int64_t kept;
-  const int64_t all = cut(&copy, &work, &kept);
+  const int64_t all = cut(NULL, &work, &kept);
   return between_steps(run) ? kept : all;
 }
 
@@ -171,14 +202,14 @@ void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers) {
   memcpy(reals, &run->real, sizeof run->real);
   reals += sizeof run->real / sizeof(double);
   if (nm) memcpy(reals, run->system->memory, (size_t)nm * sizeof(double));
-  memcpy(reals + nm, run->workspace, (size_t)saved_workspace(run) * sizeof(double));
+  memcpy(reals + nm, aligned(run->workspace), (size_t)saved_workspace(run) * sizeof(double));
 }
 
 static int belongs(const mstmm_run *run, const mstmm_run_count *saved) {
   const mstmm_run_count *c = &run->count;
   return saved->n_state == c->n_state && saved->n_events == c->n_events &&
          saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
-         saved->n_extra == c->n_extra && saved->n_dense == c->n_dense &&
+         saved->n_extra == c->n_extra && saved->n_dense == c->n_dense && saved->lanes == c->lanes &&
          saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
          saved->event < c->n_events && saved->break_index >= 0 &&
          saved->break_index <= run->n_breaks && saved->output_index >= 0 &&
@@ -201,6 +232,7 @@ int mstmm_run_restore(mstmm_run *run, int64_t n_reals, const double *reals, int6
   *run = restored;
   const int64_t nm = run->system->n_memory;
   if (nm) memcpy(run->system->memory, reals, (size_t)nm * sizeof(double));
-  memcpy(run->workspace, reals + nm, (size_t)saved_workspace(run) * sizeof(double));
+  clear_workspace(run);
+  memcpy(aligned(run->workspace), reals + nm, (size_t)saved_workspace(run) * sizeof(double));
   return 0;
 }

@@ -197,18 +197,24 @@ class Run:
         self._kept += [copy, pointer]
         return pointer
 
+    def _integers(self, values: Sequence[int]) -> Any:
+        """`int *` to a copy that lives as long as the run."""
+        copy = self._ffi.new("int[]", [int(x) for x in values] or 1)
+        self._kept.append(copy)
+        return copy
+
     def _tableau(self, tableau: Tableau) -> Any:
         t = self._ffi.new("mstmm_tableau *")
-        null = self._ffi.NULL
         t.n_stages, t.n_extra, t.n_dense = tableau.n_stages, tableau.n_extra, tableau.n_dense
-        t.error_order = tableau.error_order
-        t.a, t.b, t.c = (self._doubles(x) for x in (tableau.A, tableau.B, tableau.C))
-        t.error = null if tableau.E is None else self._doubles(tableau.E)
-        t.error_low = null if tableau.E_low is None else self._doubles(tableau.E_low)
-        t.a_extra, t.c_extra = self._doubles(tableau.A_extra), self._doubles(tableau.C_extra)
-        t.dense = self._doubles(tableau.dense)
+        t.n_errors = (tableau.E is not None) + (tableau.E_low is not None)
+        t.error_order, t.beta = tableau.error_order, tableau.beta
+        starts, columns, weights = tableau.rows
+        t.starts, t.columns = self._integers(starts), self._integers(columns)
+        t.weights = self._doubles(weights)
+        t.c, t.c_extra = self._doubles(tableau.C), self._doubles(tableau.C_extra)
         t.stability_limit = tableau.real_stability_limit
-        t.beta = tableau.beta
+        t.n_nodes, t.n_iterations = tableau.iterated or (0, 0)
+        t.mix, t.is_read = self._doubles(tableau.mix), self._integers(tableau.read_blocks)
         self._kept.append(t)
         return t
 

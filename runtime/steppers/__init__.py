@@ -25,7 +25,7 @@ __all__ = [
     "register",
 ]
 
-BUILT_IN = ("rk4", "dopri5", "dop853")
+BUILT_IN = ("rk4", "dopri5", "dop853", "pirk13")
 
 _registered: dict[str, Tableau] = {}
 

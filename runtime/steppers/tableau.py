@@ -12,15 +12,19 @@ is free of cancellation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+#: Stages of a block that C evaluates side by side, at most.
+LANES = 8
 
 
 def frozen(values: ArrayLike) -> Array:
@@ -28,6 +32,17 @@ def frozen(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
     return array
+
+
+def sparse(text: str, columns: int) -> list[Array]:
+    """Rows of published decimals, written as `column:value`; every row starts with column 0."""
+    rows: list[Array] = []
+    for word in text.split():
+        column, value = word.split(":")
+        if column == "0":
+            rows.append(np.zeros(columns))
+        rows[-1][int(column)] = float(value)
+    return rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +64,9 @@ class Tableau:
             E^2 / sqrt(E^2 + 0.01 E_low^2) (the 8(5,3) pair); None without.
         A_extra, C_extra: (e, s + 1 + e) and (e,) rows of the extra stages.
         beta: exponent of the previous error in the step controller, 0 for the plain one.
+        iterated: (nodes, iterations) of a method whose stages behind the first are so many blocks,
+            each depending on the block before alone (the first on k_0 alone) with the same weights:
+            the stages of a block are evaluated side by side.  None for other methods.
         source: where the coefficients come from.
 
     Raises:
@@ -68,6 +86,7 @@ class Tableau:
     A_extra: Array = field(default_factory=lambda: frozen(np.zeros((0, 0))))
     C_extra: Array = field(default_factory=lambda: frozen(np.zeros(0)))
     beta: float = 0.0
+    iterated: tuple[int, int] | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -96,6 +115,54 @@ class Tableau:
             raise ValueError(f"tableau {self.name}: sum(B) = 1 or sum(A[i]) = C[i] does not hold")
         if np.abs(self.dense[:, 0] - step).max() > 1e-13:
             raise ValueError(f"tableau {self.name}: dense output does not end at the step's end")
+        if self.iterated is not None and not self._is_iterated(*self.iterated):
+            raise ValueError(f"tableau {self.name}: its stages are not {self.iterated} blocks")
+
+    def _is_iterated(self, nodes: int, iterations: int) -> bool:
+        if not 1 <= nodes <= LANES or iterations < 2 or self.n_stages != 1 + nodes * iterations:
+            return False
+        expected = np.zeros_like(self.A)
+        expected[1 : 1 + nodes, 0] = self.C[1 : 1 + nodes]
+        for block in range(1, iterations):
+            at, before = 1 + block * nodes, 1 + (block - 1) * nodes
+            expected[at : at + nodes, before:at] = self._block(nodes)
+        nodes_repeat = np.array_equal(self.C[1:], np.tile(self.C[1 : 1 + nodes], iterations))
+        return nodes_repeat and np.array_equal(self.A, expected)
+
+    def _block(self, nodes: int) -> Array:
+        return self.A[1 + nodes : 1 + 2 * nodes, 1 : 1 + nodes]
+
+    @property
+    def mix(self) -> Array:
+        """(nodes, 8): column j of the weights of an iterated method's blocks, for eight lanes."""
+        nodes = self.iterated[0] if self.iterated else 0
+        mix = np.zeros((nodes, LANES))
+        mix[:, :nodes] = self._block(nodes).T
+        return mix
+
+    @property
+    def read_blocks(self) -> list[int]:
+        """1 for every block of an iterated method that is read by more than the block behind."""
+        nodes, iterations = self.iterated or (1, 0)
+        reading = [self.B, self.dense.any(axis=1), self.A_extra.any(axis=0)]
+        reading += [row for row in (self.E, self.E_low) if row is not None]
+        blocks = [slice(1 + i * nodes, 1 + (i + 1) * nodes) for i in range(iterations)]
+        return [int(any(np.any(row[block]) for row in reading)) for block in blocks]
+
+    @cached_property
+    def rows(self) -> tuple[list[int], list[int], Array]:
+        """Starts, columns and weights of the sparse rows that `mstmm_tableau` in C describes."""
+        none = np.zeros(0)
+        rows = [*self.A[1:], self.B]
+        rows += [none if row is None else row for row in (self.E, self.E_low)]
+        rows += [*self.A_extra, *self.dense.T]
+        starts, columns, weights = [0], list[int](), list[float]()
+        for row in rows:
+            places = np.flatnonzero(row)
+            columns += places.tolist()
+            weights += row[places].tolist()
+            starts.append(len(columns))
+        return starts, columns, frozen(weights)
 
     @property
     def n_stages(self) -> int:
@@ -131,7 +198,7 @@ class Tableau:
         for _ in range(self.n_stages):
             coefficients.append(float(row.sum()))
             row = row @ self.A
-        return frozen(coefficients)
+        return frozen(np.trim_zeros(coefficients, "b"))
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
         """R(z) of one step on y' = lambda y with z = h lambda: y(t + h) = R(z) y(t)."""
@@ -182,13 +249,13 @@ def hermite(B: Sequence[float] | Array, n_extra: int = 0, D: ArrayLike | None = 
     return frozen(np.stack(columns, axis=1))
 
 
-def from_monomials(P: ArrayLike) -> Array:
+def from_monomials(P: Iterable[Iterable[Any]]) -> Array:
     """Dense weights from p_i(theta) = sum_j P[i, j] theta^(j + 1), converted in exact arithmetic.
 
     Args:
-        P: (s + 1 + e, d) coefficients of theta, theta^2, ..., as SciPy's RK methods carry them.
+        P: (s + 1 + e, d) coefficients of theta, theta^2, ..., exact where they are fractions.
     """
-    rows = [[Fraction(float(x)) for x in row] for row in np.asarray(P, dtype=np.float64)]
+    rows = [[x if isinstance(x, Fraction) else Fraction(float(x)) for x in row] for row in P]
     degree = len(rows[0])
     basis = _basis_in_monomials(degree)
     dense = []

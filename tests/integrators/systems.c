@@ -10,6 +10,7 @@ typedef struct parameters {
   double p[8];
   double memory[4];
   long calls; /* whatever the system counts */
+  const mstmm_system *system; /* for test_use_lanes */
 } parameters;
 
 static int harmonic(void *context, double t, const double *y, double *dy) {
@@ -200,6 +201,7 @@ void test_use_bounce(mstmm_system *system, parameters *at);
 void test_use_three(mstmm_system *system, parameters *at);
 void test_use_normalise(mstmm_system *system);
 void test_use_accept(mstmm_system *system, parameters *at);
+void test_use_lanes(mstmm_system *system, parameters *at, int lanes);
 
 parameters *test_parameters(void) { return calloc(1, sizeof(parameters)); }
 
@@ -242,4 +244,25 @@ void test_use_accept(mstmm_system *system, parameters *at) {
   system->accept = count_accepts;
   system->n_memory = 2;
   system->memory = at->memory;
+}
+
+/* One lane after the other, by the right-hand side of single states */
+static int in_lanes(void *context, const double *t, const double *y, double *dy, int *codes) {
+  const mstmm_system *system = ((parameters *)context)->system;
+  const int n = system->n_state, lanes = system->lanes;
+  double one[64], slope[64];
+  int failed = 0;
+  for (int lane = 0; lane < lanes; lane++) {
+    for (int i = 0; i < n; i++) one[i] = y[i * lanes + lane];
+    codes[lane] = system->rhs(context, t[lane], one, slope);
+    for (int i = 0; i < n; i++) dy[i * lanes + lane] = slope[i];
+    failed |= codes[lane] != 0;
+  }
+  return failed;
+}
+
+void test_use_lanes(mstmm_system *system, parameters *at, int lanes) {
+  at->system = system;
+  system->lanes = lanes;
+  system->rhs_lanes = lanes ? in_lanes : NULL;
 }

@@ -19,17 +19,22 @@ from mstmm.runtime.steppers import Tableau, get
 
 from .c_library import compile_library
 
-SOURCES = ("engine_integrate", "engine_run", "engine_control", "engine_step", "engine_event")
-HEADERS = ("engine_integrate", "engine_step")
+SOURCES = (
+    "engine_integrate", "engine_run", "engine_control", "engine_step", "engine_norm",
+    "engine_iterate", "engine_event",
+)  # fmt: skip
+HEADERS = ("engine_integrate", "engine_step", "engine_wide")
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
 TEST_DECLARATIONS = """
-typedef struct parameters { double p[8]; double memory[4]; long calls; } parameters;
+typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
+parameters;
 parameters *test_parameters(void);
 int test_fill(mstmm_system *system, parameters *at, const char *rhs, int n, int n_error);
 void test_use_bounce(mstmm_system *system, parameters *at);
 void test_use_three(mstmm_system *system, parameters *at);
 void test_use_normalise(mstmm_system *system);
 void test_use_accept(mstmm_system *system, parameters *at);
+void test_use_lanes(mstmm_system *system, parameters *at, int lanes);
 """
 
 

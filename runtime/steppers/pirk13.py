@@ -1,0 +1,97 @@
+"""Order 13 by iterating Gauss's method with eight nodes: for right-hand sides with lanes.
+
+The eight stages of Gauss's implicit method are found by functional iteration from k_0; every
+iteration raises the order by one, and its eight right-hand sides do not wait for each other.  Where
+a compiled scene evaluates eight states in about the time of one, a step costs 13 evaluations one
+after the other and is as long as order 13 allows; elsewhere it costs 97, and dop853 is the method
+to take.
+
+P. J. van der Houwen, B. P. Sommeijer, Parallel iteration of high-order Runge-Kutta methods with
+stepsize control, Journal of Computational and Applied Mathematics 29 (1990) 111-127.  Nodes: M.
+Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), table 25.4.  The weights follow
+from the nodes in exact arithmetic.  Dense output is the polynomial of degree 10 whose slope agrees
+with the eight last stages and both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from .tableau import Tableau, from_monomials, frozen
+
+_ITERATIONS = 12
+_COMPARED = 9  # the error estimate: what three iterations less give
+
+#: Positive zeros of the Legendre polynomial of degree 8.
+_ZEROS = """
+    0.183434642495649804939476142360 0.525532409916328985817739049189
+    0.796666477413626739591553936476 0.960289856497536231683560868569
+"""
+
+Polynomial = list[Fraction]
+
+
+def _nodes() -> list[Fraction]:
+    zeros = [Fraction(word) for word in _ZEROS.split()]
+    return sorted((1 + sign * zero) / 2 for zero in zeros for sign in (-1, 1))
+
+
+def _integrals(nodes: Sequence[Fraction]) -> list[Polynomial]:
+    """Coefficients of theta, theta^2, ... of the integral from 0 of each Lagrange polynomial."""
+    found = []
+    for i, node in enumerate(nodes):
+        product: Polynomial = [Fraction(1)]
+        for j, other in enumerate(nodes):
+            if j != i:
+                shifted, scaled = [Fraction(0), *product], [other * x for x in product] + [0]
+                product = [(a - b) / (node - other) for a, b in zip(shifted, scaled, strict=True)]
+        found.append([x / (power + 1) for power, x in enumerate(product)])
+    return found
+
+
+def _value(polynomial: Polynomial, at: Fraction) -> float:
+    return float(sum(x * at ** (power + 1) for power, x in enumerate(polynomial)))
+
+
+def tableau() -> Tableau:
+    """The method `pirk13`."""
+    nodes = _nodes()
+    n = len(nodes)
+    integrals = _integrals(nodes)
+    weights = np.array([_value(p, Fraction(1)) for p in integrals])
+    block = np.array([[_value(p, node) for p in integrals] for node in nodes])
+    places = [slice(1 + i * n, 1 + (i + 1) * n) for i in range(_ITERATIONS)]
+    stages = 1 + n * _ITERATIONS
+    c = np.array([0.0, *[float(node) for node in nodes] * _ITERATIONS])
+    a, b, error = np.zeros((stages, stages)), np.zeros(stages), np.zeros(stages + 1)
+    a[places[0], 0] = c[places[0]]
+    for before, after in zip(places[:-1], places[1:], strict=True):
+        a[after, before] = block
+    b[places[-1]] = error[places[-1]] = weights
+    error[places[_COMPARED - 1]] = -weights
+    return Tableau(
+        name="pirk13",
+        order=_ITERATIONS + 1,
+        A=frozen(a),
+        B=frozen(b),
+        C=frozen(c),
+        dense=_dense(nodes, weights, stages),
+        dense_order=n + 2,
+        E=frozen(error),
+        error_order=_COMPARED + 1,
+        iterated=(n, _ITERATIONS),
+        source="van der Houwen and Sommeijer (1990), nodes of Gauss",
+    )
+
+
+def _dense(nodes: Sequence[Fraction], weights: np.ndarray, stages: int) -> np.ndarray:
+    """The slope's polynomial goes through k_0, the last eight stages and the next step's first."""
+    points = [Fraction(0), *nodes, Fraction(1)]
+    narrow = np.array(from_monomials(_integrals(points)))
+    narrow[:, 0] = [0.0, *weights, 0.0]  # what it is but for the last digits of the nodes
+    wide = np.zeros((stages + 1, narrow.shape[1]))
+    wide[0], wide[stages - len(nodes) : stages], wide[stages] = narrow[0], narrow[1:-1], narrow[-1]
+    return frozen(wide)
