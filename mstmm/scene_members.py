@@ -88,6 +88,10 @@ class Members(Sequence[T], Generic[T]):
         chain = self._chain[match[1]]
         return chain, self.chains[chain].count - 1 if match[2] == "last" else int(match[2])
 
+    def of_chain(self, name: str) -> bool:
+        """True where a name begins with that of a chain."""
+        return name.partition("[")[0].partition(".")[0] in self._chain
+
     def missing(self, name: str, shown: str = "") -> str:
         """Why there is nothing of this name, and what is near it; `shown` is how it is quoted."""
         shown = shown or f'"{name}"'

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from .result import Result
 
 
+#: Speeds of a scene up to which everything about every body and hinge is written out.
+MOST_SPEEDS = 5000
+
+
 def extra(name: str, what: str, error: ImportError) -> EnvironmentFailure:
     """A package of an extra is missing: which one, what for, and how to get it."""
     return EnvironmentFailure(
@@ -29,14 +33,20 @@ def dataset(result: Result) -> Any:
 
     `body` holds bodies and their ends ("rod1", "rod1.tip"), `coordinate` and `speed` the entries of
     q and u ("shoulder.angle", "shoulder.angle_rate"), whose units differ and stand beside them.
+    Beyond MOST_SPEEDS speeds motions of bodies and loads of hinges are left out: they follow from
+    the states, and a loaded result computes those that are asked for.
     """
     try:
         import xarray
     except ImportError as error:
         raise extra("io", "an xarray Dataset", error) from None
-    variables = _states(result) | _bodies(result) | _hinges(result) | _sums(result)
-    variables |= provenance.variables(result)
-    return xarray.Dataset(variables, _labels(result), provenance.attributes(result))
+    variables, labels = _states(result), _labels(result)
+    if result.model.nu <= MOST_SPEEDS:
+        variables |= _bodies(result) | _hinges(result)
+    else:
+        labels = {key: label for key, label in labels.items() if key not in ("body", "hinge")}
+    variables |= _sums(result) | provenance.variables(result)
+    return xarray.Dataset(variables, labels, provenance.attributes(result))
 
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]

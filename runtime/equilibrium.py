@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from mstmm.errors import NumericalFailure
 
+from .layout import refuse_dense
+
 if TYPE_CHECKING:
     from .model import Model
 
@@ -35,6 +37,7 @@ def moved(model: Model, q: Array, increment: Array) -> Array:
 
 def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
+    refuse_dense(model.nu, "the stiffness matrix")
     still = np.zeros(model.nu)
     free = _free_speeds(model)
 
@@ -63,8 +66,8 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
 def _free_speeds(model: Model) -> list[int]:
     """Speeds that no drive prescribes."""
     free = []
-    for hinge in model.scene.hinge:
-        slots = model.layout.hinges[hinge.name]
+    for number, hinge in enumerate(model.scene.hinges):
+        slots = model.layout.slots(number)
         drive = hinge.drive or (None,) * slots.nu
         held = hinge.type == "fixed"
         free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not held]

@@ -6,13 +6,28 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
 Integers = NDArray[np.int64]
+
+
+#: Speeds up to which dense matrices are made: 3 GB a matrix.
+_DENSE = 20_000
+
+
+def refuse_dense(nu: int, what: str) -> None:
+    """SceneError if `what`, a dense matrix with a row and a column per speed, is too large."""
+    if nu > _DENSE:
+        raise SceneError(
+            f"{what} of {nu} speeds would have {nu**2 * 8 / 1e9:.0f} GB; it is made for up to "
+            f"{_DENSE} speeds (accelerations and simulate have no such limit)"
+        )
 
 
 @dataclass(frozen=True)
@@ -162,6 +177,30 @@ class Layout:
 
 def _joined(parts: list[Integers]) -> Integers:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
+
+
+class StateNames(Sequence[str]):
+    """What the components of an integrator's state are: q, u and perhaps the work."""
+
+    def __init__(self, layout: Layout, with_work: bool) -> None:
+        self.layout, self.with_work = layout, with_work
+
+    def __len__(self) -> int:
+        return self.layout.nq + self.layout.nu + int(self.with_work)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[str]: ...
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        nq, nu = self.layout.nq, self.layout.nu
+        if index < nq:
+            return f"coordinate {self.layout.q_name(index)}"
+        return f"speed {self.layout.u_name(index - nq)}" if index < nq + nu else "work"
 
 
 class _ByName(Mapping[str, HingeSlots]):

@@ -17,7 +17,7 @@ from mstmm.scene import Scene
 from . import parameters as named_parameters
 from .engine import Engine
 from .fusing import Fusing, NotFused
-from .layout import Layout
+from .layout import Layout, refuse_dense
 from .pack import Known, Packed, pack
 from .simulate import Settings
 from .start import start_values
@@ -137,6 +137,7 @@ class Model:
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Symmetric (nu, nu) mass matrix, kg, kg*m, kg*m2; driven coordinates as if free."""
+        refuse_dense(self.nu, "the mass matrix")
         engine, still = self._static, np.zeros(self.nu)
         coordinates = engine.batch("q", q, self.nq)[0].copy()
         memory = engine.start_memory()

@@ -88,6 +88,9 @@ class Observed:
             yield getattr(seen, name)
 
     def _unknown(self, reference: str) -> str:
+        body = split(reference)[0]
+        if self.references.bodies.of_chain(body) and self.references.bodies.find(body) is None:
+            return f'"{reference}": {self.references.bodies.missing(body)}'
         hint = near(reference, self.references)
         return f'"{reference}": there is no such body or end in the scene{hint}'
 

@@ -11,7 +11,9 @@ from typing import Any
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
-TABLES = ("body", "hinge", "load", "event", "spring")
+TABLES = ("body", "hinge", "chain", "load", "event", "spring")
+#: How many members a chain has is no parameter: it decides the length of q and u.
+_COUNT = "count"
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -43,14 +45,15 @@ def read(scene: Scene) -> dict[str, float]:
     data = _data(scene)
     found = dict(_numbers("gravity", data["gravity"]))
     for name, element in _named(data):
-        found.update(_numbers(name, element))
+        found.update(_numbers(name, {key: x for key, x in element.items() if key != _COUNT}))
     return found
 
 
 def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """The scene with other numbers, validated afresh.
 
-    A name without an index stands for all entries of a list of one.  Raises SceneError for unknown
+    A name without an index stands for all entries of a list of one, and for all bodies or hinges
+    of a chain's pattern: "rope.body.mass".  Raises SceneError for unknown
     names and for values that the scene refuses.
     """
     data = _data(scene)
@@ -87,7 +90,7 @@ def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
 def _set(data: dict[str, Any], path: str, value: float) -> bool:
     parts = path.split(".")
     owners = _owners(data, parts)
-    return any(_assign(owner, parts, value) for owner in owners)
+    return parts != [_COUNT] and any(_assign(owner, parts, value) for owner in owners)
 
 
 def _owners(data: dict[str, Any], parts: list[str]) -> list[Any]:
@@ -106,6 +109,8 @@ def _assign(target: Any, parts: list[str], value: float) -> bool:
             return False
         holder: Any = target
         place: Any = key
+        if index is None and key in ("body", "hinge") and isinstance(holder[key], list):
+            return all(_assign(table, parts[i + 1 :], value) for table in holder[key])
         if isinstance(holder[key], list) and (index is not None or len(holder[key]) == 1):
             holder, place = holder[key], index or 0
             if place >= len(holder):

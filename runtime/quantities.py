@@ -5,7 +5,7 @@ Every name gives values over time with their unit and one label per column.  Axe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -125,6 +125,9 @@ class Quantities:
         """Place of a hinge in q and u; SceneError with the nearest name if there is none."""
         found = self.layout.hinges.get(hinge)
         if found is None:
+            hinges = self.observed.references.scene.hinges
+            if hinges.of_chain(hinge):
+                raise SceneError(f'"{hinge}": {hinges.missing(hinge)}')
             hint = near(hinge, self.layout.hinges)
             raise SceneError(f'"{hinge}": there is no such hinge in the scene{hint}')
         return found
@@ -159,20 +162,25 @@ class Quantities:
             if entry is not None:
                 return entry()
         known = [n for x in owners if self._owns(x) for n in self.of(x).entries]
-        hint = near(name, known or self.names())
+        hint = near(name, known or self._every())
         raise SceneError(f'"{name}": there is no such quantity{hint}')
 
     def names(self) -> list[str]:
         """Every name there is."""
-        return [name for owner in self.owners() for name in self.of(owner).entries]
+        return list(self._every())
+
+    def _every(self) -> Iterator[str]:
+        return (name for owner in self.owners() for name in self.of(owner).entries)
 
     def scalars(self) -> list[str]:
         """One name for every number there is per sample, in the order of a wide table."""
         return [name for owner in self.owners() for name in self.of(owner).scalars]
 
-    def owners(self) -> list[str]:
+    def owners(self) -> Iterator[str]:
         """Hinges, bodies and ends, and the scene itself."""
-        return [*self.layout.hinges, *self.observed.references, ""]
+        yield from self.layout.hinges
+        yield from self.observed.references
+        yield ""
 
     def of(self, owner: str) -> Table:
         """Names of one owner."""

@@ -17,6 +17,7 @@ from mstmm.errors import SceneError
 from . import values
 from .engine import Engine, Probe
 from .integrate import Run, Samples, Statistics, Status
+from .layout import StateNames
 from .pack import resize
 from .steppers import get
 
@@ -135,11 +136,9 @@ class SceneSystem:
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
         return y
 
-    def components(self) -> list[str]:
+    def components(self) -> StateNames:
         """A name per component of the state."""
-        layout = self.engine.packed.layout
-        names = [f"coordinate {n}" for n in layout.q_names] + [f"speed {n}" for n in layout.u_names]
-        return [*names, "work"] if self.with_power else names
+        return StateNames(self.engine.packed.layout, self.with_power)
 
 
 def _conditions(engine: Engine) -> tuple[list[Any], list[tuple[int, int]], list[str]]:

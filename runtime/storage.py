@@ -16,7 +16,7 @@ from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.scene import Scene
 
 from . import provenance, store
-from .dataset import dataset, extra
+from .dataset import MOST_SPEEDS, dataset, extra
 from .files import replacing
 from .stability import check_step
 from .steppers import get
@@ -62,6 +62,11 @@ def _room_for(size: int, path: Path) -> None:
 
 def _csv(result: Result, path: Path) -> None:
     """One row per sample, one column per number; the header holds names and units."""
+    if result.model.nu > MOST_SPEEDS:
+        raise SceneError(
+            f'result file "{path}": a table of a scene with {result.model.nu} speeds has too many '
+            "columns; write .nc, or the quantities you need (result.quantity)"
+        )
     quantities = [result.quantity(name) for name in result._quantities.scalars()]
     header = ["time [s]", "event"]
     header += [f"{q.name} [{q.unit}]" if q.unit else q.name for q in quantities]

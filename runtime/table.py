@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,17 +15,20 @@ if TYPE_CHECKING:
 #: Columns of a table nobody chose the columns of.
 _DEFAULT_COLUMNS = 6
 
+#: Hinges among which these are looked for.
+_LOOKED_AT = 10_000
+
 
 def default_names(result: Result, most: int = _DEFAULT_COLUMNS) -> list[str]:
     """The first hinge coordinates, without quaternions."""
     layout = result.model.layout
-    names = [
+    names = (
         f"{hinge.name}.{name}"
-        for hinge in layout.hinges.values()
+        for hinge in islice(layout.hinges.values(), _LOOKED_AT)
         for name, unit in zip(hinge.q_names, hinge.q_units, strict=True)
         if unit
-    ]
-    return names[:most]
+    )
+    return list(islice(names, most))
 
 
 def flat(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:

@@ -15,6 +15,7 @@ from .options import Json, python_file, quoted
 if TYPE_CHECKING:
     from mstmm.crosscheck import Report as Crosscheck
     from mstmm.scene import Scene
+    from mstmm.topology import Topology
 
 SCENE_ENDINGS = (".toml", ".json")
 
@@ -95,7 +96,7 @@ def _scene(path: str) -> Report:
     scene = mstmm.load_scene(path)
     model = compiled(path, scene)
     sizes = {
-        "bodies": len(scene.body), "hinges": len(scene.hinge), "coordinates": model.nq,
+        "bodies": len(scene.bodies), "hinges": len(scene.hinges), "coordinates": model.nq,
         "speeds": model.nu, "springs": len(scene.spring), "loads": len(scene.load),
         "events": len(scene.event),
     }  # fmt: skip
@@ -128,18 +129,29 @@ def _tree_lines(scene: Scene) -> list[str]:
     from mstmm.topology import build
 
     tree = build(scene)
-    depth: list[int] = []
-    lines = ["  ground"] if tree.links else []
-    for link in tree.links:
-        depth.append(1 if link.parent < 0 else depth[link.parent] + 1)
-        if len(depth) <= _SHOWN:
-            hinge, body = scene.hinge[link.hinge], scene.body[link.body]
-            lines.append(
-                "  " + "  " * min(depth[-1], 20) + f"{body.name}  ({hinge.name}: {hinge.type})"
-            )
-    if len(tree.links) > _SHOWN:
-        lines.append(f"  ... and {len(tree.links) - _SHOWN} more bodies")
+    depth: dict[int, int] = {-1: 0}  # of the bodies on which others may hang
+    lines = ["  ground"] if tree.runs else []
+    shown = 0
+    for run in tree.runs:
+        if len(lines) > _SHOWN:
+            break
+        first = 1 + _depth(tree, depth, run.parent)
+        depth[run.place] = first
+        hinge, body = scene.hinges[run.hinge], scene.bodies[run.body]
+        what = f"{body.name}  ({hinge.name}: {hinge.type})"
+        if run.count > 1:
+            what = f"{body.name} to {scene.bodies.name(run.body + run.count - 1)}  ({hinge.type})"
+        lines.append("  " + "  " * min(first, 20) + what)
+        shown += run.count
+    if shown < tree.count:
+        lines.append(f"  ... and {tree.count - shown} more bodies")
     return lines
+
+
+def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:
+    """How deep a place lies in the tree; `depth` knows it of the first of every run."""
+    first = max((p for p in depth if p <= place), default=-1)
+    return depth[first] + place - first if first >= 0 else 0
 
 
 # --- elements -------------------------------------------------------------------------------------

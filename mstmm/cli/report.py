@@ -14,7 +14,7 @@ def sizes(result: Result) -> str:
     """3 bodies on 3 hinges, 9 degrees of freedom."""
     scene = result.model.scene
     return (
-        f"{count(len(scene.body), 'body', 'bodies')} on {count(len(scene.hinge), 'hinge')}, "
+        f"{count(len(scene.bodies), 'body', 'bodies')} on {count(len(scene.hinges), 'hinge')}, "
         f"{count(result.model.nu, 'degree')} of freedom"
     )
 
@@ -57,8 +57,9 @@ def default_quantities(result: Result) -> list[str]:
     from mstmm.runtime.table import default_names
 
     scene = result.model.scene
-    tips = [".".join([body.name, *list(body.ends)[-1:]]) for body in scene.body[-1:]]
-    return default_names(result) or [f"{tip}.{axis}" for tip in tips for axis in "xyz"]
+    body = scene.bodies[-1]
+    tip = ".".join([body.name, *list(body.ends)[-1:]])
+    return default_names(result) or [f"{tip}.{axis}" for axis in "xyz"]
 
 
 def to_json(result: Result, seconds: float) -> dict[str, Any]:
