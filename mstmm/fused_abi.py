@@ -19,6 +19,9 @@ FLAGS = (
     "-fno-trapping-math", "-fno-tree-slp-vectorize", "-fschedule-insns", "-fsched-pressure",
 )  # fmt: skip
 
+#: Those of the flags that some compilers do not know (clang) and that change no result.
+TUNING = ("-fno-tree-slp-vectorize", "-fschedule-insns", "-fsched-pressure")
+
 _STATE = (
     "const double *p, const double *t, const double *q, const double *u, const double *memory, "
     "const double *efforts, double *qdot, double *udot"

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import ElementError, EnvironmentFailure
-from .fused_abi import ABI, FLAGS
+from .fused_abi import ABI, FLAGS, TUNING
 from .ir import KernelIR, from_json
 from .runtime.cache import Built, Recipe, find, opened
 from .runtime.fused import FusedLibrary, open_library
@@ -118,7 +118,8 @@ class Fusion:
             "structure": self.structure.identity(), "part": part, "abi": str(ABI),
             "printers": _printers_hash(), "kernels": _manifest_hash(),
         }  # fmt: skip
-        return Recipe("fused", identity, partial(self._sources, part), FLAGS)
+        sources = partial(self._sources, part)
+        return Recipe("fused", identity, sources, FLAGS, optional=TUNING)
 
     def _sources(self, part: str, key: str) -> dict[str, str]:
         from .derive.fused_c import fused_sources

@@ -46,6 +46,8 @@ class Recipe:
         sources: makes the text, file name -> content, for a key that the text may carry; runs
             only when a library is built.  Files that end in .c are compiled, others lie beside.
         flags: of the compiler, besides -fPIC and -shared.
+        optional: those of the flags that make code faster and may be left out where the compiler
+            does not know them.
         symbols: names that the library must export.  If it exports `int mstmm_self_test(void)` as
             well, that is called once after the build, in a process of its own: 0 if all is right.
     """
@@ -55,6 +57,7 @@ class Recipe:
     sources: Callable[[str], Mapping[str, str]]
     flags: tuple[str, ...]
     symbols: tuple[str, ...] = ("mstmm_fused_library",)
+    optional: tuple[str, ...] = ()
 
 
 def find(recipe: Recipe) -> Built | None:
@@ -110,6 +113,7 @@ def _placed(recipe: Recipe) -> tuple[Path, Order]:
     about = {
         "identity": dict(sorted(recipe.identity.items())),
         "flags": list(recipe.flags),
+        "optional": list(recipe.optional),
         "compiler": toolchain.compiler().identity(),
         "processor": processor.features(),
         "platform": f"{sys.platform} {os.uname().machine} {sys.byteorder} {sys.maxsize}",
@@ -118,7 +122,8 @@ def _placed(recipe: Recipe) -> tuple[Path, Order]:
     }
     key = hashlib.sha256(json.dumps([recipe.name, about], sort_keys=True).encode()).hexdigest()
     order = Order(
-        recipe.name, key, recipe.sources, recipe.flags, recipe.symbols, VARIABLE, about
+        recipe.name, key, recipe.sources, recipe.flags, recipe.symbols, VARIABLE, about,
+        recipe.optional,
     )  # fmt: skip
     return private_folder() / f"{recipe.name}-{key[:32]}", order
 

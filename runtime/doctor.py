@@ -42,15 +42,15 @@ class Finding:
     data: dict[str, Any] = field(default_factory=dict)
 
 
-def examine(compiled: Compile, flags: Sequence[str]) -> list[Finding]:
+def examine(compiled: Compile, flags: Sequence[str], optional: Sequence[str] = ()) -> list[Finding]:
     """All findings, in the order in which a reader understands them.
 
     `compiled(scene, engine)` gives the model of a scene (mstmm.compile); `flags` are those that
-    fused code is compiled with.
+    fused code is compiled with, `optional` those of them that a compiler need not know.
     """
     parts = (
         _versions(), _processor(), _compiler(flags), _cache(), _prebuilt(compiled),
-        _built_here(compiled, flags),
+        _built_here(compiled, flags, optional),
     )  # fmt: skip
     return [finding for part in parts for finding in part]
 
@@ -148,7 +148,9 @@ def _prebuilt(compiled: Compile) -> Iterator[Finding]:
     yield _tried("looped engine", lambda: _pendulum(compiled, "looped"))
 
 
-def _built_here(compiled: Compile, flags: Sequence[str]) -> Iterator[Finding]:
+def _built_here(
+    compiled: Compile, flags: Sequence[str], optional: Sequence[str]
+) -> Iterator[Finding]:
     """A kernel compiled for the trial, then a scene by the way that every scene goes."""
     from . import toolchain
 
@@ -156,7 +158,7 @@ def _built_here(compiled: Compile, flags: Sequence[str]) -> Iterator[Finding]:
         toolchain.compiler()
     except EnvironmentFailure:
         return  # said above
-    trial = _tried("compiling", lambda: _tiny_library(flags))
+    trial = _tried("compiling", lambda: _tiny_library(flags, optional))
     yield trial
     if trial.ok:
         yield _tried("fused engine", lambda: _pendulum(compiled, "fused"))
@@ -176,7 +178,7 @@ def _broken(subject: str, error: Exception) -> Finding:
     return Finding(subject, False, text)
 
 
-def _tiny_library(flags: Sequence[str]) -> str:
+def _tiny_library(flags: Sequence[str], optional: Sequence[str]) -> str:
     """Compile a kernel with the flags of fused code, open it, and compare with what it must say."""
     from .library_build import Order, fetched
     from .toolchain import TIMEOUT
@@ -188,7 +190,13 @@ def _tiny_library(flags: Sequence[str]) -> str:
     )
     with tempfile.TemporaryDirectory(prefix="mstmm-doctor-") as folder:
         order = Order(
-            "trial", "0" * 64, lambda key: {"trial.c": text}, tuple(flags), ("trial",), "TMPDIR"
+            "trial",
+            "0" * 64,
+            lambda key: {"trial.c": text},
+            tuple(flags),
+            ("trial",),
+            "TMPDIR",
+            optional=tuple(optional),
         )
         built = fetched(Path(folder) / "trial", order, min(TIMEOUT, 60.0))
         worst = _trial_error(built.path)

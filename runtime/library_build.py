@@ -44,7 +44,8 @@ class Order:
     """What to build: `name` is the library's stem, `key` says all that decides its content.
 
     `sources` makes the texts, file name -> text, and runs only when a library is built; files that
-    end in .c are compiled together with `flags`.  `symbols` must be found in the library.
+    end in .c are compiled together with `flags`, of which those in `optional` are left out where
+    the compiler does not know them.  `symbols` must be found in the library.
     `variable` names the environment variable by which a user moves the folder.
     """
 
@@ -55,6 +56,7 @@ class Order:
     symbols: tuple[str, ...]
     variable: str
     about: Mapping[str, Any] = field(default_factory=dict)
+    optional: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,9 @@ def _made(folder: Path, order: Order, compiler: Compiler, timeout: float) -> Ent
         (work / name).write_text(text, encoding="utf-8")
     library = order.name + toolchain.library_suffix()
     sources = [work / name for name in texts if name.endswith(".c")]
-    seconds = toolchain.build(compiler, sources, folder / library, order.flags, timeout)
+    compilation = toolchain.build(
+        compiler, sources, folder / library, order.flags, order.optional, timeout
+    )
     (folder / library).chmod(0o700)
     wrong = self_test.problem(folder / library, order.symbols)
     if wrong:
@@ -174,8 +178,8 @@ def _made(folder: Path, order: Order, compiler: Compiler, timeout: float) -> Ent
         )
     entries.keep_text(folder, texts)
     about = {
-        **order.about, "name": order.name, "key": order.key, "seconds": round(seconds, 4),
-        "flags": list(order.flags), "compiler": compiler.identity(),
+        **order.about, "name": order.name, "key": order.key, "flags": list(compilation.flags),
+        "seconds": round(compilation.seconds, 4), "compiler": compiler.identity(),
         "compiler_version": toolchain.version(compiler, work),
         "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }  # fmt: skip

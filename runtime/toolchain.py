@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -25,6 +26,9 @@ TIMEOUT = 300.0
 _NO_ROOM = (
     "No space left on device", "Disk quota exceeded", "File too large", "File size limit exceeded",
 )  # fmt: skip
+
+#: How gcc and clang say that they do not know an option.
+_UNKNOWN = re.compile("unknown argument|unrecognized|unsupported option|not supported")
 
 #: Variables by which gcc and clang find other headers and libraries.
 _VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
@@ -99,22 +103,59 @@ def library_suffix() -> str:
     return ".dylib" if sys.platform == "darwin" else ".so"
 
 
-def build(
-    found: Compiler, sources: Sequence[Path], target: Path, flags: Sequence[str], timeout: float
-) -> float:
-    """Compile `sources`, all in one folder, into the shared library `target`; returns seconds.
+@dataclass(frozen=True)
+class Compilation:
+    """What a successful compiler took, s, and the flags it was given in the end."""
 
+    seconds: float
+    flags: tuple[str, ...]
+
+
+def build(
+    found: Compiler, sources: Sequence[Path], target: Path, flags: Sequence[str],
+    optional: Sequence[str], timeout: float,
+) -> Compilation:  # fmt: skip
+    """Compile `sources`, all in one folder, into the shared library `target`.
+
+    Those of `flags` that are in `optional` too are left out if the compiler does not know them.
     Everything the compiler writes, its temporary files too, lies in that folder: whoever removes
     it leaves nothing behind.  Raises EnvironmentFailure, one line, if the compiler cannot be run,
     fails, is killed, does not end within `timeout` s, or leaves no library.
     """
+    begin = time.perf_counter()
+    kept = tuple(flags)
+    while True:
+        ended = _compiled(found, sources, target, kept, timeout)
+        unknown = _unknown(ended, optional) & set(kept)
+        if not unknown:
+            break
+        kept = tuple(flag for flag in kept if flag not in unknown)
+    if ended.code != 0:
+        raise EnvironmentFailure(_reason(found, ended, sources[0].name))
+    if not target.is_file() or target.stat().st_size == 0:
+        raise EnvironmentFailure(
+            f"the C compiler {found.command[0]} reported success and left no library; "
+            "see mstmm doctor"
+        )
+    return Compilation(time.perf_counter() - begin, kept)
+
+
+def _unknown(ended: Ended, optional: Sequence[str]) -> set[str]:
+    """The optional flags that a failed compiler names in a complaint about options."""
+    complaints = [line for line in ended.said.splitlines() if _UNKNOWN.search(line)]
+    named = {word.strip("'\"`‘’;,") for line in complaints for word in line.split()}
+    return named & set(optional) if ended.code != 0 else set()
+
+
+def _compiled(
+    found: Compiler, sources: Sequence[Path], target: Path, flags: Sequence[str], timeout: float
+) -> Ended:
     from .process import Hanging, run
 
     folder = sources[0].parent
     command = [*found.command, *flags, "-fPIC", "-shared", *map(str, sources), "-lm"]
-    begin = time.perf_counter()
     try:
-        ended = run([*command, "-o", str(target)], folder, timeout, TMPDIR=str(folder))
+        return run([*command, "-o", str(target)], folder, timeout, TMPDIR=str(folder))
     except Hanging:
         raise EnvironmentFailure(
             f"the C compiler {found.command[0]} did not finish within {timeout:g} s and was "
@@ -125,14 +166,6 @@ def build(
             f"the C compiler {found.command[0]} could not be run ({error.strerror}); "
             "see mstmm doctor"
         ) from None
-    if ended.code != 0:
-        raise EnvironmentFailure(_reason(found, ended, sources[0].name))
-    if not target.is_file() or target.stat().st_size == 0:
-        raise EnvironmentFailure(
-            f"the C compiler {found.command[0]} reported success and left no library; "
-            "see mstmm doctor"
-        )
-    return time.perf_counter() - begin
 
 
 def _reason(found: Compiler, ended: Ended, source: str) -> str:

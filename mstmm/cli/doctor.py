@@ -11,12 +11,12 @@ from .options import Json
 def doctor(json: Json = False) -> None:
     """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
     from mstmm.compilation import compile_scene
-    from mstmm.fused_abi import FLAGS
+    from mstmm.fused_abi import FLAGS, TUNING
     from mstmm.runtime import doctor as examination
 
     from . import output
 
-    findings = examination.examine(compile_scene, FLAGS)
+    findings = examination.examine(compile_scene, FLAGS, TUNING)
     problems = [finding for finding in findings if not finding.ok]
     if json:
         plain = [vars(finding) for finding in findings]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -92,6 +94,34 @@ def test_compiler_with_arguments_of_its_own(
     monkeypatch.setenv("CC", f"'{path}' -DGIVEN")
     built = cache.library(kernel.recipe)
     assert scaled(built.path, built.key) == 21.0
+
+
+@pytest.mark.parametrize(
+    "complaint",
+    [
+        "clang: error: unknown argument: '-fone'\nclang: error: unknown argument: '-ftwo'",
+        "cc: error: unrecognized command-line option ‘-fone’; did you mean ‘-fno’?",
+        "gcc: error: unrecognized command line option '-ftwo'",
+    ],
+)
+def test_compiler_that_does_not_know_a_flag(
+    complaint: str, cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Left out where the flag is optional; told where it is not."""
+    flags = [flag for flag in ("-fone", "-ftwo") if flag in complaint]
+    cases = "|".join(f"*{flag}*" for flag in flags)
+    script = (
+        f'case "$*" in\n{cases}) cat >&2 <<END\n{complaint}\nEND\nexit 1;; esac\nexec $REAL "$@"'
+    )
+    monkeypatch.setenv("CC", str(false_compiler(tmp_path, script)))
+    plain = Kernel().recipe
+    needing = replace(plain, flags=("-O1", *flags))
+    with pytest.raises(EnvironmentFailure, match=flags[0]):
+        cache.library(needing)
+    built = cache.library(replace(needing, optional=tuple(flags)))
+    assert scaled(built.path, built.key) == 21.0
+    about = json.loads((built.path.parent / "entry.json").read_text())
+    assert about["flags"] == ["-O1"]
 
 
 def test_hanging_compiler_is_killed_with_its_children(
