@@ -158,7 +158,9 @@ def _momentum(result: Result) -> list[Drift]:
     if not len(result.t) or not _isolated(scene):
         return found
     some = range(0, len(scene.bodies), max(1, len(scene.bodies) // _SOME))
-    reach = max((_largest(result.position(scene.bodies.name(i))) for i in some), default=0.0)
+    names = [scene.bodies.name(i) for i in some]
+    result._observed.fetch(names)
+    reach = max((_largest(result.position(name)) for name in names), default=0.0)
     force, moment = _support(result, reach)
     kinetic = np.sqrt(2 * _largest(result.energies()["kinetic"]))
     mass = sum(body.mass for body in scene.body)

@@ -6,7 +6,7 @@ into memory, each body and each kind of quantity is a batch of its own.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 #: Numbers of one batch, about 130 MB.
 _BATCH = 2**24
+
+#: Bodies and ends of a scene up to which all of them are observed together.
+_TOGETHER = 1000
 
 
 class Observed:
@@ -51,6 +54,13 @@ class Observed:
             self._observe("points", known or reference)
             self._points[reference] = self._points[known or reference]
         return self._points[reference]
+
+    def fetch(self, references: Sequence[str]) -> None:
+        """Observe these bodies and ends in one go, where they are asked for one after another."""
+        if len(self.references) > _TOGETHER:
+            missing = [name for name in references if name not in self._points]
+            if missing and len(self.run.t) * 24 * len(missing) <= _BATCH:
+                self._seen(missing, ("points",))
 
     def part(self, name: str) -> Array:
         """loads, efforts, udot or sums, see `Observation`."""
@@ -98,11 +108,16 @@ class Observed:
         run = self.run
         bodies, nu = self.engine.packed.topology.count, self.engine.nu
         size = len(run.t) * (24 * len(self.references) + 6 * bodies + 2 * nu + 10)
-        parts = PARTS if size <= _BATCH else (part,)
-        if size > _BATCH or (reference is not None and reference not in self.references):
+        together = size <= _BATCH and len(self.references) <= _TOGETHER
+        parts = PARTS if together else (part,)
+        if not together or (reference is not None and reference not in self.references):
             wanted = [] if reference is None else [reference]
         else:
             wanted = list(self.references)
+        self._seen(wanted, parts)
+
+    def _seen(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+        run = self.run
         probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
         seen = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
         for array in (seen.points, *(getattr(seen, name) for name in PARTS)):

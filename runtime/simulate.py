@@ -29,6 +29,9 @@ SLICE = 0.1
 #: Bytes of samples at which a run stops and asks for output times.
 LARGEST = 2**30
 
+#: Quaternions that are settled at once.
+_QUATERNIONS = 2**18
+
 #: The work is a by-product of a run: it may err by this many times rtol of the energy.
 _WORK_TOLERANCE = 10.0
 
@@ -287,10 +290,13 @@ def settled(engine: Engine, t: Array, y: Array, memory: Array) -> tuple[Array, f
     tolerance.  Also returns the largest distance of a quaternion's length from 1.
     """
     y, residual = y.copy(), 0.0
-    for k in engine.packed.layout.quaternions:
-        lengths = np.sqrt(np.sum(y[:, k : k + 4] ** 2, axis=1))
+    entries = engine.packed.layout.quaternions[:, None] + np.arange(4)
+    rows = max(1, _QUATERNIONS // max(1, len(entries)))
+    for first in range(0, len(y) if len(entries) else 0, rows):
+        some = y[first : first + rows]
+        lengths = np.sqrt(np.sum(some[:, entries] ** 2, axis=2))
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
-        y[:, k : k + 4] /= lengths[:, None]
+        some[:, entries] /= lengths[:, :, None]
     if engine.packed.model.n_drives:
         system = SceneSystem(engine)
         for time, known, row in zip(t, memory, y, strict=True):
