@@ -12,15 +12,14 @@ ABI = 2
 SYMBOL = "mstmm_fused_library"
 
 #: Contraction to fused multiply-add is wanted; -ffast-math would break the inlined sine, and -O1
-#: takes minutes.  Scalar statements are not to be merged into vectors (measured: slower), but they
-#: are to be reordered with an eye on registers.
+#: takes minutes.  Scalar statements are not to be merged into vectors (measured: slower).
 FLAGS = (
     "-O2", "-std=gnu17", "-march=native", "-ffp-contract=fast", "-fno-math-errno",
-    "-fno-trapping-math", "-fno-tree-slp-vectorize", "-fschedule-insns", "-fsched-pressure",
+    "-fno-trapping-math", "-fno-tree-slp-vectorize",
 )  # fmt: skip
 
 #: Those of the flags that some compilers do not know (clang) and that change no result.
-TUNING = ("-fno-tree-slp-vectorize", "-fschedule-insns", "-fsched-pressure")
+TUNING = ("-fno-tree-slp-vectorize",)
 
 _STATE = (
     "const double *p, const double *t, const double *q, const double *u, const double *memory, "
