@@ -116,7 +116,7 @@ def small() -> KernelIR:
     graph = Graph()
     a, b, c = (graph.element(name) for name in "abc")
     graph.guard(graph.call("lt", 0, c), 4, "c is not positive")
-    values = {"y": [a * graph.sin(b) + 3 * c, b * b, graph.constant(7)]}
+    values: dict[str, object] = {"y": [a * graph.sin(b) + 3 * c, b * b, graph.constant(7)]}
     return graph.kernel("small", [Port(n) for n in "abc"], [Port("y", (3,))], values)
 
 
