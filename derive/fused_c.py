@@ -25,7 +25,7 @@ __all__ = ["ABI", "FLAGS", "function_text", "fused_sources", "support"]
 
 
 class FusedKernels(Protocol):
-    """What `derive.fuse` returns: kernels by name, and what their guard codes 1, 2, ... stand for."""
+    """What `derive.fuse` returns: kernels by name, and what their guard codes stand for."""
 
     @property
     def kernels(self) -> dict[str, KernelIR]:
@@ -43,9 +43,9 @@ typedef double real;
 #define MSTMM_LITERAL(number) number
 """
 
-#: gcc keeps the order of statements unless told otherwise.  Up to this many operations its scheduler,
-#: minding registers, makes the code faster (8 % at 7 pins); beyond, it spills more than it gains.
-#: As a pragma, because other compilers do not know the flags.
+#: gcc keeps the order of statements unless told otherwise.  Up to this many operations its
+#: scheduler, minding registers, makes the code faster (8 % at 7 pins); beyond, it spills more than
+#: it gains.  As a pragma, because other compilers do not know the flags.
 _REORDERED = 3000
 _REORDER = """\
 #if defined __GNUC__ && !defined __clang__
@@ -100,8 +100,8 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
     guards: list[tuple[str, int]] = []
     angles = _lanes_angles if dialect.vector else _four_angles
     for level in ordered.levels:
-        for statement in level.statements:
-            lines += text.assign(statement)
+        for early in level.statements:
+            lines += text.assign(early)
         lines += angles(text, level.angles)
     for statement in ordered.rest:
         if isinstance(statement, Guard):
@@ -199,19 +199,19 @@ def _descriptor(
 
 def _self_test(kernels: dict[str, KernelIR], part: str) -> str:
     """A call of every kernel on ones: what the processor cannot run ends here, not in a run."""
-    lines, calls = [], []
     names = ["accelerations_lanes"] if part == "lanes" else list(kernels)
+    kernel = kernels["accelerations"]
+    longest = max(1, *(port.length() for port in (*kernel.inputs, *kernel.outputs)))
+    lines = [
+        f"enum {{ length = {longest} * MSTMM_LANES }};",
+        "static double ones[length], results[4][length];",
+        "static int codes[MSTMM_LANES];",
+        "for (int i = 0; i < length; i++) ones[i] = 1.0;",
+    ]
     for name in names:
-        kernel = kernels[name.removesuffix("_lanes")]
-        words = []
-        for port in (*kernel.inputs, *kernel.outputs):
-            lines.append(f"static double {name}_{port.name}[{max(1, port.length())} * MSTMM_LANES];")
-            words.append(f"{name}_{port.name}")
-            ones = f"for (int i = 0; i < {port.length()} * MSTMM_LANES; i++) {words[-1]}[i] = 1.0;"
-            calls.append(ones)
-        if part == "lanes":
-            lines.append("static int codes[MSTMM_LANES];")
-            words.append("codes")
-        calls.append(f"mstmm_{name}({', '.join(words)});")
-    body = "\n".join(f"    {line}" for line in [*lines, *calls, "return 0;"])
+        outputs = kernels[name.removesuffix("_lanes")].outputs
+        words = ["ones"] * len(kernel.inputs) + [f"results[{i}]" for i in range(len(outputs))]
+        words += ["codes"] if part == "lanes" else []
+        lines.append(f"mstmm_{name}({', '.join(words)});")
+    body = "\n".join(f"    {line}" for line in [*lines, "(void)codes;", "return 0;"])
     return f"int mstmm_self_test(void);\nint mstmm_self_test(void)\n{{\n{body}\n}}\n"

@@ -63,7 +63,7 @@ class StraightText:
         self._numbers = _used_as_numbers(kernel.statements) & self._truths
 
     def assign(self, statement: Assign) -> list[str]:
-        """`const real t12 = ...;`; a truth value is `m12`, and `t12` too where a number is needed."""
+        """`const real t12 = ...;`; a truth value is `m12`, and `t12` where somebody counts it."""
         number, op, args = statement.number, statement.op, statement.args
         if op not in TRUTH_VALUED:
             return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
@@ -148,8 +148,3 @@ def _used_as_numbers(statements: Iterable[object]) -> set[int]:
             read = read[1:]
         used |= {operand.number for operand in read if isinstance(operand, Temporary)}
     return used
-
-
-def reads_inputs_alone(operand: Operand, ready: set[int]) -> bool:
-    """Whether an operand is a literal, an input, or one of the temporaries in `ready`."""
-    return isinstance(operand, (Constant, Element)) or operand.number in ready
