@@ -309,6 +309,7 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
     run->count.status = status;
     if (status < 0) run->count.phase = PHASE_END;
     if (status) return status;
-    if (phase == PHASE_SAMPLE && run->count.steps > steps && time_is_up(&at)) return MSTMM_RUNNING;
+    if (phase != PHASE_SAMPLE || run->count.steps == steps) continue;
+    if (run->count.steps == run->pause_steps || time_is_up(&at)) return MSTMM_RUNNING;
   }
 }

@@ -122,6 +122,7 @@ typedef struct mstmm_run {
   const double *atol; /* n_error; may be NULL with fixed steps */
   double first_step, min_step, max_step; /* 0: chosen */
   int64_t max_steps;                     /* 0: no limit */
+  int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
   int64_t n_breaks;
   const double *breaks; /* strictly increasing */
   int64_t n_outputs;    /* < 0: a sample at every accepted step */

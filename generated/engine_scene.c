@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "elements.h"
-#include "engine_scene.h"
+#include "engine_compiled.h"
 
 typedef int (*energy_kernel)(const real *p, const real *v, const real *w, real *energy);
 typedef int (*inertia_kernel)(const real *p, real *inertia);
@@ -247,6 +247,15 @@ static int scene_fire(void *context, int event, double t, double *y)
     return action->action;
 }
 
+/* Is there anything for `mstmm_scene_settle` to do? */
+static int needs_settling(const mstmm_scene_run *run)
+{
+    const mstmm_model *model = run->model;
+    for (int k = 0; k < model->n_laws; k++)
+        if (model->laws[k].twist >= 0) return 1;
+    return run->n_quaternions > 0 || model->n_drives > 0;
+}
+
 void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 {
     const mstmm_model *model = run->model;
@@ -255,10 +264,11 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
     system->n_state = model->nq + model->nu + (run->with_power ? 1 : 0);
     system->n_error = system->n_state; /* the work too: its power has kinks that motion has not */
     system->rhs = scene_rhs;
-    system->accept = scene_accept;
+    system->accept = needs_settling(run) ? scene_accept : NULL;
     system->n_events = run->n_events;
     system->events = scene_events;
     system->fire = scene_fire;
     system->n_memory = model->n_memory;
     system->memory = run->memory;
+    if (run->fused) mstmm_compiled_system(run, system);
 }

@@ -2,6 +2,7 @@
 #ifndef MSTMM_ENGINE_SCENE_H
 #define MSTMM_ENGINE_SCENE_H
 
+#include "engine_fused.h"
 #include "engine_integrate.h"
 #include "engine_sweep.h"
 
@@ -60,6 +61,10 @@ typedef struct {
     int n_probes;
     const mstmm_probe *probes;
     real *probe_values; /* n_probes x 6, and MSTMM_PROBE_NUMBERS of scratch */
+    /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
+    const mstmm_fused *fused, *fused_lanes;
+    const real *fused_p;
+    real *fused_numbers;
 } mstmm_scene_run;
 
 /* Fills the integrator's view of `run`. */

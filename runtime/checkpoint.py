@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 State = Mapping[str, Any]
 
-_FORMAT = "mstmm checkpoint 1"
+_FORMAT = "mstmm checkpoint 2"
 _ROWS = ("t", "y", "memory", "event")
 
 
@@ -81,7 +81,7 @@ class Checkpoint:
                     "run without resume to start again"
                 )
         samples = Samples(*(data[name] for name in _ROWS))
-        return {"real": data["real"], "integer": data["integer"]}, samples
+        return {name: data[name] for name in ("real", "integer", "engine")}, samples
 
     def remove(self) -> None:
         """The run has ended by itself: nothing to continue."""

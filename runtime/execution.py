@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mstmm.errors import MstmmError, SceneError
 
-from . import second_opinion
-from .checkpoint import Checkpoint
+from . import compiled_run, second_opinion
+from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, compare, tighter
-from .integrate import Run, Samples
+from .integrate import Run, Samples, Status
 from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
 from .stability import StepCheck, check_step
 from .steppers import get
@@ -39,6 +39,7 @@ class Watch:
         self.progress, self.settings, self.runs = progress, settings, runs
         self.run, self.notes = 0, list[str]()
         self.checkpoint: Checkpoint | None = None
+        self.engine = compiled_run.LOOPED
         self._saved = time.monotonic()
 
     def tell(self, t: float) -> None:
@@ -62,7 +63,8 @@ class Watch:
         """A checkpoint now.  If it cannot be written the run goes on and a note says so."""
         if self.checkpoint is not None and self.run == 0:
             try:
-                self.checkpoint.save(run.state(), _joined(earlier, run.samples))
+                state = {**run.state(), "engine": np.array(self.engine)}
+                self.checkpoint.save(state, _joined(earlier, run.samples))
             except MstmmError as error:
                 note = f"no checkpoint: {error}"
                 if note not in self.notes:
@@ -82,20 +84,42 @@ def first_run(
         if watch.checkpoint is not None:
             raise SceneError(f"method {settings.method!r} keeps no checkpoints; use dop853")
         return second_opinion.integrate(model, settings, q, u, watch.tell), None
-    system = SceneSystem(model._engine)
+    state, earlier = _continued(watch.checkpoint) if resume else (None, None)
+    recorded = None if state is None else str(state["engine"])
+    engine, compiled = model._engine, compiled_run.at_once(model, settings, recorded)
+    system = SceneSystem(engine, compiled)
     start = system.start(settings.t_start, q, u)
-    step = check_step(model._engine, get(settings.method), settings, start, system.memory)
-    run, earlier = make_run(system, settings, q, u), None
-    if resume and watch.checkpoint is not None and watch.checkpoint.exists():
-        state, earlier = watch.checkpoint.load()
+    step = check_step(engine, get(settings.method), settings, start, system.memory)
+    run = make_run(system, settings, q, u)
+    if state is not None:
         run.restore(state)
-    status = advance(run, lambda now: watch.look(now, earlier))
+    look = 0 if compiled else compiled_run.look_after(model, settings)
+    if run.statistics.steps < look:
+        watch.engine = compiled_run.LOOPED
+        status = advance(run, lambda now: watch.look(now, earlier), look)
+        if status is Status.RUNNING:
+            compiled = compiled_run.worth_compiling(model, settings, run)
+        if compiled is not None:
+            system, earlier = SceneSystem(engine, compiled), None
+            run = make_run(system, settings, q, u)
+    else:
+        status = Status.RUNNING
+    watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
+    if status is Status.RUNNING:
+        status = advance(run, lambda now: watch.look(now, earlier))
     if watch.checkpoint is not None:
         if status is None:
             watch.save(run, earlier)
         else:
             watch.checkpoint.remove()
     return trajectory(system, run, settings, status, earlier), step
+
+
+def _continued(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | None]:
+    """State and samples of a run that was interrupted; None where there is none."""
+    if checkpoint is None or not checkpoint.exists():
+        return None, None
+    return checkpoint.load()
 
 
 def second_run(

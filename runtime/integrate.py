@@ -238,13 +238,18 @@ class Run:
         run.sample_memory = self._ffi.from_buffer("double[]", self._memory)
         run.sample_event = self._ffi.from_buffer("int64_t[]", self._event)
 
-    def advance(self, wall: float = 0.1) -> Status:
+    def advance(self, wall: float = 0.1, steps: int = 0) -> Status:
         """Goes on for `wall` seconds or to the end.  Full buffers are emptied on the way.
+
+        Args:
+            wall: seconds; infinite for no limit.
+            steps: comes back, too, when the run has made so many steps in all; 0 for no limit.
 
         Returns:
             RUNNING, FINISHED, STOPPED or a failure; never BUFFER_FULL.
         """
         deadline = time.monotonic() + wall
+        self._run.pause_steps = steps
         while True:
             left = max(0.0, deadline - time.monotonic())
             status = Status(self._lib.mstmm_advance(self._run, left))

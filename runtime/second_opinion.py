@@ -80,7 +80,8 @@ class _System:
     def remember(self, t: float, y: Array) -> Array:
         """After a step: memory of turns brought up to date; the settled state."""
         state = np.array(y)
-        self.calls.accept(self.calls.context, t, self._c(state))
+        if self.calls.accept != self.ffi.NULL:  # where there is something to settle
+            self.calls.accept(self.calls.context, t, self._c(state))
         return state
 
     def fire(self, event: int, t: float, y: Array) -> int:

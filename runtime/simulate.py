@@ -16,6 +16,7 @@ from mstmm.errors import SceneError
 
 from . import values
 from .engine import Engine, Probe
+from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
 from .layout import StateNames
 from .pack import resize
@@ -83,10 +84,22 @@ class Trajectory:
         return done and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())
 
 
-class SceneSystem:
-    """`mstmm_system` of a model: events, power and memory of its own."""
+@dataclass(frozen=True)
+class Compiled:
+    """Code compiled for a scene: for one state, for several side by side, and their numbers."""
 
-    def __init__(self, engine: Engine) -> None:
+    one: FusedLibrary
+    lanes: FusedLibrary | None
+    numbers: Array
+
+
+class SceneSystem:
+    """`mstmm_system` of a model: events, power and memory of its own.
+
+    With `compiled` the right-hand side is that code; events and settling stay with the engine.
+    """
+
+    def __init__(self, engine: Engine, compiled: Compiled | None = None) -> None:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
         conditions, actions, self.event_names = _conditions(engine)
@@ -106,8 +119,19 @@ class SceneSystem:
             self._events(conditions, actions)
         self.workspace = np.zeros(int(model.workspace))
         run.workspace = engine.pointer(self.workspace)
+        if compiled is not None:
+            self._compiled(compiled)
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
+
+    def _compiled(self, code: Compiled) -> None:
+        engine, lib = self.engine, self.engine.lib
+        lanes = engine.ffi.NULL if code.lanes is None else code.lanes.descriptor
+        numbers = np.ascontiguousarray(code.numbers)
+        scratch = np.zeros(max(1, lib.mstmm_compiled_size(code.one.descriptor, lanes)))
+        pointers = engine.pointer(numbers), engine.pointer(scratch)
+        lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)
+        self.kept += [code, numbers, scratch, *pointers]
 
     def _events(self, conditions: list[Any], actions: list[tuple[int, int]]) -> None:
         engine, ffi, run = self.engine, self.engine.ffi, self.run
@@ -213,15 +237,17 @@ def interruptible() -> Iterator[list[bool]]:
         signal.signal(signal.SIGINT, previous)
 
 
-def advance(run: Run, observe: Callable[[Run], None] | None = None) -> Status | None:
+def advance(
+    run: Run, observe: Callable[[Run], None] | None = None, steps: int = 0
+) -> Status | None:
     """Run to the end; None if Ctrl-C came first or the samples fill the memory they may take.
 
-    `observe` is called between slices.
+    `observe` is called between slices.  RUNNING when so many steps have been made in all.
     """
     with interruptible() as interrupted:
         while True:
-            status = run.advance(SLICE)
-            if status is not Status.RUNNING:
+            status = run.advance(SLICE, steps)
+            if status is not Status.RUNNING or run.statistics.steps == steps:
                 return status
             if observe is not None:
                 observe(run)

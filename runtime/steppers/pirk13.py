@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
-from .tableau import Tableau, from_monomials, frozen
+from .tableau import Array, Tableau, from_monomials, frozen
 
 _ITERATIONS = 12
 _COMPARED = 9  # the error estimate: what three iterations less give
@@ -68,7 +69,7 @@ def tableau() -> Tableau:
     c = np.array([0.0, *[float(node) for node in nodes] * _ITERATIONS])
     a, b, error = np.zeros((stages, stages)), np.zeros(stages), np.zeros(stages + 1)
     a[places[0], 0] = c[places[0]]
-    for before, after in zip(places[:-1], places[1:], strict=True):
+    for before, after in pairwise(places):
         a[after, before] = block
     b[places[-1]] = error[places[-1]] = weights
     error[places[_COMPARED - 1]] = -weights
@@ -87,7 +88,7 @@ def tableau() -> Tableau:
     )
 
 
-def _dense(nodes: Sequence[Fraction], weights: np.ndarray, stages: int) -> np.ndarray:
+def _dense(nodes: Sequence[Fraction], weights: Array, stages: int) -> Array:
     """The slope's polynomial goes through k_0, the last eight stages and the next step's first."""
     points = [Fraction(0), *nodes, Fraction(1)]
     narrow = np.array(from_monomials(_integrals(points)))

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 LANES = 8
 
 
-def frozen(values: ArrayLike) -> Array:
+def frozen(values: ArrayLike | Sequence[Any]) -> Array:
     """A contiguous, read-only copy in double precision."""
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
@@ -144,7 +144,7 @@ class Tableau:
     def read_blocks(self) -> list[int]:
         """1 for every block of an iterated method that is read by more than the block behind."""
         nodes, iterations = self.iterated or (1, 0)
-        reading = [self.B, self.dense.any(axis=1), self.A_extra.any(axis=0)]
+        reading = [self.B, np.abs(self.dense).sum(axis=1), np.abs(self.A_extra).sum(axis=0)]
         reading += [row for row in (self.E, self.E_low) if row is not None]
         blocks = [slice(1 + i * nodes, 1 + (i + 1) * nodes) for i in range(iterations)]
         return [int(any(np.any(row[block]) for row in reading)) for block in blocks]
