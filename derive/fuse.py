@@ -19,7 +19,6 @@ from mstmm.structure import BodyStructure, Entries, ExpressionStructure, Key, St
 from .balance import balance
 from .fused_loads import LoadPass
 from .inline import Inliner, Nodes
-from .schedule import schedule
 from .transport import Stage, stages_of
 
 #: (element, kernel name) -> its IR.
@@ -29,8 +28,6 @@ Kernels = Callable[[Key, str], KernelIR]
 UNDETERMINED, HINGE = 1, 4
 #: A pivot must exceed this share of the mean inertia of the body it moves.
 PIVOT_FLOOR = Fraction(1, 10**14)
-#: Operations that the order of the statements assumes to start in one cycle; measured.
-WIDTH = 4
 
 
 @dataclass(frozen=True)
@@ -46,6 +43,7 @@ class BodyNodes:
     """What is known of a body while the sweep runs."""
 
     stages: tuple[Stage, ...]
+    axial: bool
     hinge: dict[str, Nodes]
     s: Nodes
     motion: Nodes
@@ -186,12 +184,33 @@ class _Fusion:
         for stage in stages[:-1]:
             motion = stage.motion(motion)
         motion = stages[-1].motion_behind_hinge(motion, hinge, s)
+        if not any(body.imposed) and all(isinstance(x, float) for x in body.rotor):
+            self._stop_free_directions(hinge["H"], motion, s)
         p = self.entries(body.body_p)
         own = self.inline.run(self.kernels(body.body, "inertia"), {"p": p})["S"]
         load = self.inline.run(self.kernels(body.body, "bias_load"), {"p": p, "motion": motion})
         tau = self.efforts[body.u : body.u + body.nu]
         none: Nodes = []
-        return BodyNodes(stages, hinge, s, motion, own, load["e"], own, tau, none, none, none, none)
+        axial = stages[-1].keeps(hinge["H"])
+        return BodyNodes(
+            stages, axial, hinge, s, motion, own, load["e"], own, tau, none, none, none, none
+        )
+
+    def _stop_free_directions(self, subspace: Nodes, motion: Nodes, s: Nodes) -> None:
+        """Choose the bias motion: the deviations from it are recovered whatever it is.
+
+        Along a free unit direction of H the speed's own acceleration s can cancel what the carrier
+        brings along; the zeros that this leaves in the bias motion fold away behind it.  (Not with
+        rotor inertia, whose effort goes with the whole acceleration.)
+        """
+        nu = len(s)
+        for k in range(nu):
+            column = subspace[k::nu]
+            units = [row for row in range(6) if column[row].value == 1]
+            if len(units) == 1 and sum(x.value == 0 for x in column) == 5:
+                place = units[0] + 6 if units[0] < 3 else units[0]  # motion is w, wd, rdd
+                s[k] = -motion[place]
+                motion[place] = self.zero
 
     def free(self, index: int) -> list[int]:
         """Speeds of a body's hinge that no drive prescribes."""
@@ -206,21 +225,23 @@ class _Fusion:
         """Eliminate the free speeds, then carry S and e to the parent."""
         body, nodes = self.structure.bodies[index], self.bodies[index]
         inertia, load = nodes.inertia, nodes.load
+        if nodes.axial:
+            inertia, load = nodes.stages[-1].condense(inertia, load)
         if self.free(index):
-            inertia, load = self._eliminate(index)
+            inertia, load = self._eliminate(index, inertia, load)
         if body.parent < 0:
             return
-        for stage in reversed(nodes.stages):
+        for stage in reversed(nodes.stages[:-1] if nodes.axial else nodes.stages):
             inertia, load = stage.condense(inertia, load)
         parent = self.bodies[body.parent]
         parent.inertia = [a + b for a, b in zip(parent.inertia, inertia, strict=True)]
         parent.load = [a + b for a, b in zip(parent.load, load, strict=True)]
 
-    def _eliminate(self, index: int) -> tuple[Nodes, Nodes]:
+    def _eliminate(self, index: int, inertia: Nodes, load: Nodes) -> tuple[Nodes, Nodes]:
         body, nodes, free = self.structure.bodies[index], self.bodies[index], self.free(index)
         rotor = self.entries(body.rotor)
         given: dict[str, Sequence[Node]] = {
-            "S": nodes.inertia, "e": nodes.load, "tau": [nodes.tau[k] for k in free],
+            "S": inertia, "e": load, "tau": [nodes.tau[k] for k in free],
         }  # fmt: skip
         kernel = self._own_elimination(body) if len(free) == body.nu else None
         if kernel is not None and all(x.value == 0 for x in rotor):
@@ -270,12 +291,16 @@ class _Fusion:
         for stage in nodes.stages[:-1]:
             delta = stage.delta(delta)
         free = self.free(index)
-        rates, nodes.delta = nodes.stages[-1].delta_behind_hinge(
-            delta, self._free_subspace(index), nodes.gain, nodes.offset
-        )
+        last = nodes.stages[-1]
+        known = self._free_subspace(index), nodes.gain, nodes.offset
+        if nodes.axial:
+            rates, delta = last.still().delta_behind_hinge(delta, *known)
+            nodes.delta = last.delta(delta)
+        else:
+            rates, nodes.delta = last.delta_behind_hinge(delta, *known)
         nodes.udot = list(nodes.s)
         for k, rate in zip(free, rates, strict=True):
-            nodes.udot[k] = rate
+            nodes.udot[k] = nodes.s[k] + rate
 
     def _drive_power(self) -> None:
         """Power that drives feed in: tau_d . u_d with tau_d = H_d^T f + J udot - given."""
@@ -309,6 +334,6 @@ class _Fusion:
             )
             found.append(wide)
         return Fused(
-            {kernel.name: schedule(balance(kernel), WIDTH) for kernel in found},
+            {kernel.name: balance(kernel) for kernel in found},
             tuple(self.failures),
         )

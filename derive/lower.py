@@ -303,6 +303,10 @@ class _Lowering:
             op = "and" if isinstance(e, sp.And) else "or"
         if op == "mul":
             return self._quotient(e)
+        shared = _shared_factor(e) if op == "add" else sp.Integer(1)
+        if shared != 1:
+            rest = sp.Add(*(a / shared for a in e.args))
+            return self.graph.constant(_fraction(shared)) * self.scalar(rest)
         first, *rest = [self.scalar(a) for a in sorted(e.args, key=sp.default_sort_key)]
         for node in rest:
             first = self.graph.call(op, first, node)
@@ -311,10 +315,14 @@ class _Lowering:
     def _quotient(self, e: sp.Mul) -> Node:
         """Products times the reciprocal of the denominator, which value numbering then shares."""
         above, below = sp.fraction(e, exact=True)
+        number, above = above.as_coeff_Mul()
         result = self.graph.constant(1)
         for factor in sorted(sp.Mul.make_args(above), key=sp.default_sort_key):
             result = result * self.scalar(factor)
-        return result if below == 1 else result * (1 / self.scalar(below))
+        factor = self.graph.constant(_fraction(number))
+        if below == 1:
+            return factor * result
+        return (factor * (1 / self.scalar(below))) * result
 
     def _piecewise(self, e: sp.Piecewise) -> Node:
         *cases, (value, condition) = e.args
@@ -336,6 +344,13 @@ class _Lowering:
             "==": lambda: call("eq", left, right),
             "!=": lambda: call("not", call("eq", left, right)),
         }[e.rel_op]()
+
+
+def _shared_factor(total: sp.Add) -> sp.Rational:
+    """Number with which every term of a sum is multiplied (up to sign); SymPy distributes it."""
+    factors = {abs(term.as_coeff_Mul()[0]) for term in total.args}
+    factor = factors.pop()
+    return factor if not factors and isinstance(factor, sp.Rational) else sp.Integer(1)
 
 
 def _fraction(number: sp.Number) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from mstmm.ir import Assign, Constant, Element, Guard, KernelIR, Operand, Port, Store, Temporary
+from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
 
 from .c_text import TRUTH_VALUED, literal
 

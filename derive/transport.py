@@ -87,6 +87,20 @@ class Stage:
                 return axis
         return ""
 
+    def keeps(self, subspace: Nodes) -> bool:
+        """Whether this stage is a screw about z that leaves a subspace along z as it is.
+
+        Then the hinge can be eliminated behind the stage, in inboard axes, which takes the turn out
+        of the chain of divisions.
+        """
+        nu = len(subspace) // 6
+        aside = [subspace[row * nu + k] for row in (0, 1, 3, 4) for k in range(nu)]
+        return nu > 0 and self._screw_axis() == "z" and all(x.value == 0 for x in aside)
+
+    def still(self) -> Stage:
+        """A stage without rotation and shift."""
+        return Stage(self.fusion, self.fusion.identity(), self.fusion.zeros(3))
+
     def delta(self, delta: Nodes) -> Nodes:
         """X delta: deviation of the outboard frame, at rest in the inboard one."""
         return self.delta_behind_hinge(delta, [], [], [])[1]

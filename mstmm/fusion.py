@@ -37,10 +37,13 @@ _SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.2, 0.04, 0.002
 _SAVED_PER_BODY = 1e-7
 
 #: What decides the text besides structure and kernels: the modules that print it.
-_PRINTERS = (
-    "fuse.py", "fused_loads.py", "transport.py", "inline.py", "balance.py", "schedule.py",
-    "fused_c.py", "fused_sincos.py", "straight_c.py", "c_text.py",
-)  # fmt: skip
+PRINTERS = {
+    "mstmm": ("fused_abi.py", "graph.py", "ir.py", "structure.py", "abi.py"),
+    "mstmm.derive": (
+        "balance.py", "c_text.py", "fuse.py", "fused_c.py", "fused_loads.py", "fused_sincos.py",
+        "inline.py", "straight_c.py", "transport.py",
+    ),
+}  # fmt: skip
 
 
 class Fusion:
@@ -74,6 +77,22 @@ class Fusion:
         if found is None:
             raise EnvironmentFailure(f"this scene cannot be fused: {self.obstacle}")
         return found
+
+    def follow(self, other: Fusion) -> None:
+        """Take over the libraries of the same scene with other numbers.
+
+        Where a structural zero was touched another library is needed: it is compiled if the other
+        had one, and without a compiler the scene falls back to the looped engine and says so.
+        """
+        if self.obstacle or other.obstacle:
+            return
+        if self.structure == other.structure:
+            self.library, self.lanes, self.note = other.library, other.lanes, other.note
+        elif other.library is not None:
+            try:
+                self.build()
+            except EnvironmentFailure as error:
+                self.obstacle = str(error)
 
     def ready(self, evaluations: float) -> FusedLibrary | None:
         """The scalar library if it is there, or if so many evaluations are worth a compiler run."""
@@ -156,10 +175,10 @@ def _obstacle(packed: Packed) -> str:
 
 @cache
 def _printers_hash() -> str:
-    folder = files("mstmm.derive")
     found = hashlib.sha256()
-    for name in _PRINTERS:
-        found.update(folder.joinpath(name).read_bytes())
+    for package, names in PRINTERS.items():
+        for name in names:
+            found.update(files(package).joinpath(name).read_bytes())
     for path in sorted(Path(str(files("mstmm.templates"))).glob("fused_*.c")):
         found.update(path.read_bytes())
     return found.hexdigest()

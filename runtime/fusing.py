@@ -19,7 +19,8 @@ class Fusing(Protocol):
 
     `numbers` is the vector p they read; `note` says where the library came from, `obstacle` why
     there can be none.  `ready(n)` gives a library if it is there or if n evaluations are worth a
-    compiler run; `find()` only looks; `build()` raises EnvironmentFailure where there can be none.
+    compiler run; `find()` only looks; `build()` raises EnvironmentFailure where there can be none;
+    `follow(other)` takes over the libraries of the same scene with other numbers.
     """
 
     library: FusedLibrary | None
@@ -30,6 +31,7 @@ class Fusing(Protocol):
 
     def find(self) -> FusedLibrary | None: ...
     def build(self) -> FusedLibrary: ...
+    def follow(self, other: Any) -> None: ...
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
@@ -52,6 +54,9 @@ class NotFused:
         from mstmm.errors import EnvironmentFailure
 
         raise EnvironmentFailure(f'{self.obstacle}; use mstmm.compile(scene, engine="fused")')
+
+    def follow(self, other: Any) -> None:
+        pass
 
     def ready(self, evaluations: float) -> None:
         return None

@@ -211,8 +211,7 @@ class Model:
             named_parameters.changed(self.scene, changes), self.known, self._fusing,
             self._product_accuracy,
         )  # fmt: skip
-        if self.fusion.library is not None:
-            changed.fusion.build()  # the library at hand, unless a structural zero was touched
+        changed.fusion.follow(self.fusion)
         return changed
 
     def simulate(
