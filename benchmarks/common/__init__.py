@@ -1,0 +1,1 @@
+"""What the benchmarks share: scenes, peers, timing loops in C, rounds and their record."""

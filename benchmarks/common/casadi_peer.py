@@ -1,0 +1,116 @@
+"""CasADi's articulated-body algorithm as C, compiled and ready for the timing loops."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from . import native
+from .aba import articulated_body
+from .links import COORDINATES, Tree
+
+HEAD = """
+/* Only called here, so that the compiler inlines it and drops its checks of NULL. */
+#define CASADI_SYMBOL_EXPORT static inline
+"""
+
+WRAPPER = """
+__attribute__((visibility("default")))
+int evaluate(const double *restrict p, const double *restrict t, const double *restrict q,
+             const double *restrict u, const double *restrict memory,
+             const double *restrict efforts, double *restrict qdot, double *restrict udot)
+{
+    double *res[] = {qdot, udot};
+    (void)t, (void)memory;
+    %s
+    return aba(arg, res, 0, 0, 0);
+}
+"""
+
+#: The function as CasADi writes it.
+PLAIN = "const double *arg[] = {p, q, u, efforts};"
+
+#: All sines and cosines first, so that no call splits the rest: libm's, or eight at a time glibc's
+#: vector library (at most 4 units in the last place off).
+AHEAD = """
+    double angles[PINS + 7], sines[PINS + 7], cosines[PINS + 7];
+    static const int place[] = {%s};
+    for (int i = 0; i < PINS; i++) angles[i] = q[place[i]];
+    %s
+    const double *arg[] = {p, q, u, efforts, sines, cosines};
+"""
+LIBM = "for (int i = 0; i < PINS; i++) sincos(angles[i], sines + i, cosines + i);"
+LIBMVEC = """for (int i = 0; i < PINS; i += WIDE) {
+        vector x;
+        __builtin_memcpy(&x, angles + i, sizeof x);
+        const vector s = VECTOR_SIN(x), c = VECTOR_COS(x);
+        __builtin_memcpy(sines + i, &s, sizeof s);
+        __builtin_memcpy(cosines + i, &c, sizeof c);
+    }"""
+DECLARED = """#define _GNU_SOURCE
+#include <math.h>
+#define PINS %d
+#define WIDE %d
+typedef double vector __attribute__((vector_size(8 * WIDE)));
+#define VECTOR_SIN %s_sin
+#define VECTOR_COS %s_cos
+vector VECTOR_SIN(vector), VECTOR_COS(vector);
+"""
+
+#: Flags tried; the best of them counts.  Nothing here changes results beyond contraction.
+FLAGS = {
+    "O2": ("-O2", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
+    "O3": ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
+}
+
+
+def c_text(function: ca.Function) -> str:
+    """C of a CasADi function."""
+    with tempfile.TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("aba.c")
+        generator.add(function)
+        generator.generate(folder + "/")
+        return (Path(folder) / "aba.c").read_text()
+
+
+def text_of(tree: Tree, baked: bool, sines: str) -> tuple[str, np.ndarray]:
+    """C with the common signature, and the numbers it wants; sines: "", "libm", "libmvec4", "8"."""
+    function, numbers = articulated_body(tree, baked, ahead=bool(sines))
+    if not sines:
+        return HEAD + c_text(function) + WRAPPER % PLAIN, numbers
+    at, places = 0, []
+    for link in tree.links:
+        if link.kind == "pin":
+            places.append(str(at))
+        at += COORDINATES[link.kind][0]
+    wide = 8 if sines.endswith("8") else 4
+    name = "_ZGVeN8v" if wide == 8 else "_ZGVdN4v"
+    declared = DECLARED % (len(places), wide, name, name)
+    prelude = AHEAD % (", ".join(places), LIBM if sines == "libm" else LIBMVEC)
+    return declared + HEAD + c_text(function) + WRAPPER % prelude, numbers
+
+
+def subjects(
+    tree: Tree,
+    q: np.ndarray,
+    u: np.ndarray,
+    baked: bool,
+    flags: dict[str, tuple[str, ...]] = FLAGS,
+    sines: tuple[str, ...] = ("", "libm", "libmvec4", "libmvec8"),
+) -> dict[str, native.Subject]:
+    """Flags' name -> function and states."""
+    found = {}
+    pins = any(link.kind == "pin" for link in tree.links)
+    for ahead in sines if pins else ("",):
+        text, numbers = text_of(tree, baked, ahead)
+        for name, chosen in flags.items():
+            options = [*chosen, "-std=gnu17", "-fvisibility=hidden", "-w"]
+            path = native.library("casadi", text, options, after=["-lmvec"])
+            opened = ctypes.CDLL(str(path))
+            address = ctypes.cast(opened.evaluate, ctypes.c_void_p).value
+            found[f"{name} {ahead}".strip()] = native.Subject(address, numbers, q, u, keep=opened)
+    return found

@@ -1,0 +1,47 @@
+"""mstmm's two engines as functions of the signature of native.h."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+import mstmm
+
+from . import native
+
+
+class _Place(ctypes.Structure):
+    _fields_ = [
+        ("f", ctypes.c_void_p), ("model", ctypes.c_void_p), ("workspace", ctypes.c_void_p),
+        ("failure", ctypes.c_int * 4),
+    ]  # fmt: skip
+
+
+def looped(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
+    """The loop over element kernels."""
+    engine = model._engine
+    ffi = engine.ffi
+    source = (native.HERE / "mstmm_looped.c").read_text()
+    opened = ctypes.CDLL(str(native.library("mstmm_looped", source, ["-O2", "-std=gnu17"])))
+    f: Any = ctypes.c_void_p.in_dll(opened, "looped_accelerations").value
+    function = ffi.addressof(engine.lib, "mstmm_accelerations")
+    address = [int(ffi.cast("intptr_t", x)) for x in (function, engine.packed.model)]
+    workspace = native.aligned(np.zeros(int(engine.packed.model.workspace)))
+    place = _Place(*address, workspace.ctypes.data)
+    return native.Subject(
+        f, ctypes.addressof(place), q, u, memory=engine.start_memory(),
+        keep=(opened, place, workspace, model),
+    )  # fmt: skip
+
+
+def fused(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
+    """The straight-line function of the scene; its parameters are numbers at run time."""
+    library = model.fusion.library
+    ffi = library.ffi
+    address = int(ffi.cast("intptr_t", library.descriptor.accelerations))
+    return native.Subject(
+        address, np.asarray(model.fusion.numbers), q, u, memory=model._engine.start_memory(),
+        keep=model,
+    )  # fmt: skip

@@ -1,0 +1,122 @@
+"""MuJoCo's C functions that lead to accelerations, on a model written as MJCF."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from . import native
+from .links import COORDINATES, Link, Tree
+
+
+def text(values: Any) -> str:
+    """Numbers as an attribute, without loss."""
+    return " ".join(repr(float(v)) for v in np.ravel(values))
+
+
+def quaternion(matrix: np.ndarray) -> np.ndarray:
+    """w, x, y, z of a rotation matrix."""
+    return np.roll(Rotation.from_matrix(matrix).as_quat(), 1)
+
+
+def element(carrier: ElementTree.Element, link: Link) -> ElementTree.Element:
+    """The body of one link inside the body that carries it."""
+    node = ElementTree.SubElement(
+        carrier, "body", name=link.name, pos=text(link.place), quat=text(quaternion(link.turn))
+    )
+    ElementTree.SubElement(node, "inertial", pos=text(link.center), mass="1", diaginertia="1 1 1")
+    kind = {"pin": "hinge"}.get(link.kind, link.kind)
+    joint = ElementTree.SubElement(node, "joint", type=kind)
+    if kind == "hinge":
+        joint.set("axis", text(link.axis))
+        joint.set("armature", text(link.armature))
+    return node
+
+
+def model_of(tree: Tree) -> mujoco.MjModel:
+    """MuJoCo's model of the tree."""
+    root = ElementTree.Element("mujoco")
+    ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    ElementTree.SubElement(root, "option", gravity=text(tree.gravity))
+    nodes = {-1: ElementTree.SubElement(root, "worldbody")}
+    for number, link in enumerate(tree.links):
+        nodes[number] = element(nodes[link.parent], link)
+    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
+    for link in tree.links:
+        # Written here, because the reader refuses massless links and tabulated inertias.
+        number = model.body(link.name).id
+        model.body_mass[number], model.body_inertia[number] = link.mass, np.diag(link.inertia)
+        if np.count_nonzero(link.inertia - np.diag(np.diag(link.inertia))):
+            model.body_inertia[number], axes = np.linalg.eigh(link.inertia)
+            axes[:, 2] *= np.sign(np.linalg.det(axes))
+            model.body_iquat[number] = quaternion(axes)
+            model.body_sameframe[number] = 0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def places(tree: Tree, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """MuJoCo's q and u from ours: columns, in its order of bodies."""
+    starts, at_q, at_u = [], 0, 0
+    for link in tree.links:
+        starts.append((at_q, at_u))
+        at_q, at_u = at_q + COORDINATES[link.kind][0], at_u + COORDINATES[link.kind][1]
+    q, u = np.zeros(tree.nq, int), np.zeros(tree.nu, int)
+    for number, link in enumerate(tree.links):
+        joint = model.body(link.name).jntadr[0]
+        nq, nu = COORDINATES[link.kind]
+        first = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        q[first[0] : first[0] + nq] = starts[number][0] + np.arange(nq)
+        u[first[1] : first[1] + nu] = starts[number][1] + np.arange(nu)
+    return q, u
+
+
+def turned(tree: Tree, q: np.ndarray, u: np.ndarray, sign: int) -> np.ndarray:
+    """Linear part of a free root's speeds (+1) from outboard to world axes, (-1) back."""
+    if tree.links[0].kind != "free":
+        return u
+    out = u.copy()
+    turns = Rotation.from_quat(np.roll(q[:, 3:7], -1, axis=1))
+    out[:, :3] = (turns if sign > 0 else turns.inv()).apply(u[:, :3])
+    return out
+
+
+def library() -> Path:
+    """mujoco.c beside the wheel's libmujoco."""
+    home = Path(mujoco.__file__).parent
+    shared = next(home.glob("libmujoco.so*"))
+    flags = ["-O3", "-march=native", "-std=gnu17", f"-I{home / 'include'}"]
+    source = (native.HERE / "mujoco.c").read_text()
+    return native.library("mujoco", source, flags, after=[str(shared), f"-Wl,-rpath,{home}"])
+
+
+def subject(tree: Tree, q: np.ndarray, u: np.ndarray) -> native.Subject:
+    """Function and states in MuJoCo's order; `back` of its accelerations with `accelerations`."""
+    model = model_of(tree)
+    data = mujoco.MjData(model)
+    opened = ctypes.CDLL(str(library()))
+    f: Any = ctypes.c_void_p.in_dll(opened, "mujoco_accelerations").value
+    pair = (ctypes.c_void_p * 2)(model._address, data._address)
+    of_q, of_u = places(tree, model)
+    found = native.Subject(
+        f, ctypes.addressof(pair), q[:, of_q], turned(tree, q, u, 1)[:, of_u],
+        keep=(opened, pair, model, data),
+    )  # fmt: skip
+    found.order = of_u
+    return found
+
+
+def accelerations(found: native.Subject, tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """udot in our order and axes."""
+    out = np.zeros_like(u)
+    out[:, found.order] = found.accelerations()
+    out = turned(tree, q, out, -1)
+    if tree.links[0].kind == "free":
+        out[:, :3] -= np.cross(u[:, 3:6], u[:, :3])
+    return out

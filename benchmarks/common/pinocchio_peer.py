@@ -1,0 +1,84 @@
+"""Pinocchio's C++ articulated-body loop, built from the headers of the pin wheel."""
+
+from __future__ import annotations
+
+import ctypes
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import native
+from .links import COORDINATES, Tree
+
+#: Pinocchio's own public definitions (pinocchioTargets.cmake).
+DEFINITIONS = (
+    "BOOST_MPL_LIMIT_LIST_SIZE=30",
+    "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "BOOST_FUSION_INVOKE_MAX_ARITY=12",
+    "NDEBUG",
+)
+LEVELS = ("O2", "O3")
+
+
+def opened(level: str) -> ctypes.CDLL:
+    """The library at one level of optimisation."""
+    prefix = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "include"
+    if not (prefix / "pinocchio").is_dir() or not (prefix / "eigen3").is_dir():
+        raise SystemExit("this Python lacks pin or cmeel-eigen: pip install pin cmeel-eigen")
+    flags = [f"-{level}", "-std=c++17", "-march=native", "-w", *(f"-D{d}" for d in DEFINITIONS)]
+    flags += [f"-I{prefix}", f"-I{prefix / 'eigen3'}"]
+    text = (native.HERE / "pinocchio.cpp").read_text()
+    found = ctypes.CDLL(str(native.library("pinocchio", text, flags, "g++", ".cpp")))
+    found.tree_new.restype = found.tree_copy.restype = ctypes.c_void_p
+    found.tree_new.argtypes = [ctypes.c_void_p]
+    found.tree_copy.argtypes = found.tree_ready.argtypes = [ctypes.c_void_p]
+    pointer, number = ctypes.c_void_p, ctypes.c_double
+    found.tree_add.argtypes = [
+        pointer, ctypes.c_int, ctypes.c_int, pointer, pointer, number, pointer, pointer, number,
+    ]  # fmt: skip
+    return found
+
+
+def built(library: ctypes.CDLL, tree: Tree) -> int:
+    """Address of a Pinocchio model of the tree with its workspace."""
+    made = library.tree_new(native.aligned(tree.gravity).ctypes.data)
+    for link in tree.links:
+        kind = {"ball": 3, "free": 4}.get(link.kind, int(np.argmax(np.abs(link.axis))))
+        place, turn, center, inertia = (
+            np.ascontiguousarray(x, dtype=float)
+            for x in (link.place, link.turn, link.center, link.inertia)
+        )
+        library.tree_add(
+            made, link.parent, kind, place.ctypes.data, turn.ctypes.data, link.mass,
+            center.ctypes.data, inertia.ctypes.data, link.armature,
+        )  # fmt: skip
+    library.tree_ready(made)
+    return made
+
+
+def coordinates(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """Pinocchio's q: quaternions as x, y, z, w."""
+    out, at = q.copy(), 0
+    for link in tree.links:
+        end = at + COORDINATES[link.kind][0]
+        if link.kind != "pin":
+            out[:, end - 4 : end] = np.roll(q[:, end - 4 : end], -1, axis=1)
+        at = end
+    return out
+
+
+def subjects(tree: Tree, q: np.ndarray, u: np.ndarray) -> dict[str, native.Subject]:
+    """Level and convention -> function and states."""
+    found: dict[str, native.Subject] = {}
+    for level in LEVELS:
+        library = opened(level)
+        for convention in ("local", "world"):
+            model = built(library, tree)
+            f: Any = ctypes.c_void_p.in_dll(library, f"{convention}_aba").value
+            found[f"{level} {convention}"] = native.Subject(
+                f, model, coordinates(tree, q), u, keep=library
+            )
+    return found

@@ -1,0 +1,143 @@
+"""The scenes of the benchmarks, as scene dictionaries of mstmm; the one place with their data."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Scene = dict[str, Any]
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+AXES = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+
+
+def rod(name: str) -> dict[str, Any]:
+    """A uniform rod of 1 m and 1 kg along x, 0.1 m thick."""
+    return {
+        "name": name,
+        "mass": 1.0,
+        "center_of_mass": [0.5, 0.0, 0.0],
+        "inertia": [1 / 1200, 1 / 12, 1 / 12],
+        "ends": {"tip": [1.0, 0.0, 0.0]},
+    }
+
+
+def chain(n: int, gravity: list[float], hinge: Callable[[int], dict[str, Any]]) -> Scene:
+    """n rods in a row, hinge(i) inboard of rod i."""
+    hinges = [
+        {
+            "name": f"hinge{i}",
+            "inboard": f"rod{i - 1}.tip" if i else "ground",
+            "outboard": f"rod{i}",
+            **hinge(i),
+        }
+        for i in range(n)
+    ]
+    bodies = [rod(f"rod{i}") for i in range(n)]
+    return {"schema_version": 1, "gravity": gravity, "body": bodies, "hinge": hinges}
+
+
+def pins(n: int) -> Scene:
+    """Axes alternate x, y, z."""
+    return chain(n, [0.0, 0.0, -9.81], lambda i: {"type": "pin", "axis": AXES[i % 3]})
+
+
+def balls(n: int) -> Scene:
+    """Ball hinges."""
+    return chain(n, [0.0, 0.0, -9.81], lambda i: {"type": "ball"})
+
+
+def planar(n: int) -> Scene:
+    """All axes along z, gravity in the plane."""
+    return chain(n, [0.0, -9.81, 0.0], lambda i: {"type": "pin", "axis": AXES[2]})
+
+
+def example(name: str) -> Scene:
+    """One of the scenes under examples/."""
+    return tomllib.loads(next((EXAMPLES / name).glob("*.toml")).read_text())
+
+
+def puma(n: int = 6) -> Scene:
+    """The Puma 560 of examples/."""
+    return example("puma560")
+
+
+#: name, carried by, place on it (m), axis, mass (kg), mass centre (m), inertia (kg m2).
+LEG = (
+    ("hip_yaw", "pelvis", (0.0, 0.09, -0.06), 2, 2.1, (0.012, 0.004, -0.055),
+     (0.0082, 0.0079, 0.0031, 0.0001, -0.0004, 0.0002)),
+    ("hip_roll", "hip_yaw", (0.02, 0.0, -0.11), 0, 1.6, (-0.008, 0.011, -0.014),
+     (0.0026, 0.0031, 0.0029, 0.0001, 0.0002, -0.0001)),
+    ("hip_pitch", "hip_roll", (0.0, 0.035, 0.0), 1, 5.4, (0.009, 0.012, -0.162),
+     (0.0740, 0.0722, 0.0101, -0.0005, 0.0042, 0.0021)),
+    ("knee", "hip_pitch", (-0.012, 0.0, -0.34), 1, 3.0, (0.011, 0.003, -0.141),
+     (0.0311, 0.0306, 0.0042, 0.0001, 0.0013, -0.0007)),
+    ("ankle_pitch", "knee", (0.0, 0.0, -0.33), 1, 0.25, (-0.004, 0.0, 0.006),
+     (0.00019, 0.00024, 0.00013, 0.0, 0.00001, 0.0)),
+    ("ankle_roll", "ankle_pitch", (0.0, 0.0, -0.018), 0, 0.9, (0.031, 0.0, -0.022),
+     (0.0007, 0.0031, 0.0034, 0.0, 0.0002, 0.0)),
+)  # fmt: skip
+ARM = (
+    ("shoulder_pitch", "chest", (0.004, 0.12, 0.26), 1, 1.1, (0.001, 0.043, -0.006),
+     (0.0013, 0.0010, 0.0012, 0.0001, 0.0, 0.0002)),
+    ("shoulder_roll", "shoulder_pitch", (0.0, 0.055, -0.012), 0, 1.3, (0.006, 0.007, -0.065),
+     (0.0043, 0.0042, 0.0012, 0.0, 0.0003, -0.0002)),
+    ("shoulder_yaw", "shoulder_roll", (0.0, 0.006, -0.14), 2, 1.0, (0.009, 0.001, -0.072),
+     (0.0033, 0.0034, 0.0009, 0.0, 0.0004, 0.0001)),
+    ("elbow", "shoulder_yaw", (0.016, 0.0, -0.10), 1, 1.2, (0.101, 0.004, -0.011),
+     (0.0012, 0.0078, 0.0076, -0.0003, 0.0006, 0.0001)),
+)  # fmt: skip
+TRUNK = (
+    ("waist_yaw", "pelvis", (-0.004, 0.0, 0.05), 2, 0.6, (0.003, 0.0, 0.018),
+     (0.0008, 0.0009, 0.0006, 0.0, 0.0001, 0.0)),
+    ("waist_roll", "waist_yaw", (0.0, 0.0, 0.04), 0, 0.5, (0.002, 0.001, 0.009),
+     (0.0005, 0.0005, 0.0004, 0.0, 0.0, 0.0)),
+    ("chest", "waist_roll", (0.0, 0.0, 0.02), 1, 9.8, (0.006, 0.001, 0.154),
+     (0.1270, 0.1050, 0.0460, 0.0004, -0.0031, 0.0011)),
+    ("neck", "chest", (0.002, 0.0, 0.39), 2, 3.4, (0.021, 0.0, 0.081),
+     (0.0180, 0.0205, 0.0098, 0.0, 0.0011, 0.0)),
+)  # fmt: skip
+PELVIS = (6.2, (-0.004, 0.001, 0.012), (0.0410, 0.0290, 0.0390, 0.0001, -0.0008, 0.0002))
+
+
+def mirrored(part: tuple[Any, ...], names: set[str]) -> tuple[Any, ...]:
+    """The right limb from the left one: y turned round."""
+    name, carrier, (x, y, z), axis, mass, (cx, cy, cz), (xx, yy, zz, xy, xz, yz) = part
+    carried = f"right_{carrier}" if carrier in names else carrier
+    center, inertia = (cx, -cy, cz), (xx, yy, zz, -xy, xz, -yz)
+    return (f"right_{name}", carried, (x, -y, z), axis, mass, center, inertia)
+
+
+def humanoid(n: int = 25) -> Scene:
+    """A walking robot's size: a free pelvis and 24 pins, 30 degrees of freedom; data made up."""
+    limbs = LEG + ARM
+    names = {part[0] for part in limbs}
+    parts = (*TRUNK, *limbs, *(mirrored(part, names) for part in limbs))
+    mass, center, inertia = PELVIS
+    bodies: list[dict[str, Any]] = [
+        {"name": "pelvis", "mass": mass, "center_of_mass": list(center), "inertia": list(inertia)}
+    ]
+    hinges: list[dict[str, Any]] = [
+        {"name": "root", "type": "free", "inboard": "ground", "outboard": "pelvis"}
+    ]
+    ends: dict[str, dict[str, list[float]]] = {}
+    for name, carrier, place, axis, mass, center, inertia in parts:
+        ends.setdefault(carrier, {})[name] = list(place)
+        bodies.append(
+            {"name": name, "mass": mass, "center_of_mass": list(center), "inertia": list(inertia)}
+        )
+        hinges.append(
+            {"name": f"{name}_joint", "type": "pin", "inboard": f"{carrier}.{name}",
+             "outboard": name, "axis": AXES[axis]}
+        )  # fmt: skip
+    for body in bodies:
+        body["ends"] = ends.get(body["name"], {})
+    return {"schema_version": 1, "gravity": [0.0, 0.0, -9.81], "body": bodies, "hinge": hinges}
+
+
+#: Kind -> scene of n bodies (Puma and humanoid have one size each).
+KINDS: dict[str, Callable[[int], Scene]] = {
+    "pins": pins, "balls": balls, "planar": planar, "puma": puma, "humanoid": humanoid,
+}  # fmt: skip
+SIZES = {"puma": 6, "humanoid": 25}
