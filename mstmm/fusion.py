@@ -61,6 +61,7 @@ class Fusion:
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
         self.note = ""
+        self._insisted = False  # engine="fused": batches too
         if not self.obstacle:
             self.structure, self.numbers = structure_of(packed, known)
 
@@ -73,6 +74,7 @@ class Fusion:
 
         Raises EnvironmentFailure if there is no compiler, it fails, or the scene cannot be fused.
         """
+        self._insisted = True
         found = self._get("scalar", build=True)
         if found is None:
             raise EnvironmentFailure(f"this scene cannot be fused: {self.obstacle}")
@@ -99,7 +101,13 @@ class Fusion:
         return self._ready("scalar", evaluations)
 
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None:
-        """The same for the library that computes several states side by side."""
+        """The same for the library that computes several states side by side.
+
+        After `build` it is made whatever the number of evaluations; raises EnvironmentFailure if
+        it cannot be.
+        """
+        if self._insisted:
+            return self._get("lanes", build=True)
         return self._ready("lanes", evaluations)
 
     def _ready(self, part: str, evaluations: float) -> FusedLibrary | None:

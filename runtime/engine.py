@@ -16,7 +16,7 @@ from .pack import Packed
 
 Array = NDArray[np.float64]
 
-_UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT = 1, 2, 3, 4, 5, 6
+UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT = 1, 2, 3, 4, 5, 6
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Engine:
             self.pointer(qdot), self.pointer(udot), failure, at,
         )  # fmt: skip
         if code:
-            kind = UndeterminedMotion if code == _UNDETERMINED else NumericalFailure
+            kind = UndeterminedMotion if code == UNDETERMINED else NumericalFailure
             raise kind(self.failure_text(failure, float(times[at[0]])))
         self._finite("acceleration", udot, times)
         return qdot, udot
@@ -196,7 +196,7 @@ class Engine:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
         reason, element = int(failure.reason), int(failure.element)
-        if reason == _UNDETERMINED:
+        if reason == UNDETERMINED:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
                 "what it carries has no inertia in that direction (a thin rod on a ball, a point "

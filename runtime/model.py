@@ -99,23 +99,36 @@ class Model:
         return np.ascontiguousarray(np.tile(self._engine.start_memory(), (n, 1)))
 
     def accelerations(
-        self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, efforts: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        t: ArrayLike = 0.0,
+        efforts: ArrayLike | None = None,
+        *,
+        threads: int | None = None,
     ) -> Array:
         """udot (..., nu) from q (..., nq), u (..., nu), t (s) and extra efforts (..., nu; N, N*m).
 
-        Driven coordinates take the drive's value whatever q and u say.  Raises SceneError for a
-        shape that does not fit, NumericalFailure naming the hinge whose motion is undetermined.
+        Driven coordinates take the drive's value whatever q and u say.  A batch (leading axes) goes
+        through vector lanes where there is fused code, and through `threads` threads (None: as many
+        as there are processors); with one engine a state's numbers depend neither on the batch
+        around it nor on the threads, to the last bit.
+
+        Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
+        hinge whose motion is undetermined.
         """
+        from .batch import States, accelerations
+
         lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
         engine = self._engine
-        coordinates, speeds = (
+        states = States(
+            lead,
+            np.array(np.broadcast_to(np.asarray(t, dtype=np.float64), lead)).reshape(-1),
             engine.batch("q", q, self.nq, lead),
             engine.batch("u", u, self.nu, lead),
+            None if efforts is None else engine.batch("efforts", efforts, self.nu, lead),
         )
-        extra = None if efforts is None else engine.batch("efforts", efforts, self.nu, lead)
-        times = np.broadcast_to(np.asarray(t, dtype=np.float64), lead).reshape(-1)
-        _, udot = engine.accelerations(times, coordinates, speeds, self._memory(len(speeds)), extra)
-        return udot.reshape(*lead, self.nu)
+        return accelerations(engine, self.fusion, states, threads).reshape(*lead, self.nu)
 
     def inverse_dynamics(
         self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: float = 0.0
