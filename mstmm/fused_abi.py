@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 2
+ABI = 3
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -32,7 +32,7 @@ _STATE = (
 #: codes[lane] is set, and the result is non-zero if any lane failed.
 DECLARATIONS = f"""\
 /* n states, each array row by row: entry i of a state at [state * width + i].  With a stride of 0
- * all states share one row, otherwise the stride is the distance of rows.  efforts may be NULL. */
+ * all states share one row, otherwise the stride is the distance of rows.  efforts and qdot may be NULL. */
 typedef struct {{
     long long n;
     const double *p, *t, *q, *u, *memory, *efforts;

@@ -120,8 +120,8 @@ def _lanes(
     def run(first: int, end: int) -> Failed | None:
         part = slice(first, end)
         efforts = None if states.efforts is None else states.efforts[part]
-        codes, _, udot[part] = library.many(
-            numbers, states.t[part], states.q[part], states.u[part], memory, efforts
+        codes = library.many(
+            numbers, states.t[part], states.q[part], states.u[part], memory, efforts, udot[part]
         )
         bad = np.flatnonzero(codes)
         if not len(bad):

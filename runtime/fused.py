@@ -102,32 +102,41 @@ class FusedLibrary:
         return call(), call.qdot, call.udot
 
     def many(
-        self, p: Array, t: Array, q: Array, u: Array, memory: Array, efforts: Array | None
-    ) -> tuple[Codes, Array, Array]:
-        """(codes, qdot, udot) of n states: q (n, nq), u (n, nu), efforts (n, nu) or None.
+        self,
+        p: Array,
+        t: Array,
+        q: Array,
+        u: Array,
+        memory: Array,
+        efforts: Array | None,
+        udot: Array,
+        qdot: Array | None = None,
+    ) -> Codes:
+        """Fill udot (n, nu), and qdot (n, nq) if given, for n states; returns their codes (n,).
 
-        t (n,) or (1,), p (n, np) or (np,), memory (n, m) or (m,) with m at least n_memory; one row
-        serves all states.  The numbers of a state depend on no other state.  All arrays are
+        q (n, nq), u (n, nu), efforts (n, nu) or None; t (n,) or (1,), p (n, np) or (np,), memory
+        (n, m) or (m,) with m at least n_memory: one row serves all states.  The numbers of a state
+        depend on no other state; those of a state with a code mean nothing.  All arrays are
         contiguous.
         """
-        n = len(q)
+        n, null = len(q), self.ffi.NULL
         codes = np.zeros(n, dtype=np.int32)
-        qdot, udot = np.empty((n, self.nq)), np.empty((n, self.nu))
         batch = self.ffi.new("mstmm_batch *")
-        kept = [self.pointer(array) for array in (p, t, q, u, memory, qdot, udot)]
-        batch.n = n
-        batch.p, batch.t, batch.q, batch.u, batch.memory, batch.qdot, batch.udot = kept
+        kept = [
+            null if array is None else self.pointer(array)
+            for array in (p, t, q, u, memory, efforts, qdot, udot)
+        ]
+        errors = self.ffi.from_buffer("int[]", codes)
+        batch.n, batch.codes = n, errors
+        batch.p, batch.t, batch.q, batch.u, batch.memory, batch.efforts = kept[:6]
+        batch.qdot, batch.udot = kept[6:]
         batch.p_stride = p.shape[1] if p.ndim == 2 else 0
         batch.t_stride = 1 if len(t) > 1 else 0
         batch.memory_stride = memory.shape[1] if memory.ndim == 2 else 0
-        given = None if efforts is None else self.pointer(efforts)
-        batch.efforts = self.ffi.NULL if given is None else given
         batch.efforts_stride = self.nu
-        errors = self.ffi.from_buffer("int[]", codes)
-        batch.codes = errors
         if n:
             self.descriptor.accelerations_many(batch)
-        return codes, qdot, udot
+        return codes
 
 
 class Call:

@@ -8,16 +8,25 @@ typedef struct {
     double qdot[MSTMM_SOME(MSTMM_NQ) * MSTMM_LANES], udot[MSTMM_SOME(MSTMM_NU) * MSTMM_LANES];
 } __attribute__((aligned(64))) mstmm_group;
 
-/* Rows of `width` numbers -> lanes; lanes behind `count` repeat the last row. */
+/* Rows of `width` numbers -> lanes; lanes behind `count` repeat the last row.  The vector is put
+ * together in a register: eight numbers stored one by one and loaded as one would have to wait. */
 MSTMM_INLINE void mstmm_load(double *lanes, const double *rows, int width, long long stride,
                              int count)
 {
     const double *row[MSTMM_LANES];
     for (int k = 0; k < MSTMM_LANES; k++) row[k] = rows + (k < count ? k : count - 1) * stride;
     for (int i = 0; i < width; i++)
-        for (int k = 0; k < MSTMM_LANES; k++) lanes[i * MSTMM_LANES + k] = row[k][i];
+#if MSTMM_LANES == 8
+        ((lanes_array_t *)lanes)[i] = (lanes_t){row[0][i], row[1][i], row[2][i], row[3][i],
+                                                row[4][i], row[5][i], row[6][i], row[7][i]};
+#elif MSTMM_LANES == 4
+        ((lanes_array_t *)lanes)[i] = (lanes_t){row[0][i], row[1][i], row[2][i], row[3][i]};
+#else
+        ((lanes_array_t *)lanes)[i] = (lanes_t){row[0][i], row[1][i]};
+#endif
 }
 
+/* Lanes -> rows; the numbers of lanes behind `count` are left out. */
 MSTMM_INLINE void mstmm_keep(double *rows, const double *lanes, int width, int count)
 {
     for (int k = 0; k < count; k++)
@@ -50,7 +59,7 @@ static long long mstmm_accelerations_many(const mstmm_batch *batch)
         mstmm_load(g.q, batch->q + first * MSTMM_NQ, MSTMM_NQ, MSTMM_NQ, count);
         mstmm_load(g.u, batch->u + first * MSTMM_NU, MSTMM_NU, MSTMM_NU, count);
         mstmm_accelerations_lanes(g.p, g.t, g.q, g.u, g.memory, g.efforts, g.qdot, g.udot, codes);
-        mstmm_keep(batch->qdot + first * MSTMM_NQ, g.qdot, MSTMM_NQ, count);
+        if (batch->qdot) mstmm_keep(batch->qdot + first * MSTMM_NQ, g.qdot, MSTMM_NQ, count);
         mstmm_keep(batch->udot + first * MSTMM_NU, g.udot, MSTMM_NU, count);
         for (int k = 0; k < count; k++) {
             batch->codes[first + k] = codes[k];
