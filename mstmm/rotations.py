@@ -71,17 +71,21 @@ def rows(matrix: Sequence[Sequence[float]]) -> Matrix:
 
 def product(a: Matrix, b: Matrix) -> Matrix:
     """a b."""
+    if a is IDENTITY or b is IDENTITY:
+        return b if a is IDENTITY else a
     columns = list(zip(*b, strict=True))
     return rows([[dot(row, column) for column in columns] for row in a])
 
 
 def transpose(a: Matrix) -> Matrix:
     """Rows and columns exchanged."""
-    return rows(list(zip(*a, strict=True)))
+    return IDENTITY if a is IDENTITY else rows(list(zip(*a, strict=True)))
 
 
 def apply(a: Matrix, v: Sequence[float]) -> Vector:
     """a v."""
+    if a is IDENTITY:
+        return (real(v[0]), real(v[1]), real(v[2]))
     x, y, z = (dot(row, v) for row in a)
     return (x, y, z)
 
@@ -113,6 +117,8 @@ def from_rpy(angles: Sequence[float]) -> Matrix:
     An angle that is the double nearest to a quarter turn gives exact zeros and ones, so that
     frames turned by right angles stay aligned.
     """
+    if tuple(angles) == (0.0, 0.0, 0.0):
+        return IDENTITY
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle) for angle in angles)
     return (
         (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),

@@ -90,6 +90,8 @@ class _Laws:
     ) -> int:
         """Records of all members of a run; returns how many twist memories they take."""
         flat = [record for member in pattern for record in member]
+        if run.count == 1:
+            return self._fill_one(records, places.start, flat, run, twists)
         prototypes = Records(self.packed.ffi, "mstmm_law", len(flat))
         for target, record in zip(prototypes.array, flat, strict=False):
             for key, value in record.items():
@@ -107,6 +109,25 @@ class _Laws:
         records.column("twist")[places] = twist
         self._efforts(records.column("effort")[places], [r["effort"] for r in flat], members, run)
         return int(turning.sum())
+
+    def _fill_one(
+        self, records: Records, place: int, flat: list[Record], run: Run, twists: int
+    ) -> int:
+        """The same for a body of its own, record by record."""
+        hinge, first = self.packed.scene.hinges[run.hinge], len(self.packed.releases) + twists
+        turning = 0
+        for number, record in enumerate(flat):
+            target = records.array[place + number]
+            for key, value in record.items():
+                if key != "effort":
+                    setattr(target, key, value)
+            places = [self.values.place(effort, hinge) for effort in record["effort"]]
+            array = self.packed.ffi.new("int[]", places)
+            self.packed.kept.append(array)
+            target.effort, target.body = array, run.place
+            target.twist = first + turning if record["kind"] == 1 else -1
+            turning += record["kind"]
+        return turning
 
     def _efforts(
         self, pointers: Array, efforts: list[list[Expression]], members: Array, run: Run

@@ -99,6 +99,8 @@ class Group:
         return self._spread(first, self.nq)[there[k % len(self.hinges)]]
 
     def _spread(self, pattern: Sequence[int], length: int) -> Integers:
+        if self.count == 1:
+            return np.array(pattern, dtype=np.int64)
         k = np.arange(self.count)
         repeats, which = np.divmod(k, len(self.hinges))
         return np.asarray(np.array(pattern, dtype=np.int64)[which] + repeats * length)

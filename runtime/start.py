@@ -17,10 +17,14 @@ def start_values(scene: Scene, layout: Layout) -> tuple[Array, Array]:
     """(q, u) of the scene; driven coordinates still as `initial` has them."""
     q, u = np.zeros(layout.nq), np.zeros(layout.nu)
     for group in layout.groups:
-        places = group.q_places(), group.u_places()
         for k, slots in enumerate(group.hinges):
             one_q, one_u = _values(scene.hinges[group.first + k], slots)
-            for target, first, values in ((q, places[0], one_q), (u, places[1], one_u)):
+            if group.count == 1:
+                q[slots.q_slice], u[slots.u_slice] = one_q, one_u
+                continue
+            for target, first, values in (
+                (q, group.q_places(), one_q), (u, group.u_places(), one_u)
+            ):  # fmt: skip
                 if len(values):
                     mine = first[k :: len(group.hinges)]
                     target[mine[:, None] + np.arange(len(values))] = values
@@ -39,4 +43,3 @@ def _values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
     if hinge.initial is not None and hinge.initial.u:
         u[:] = hinge.initial.u
     return q, u
-
