@@ -116,8 +116,8 @@ class _Laws:
         """The same for a body of its own, record by record."""
         hinge, first = self.packed.scene.hinges[run.hinge], len(self.packed.releases) + twists
         turning = 0
-        for number, record in enumerate(flat):
-            target = records.array[place + number]
+        for target_place, record in enumerate(flat, place):
+            target = records.array[target_place]
             for key, value in record.items():
                 if key != "effort":
                     setattr(target, key, value)
