@@ -184,7 +184,7 @@ class _Fusion:
         for stage in stages[:-1]:
             motion = stage.motion(motion)
         motion = stages[-1].motion_behind_hinge(motion, hinge, s)
-        if not any(body.imposed) and all(isinstance(x, float) for x in body.rotor):
+        if not any(body.imposed) and not any(self._moves(x) for x in body.rotor):
             self._stop_free_directions(hinge["H"], motion, s)
         p = self.entries(body.body_p)
         own = self.inline.run(self.kernels(body.body, "inertia"), {"p": p})["S"]
@@ -195,6 +195,11 @@ class _Fusion:
         return BodyNodes(
             stages, axial, hinge, s, motion, own, load["e"], own, tau, none, none, none, none
         )
+
+    @staticmethod
+    def _moves(entry: float | int) -> bool:
+        """Whether an entry is anything but a structural zero."""
+        return isinstance(entry, int) or entry != 0.0
 
     def _stop_free_directions(self, subspace: Nodes, motion: Nodes, s: Nodes) -> None:
         """Choose the bias motion: the deviations from it are recovered whatever it is.

@@ -31,7 +31,11 @@ class Generated:
 
 
 def compile_scene(
-    scene: Scene, engine: str = "auto", sweep: str = "riccati", accuracy: float = 1e-8
+    scene: Scene,
+    engine: str = "auto",
+    sweep: str = "riccati",
+    accuracy: float = 1e-8,
+    bake: bool = False,
 ) -> Model:
     """Model of a scene, ready to compute.
 
@@ -45,6 +49,8 @@ def compile_scene(
             matrices, chains only, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
+        bake: with "fused", make the scene's numbers part of the code instead of reading them at run
+            time: somewhat faster, but other parameters need the compiler again.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
     leave a motion of the start undetermined; EnvironmentFailure if engine="fused" cannot be had.
@@ -64,10 +70,12 @@ def compile_scene(
     product = accuracy if sweep == "product" else None
     if engine == "fused" and product is not None:
         raise SceneError('sweep = "product" has no fused code; use engine = "auto" or "looped"')
+    if bake and engine != "fused":
+        raise SceneError('bake = True is for engine = "fused"; its numbers stand in the code')
     refused = "asked for" if engine == "looped" else ""
 
     def fusing(packed: Packed, known: Known) -> Fusion:
-        return Fusion(packed, known, definitions, refused)
+        return Fusion(packed, known, definitions, refused, bake)
 
     model = Model(scene, elements, fusing, product)
     model.refuse_undetermined_start()

@@ -55,6 +55,7 @@ class Fusion:
         known: Known,
         definitions: Mapping[Key, ElementSpec],
         obstacle: str = "",
+        bake: bool = False,
     ) -> None:
         self._definitions = definitions
         self.obstacle = obstacle or _obstacle(packed)
@@ -63,7 +64,7 @@ class Fusion:
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         if not self.obstacle:
-            self.structure, self.numbers = structure_of(packed, known)
+            self.structure, self.numbers = structure_of(packed, known, bake)
 
     def find(self) -> FusedLibrary | None:
         """The scalar library if it is in the cache; no compiler is started."""

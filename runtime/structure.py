@@ -45,8 +45,8 @@ _STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
 class _Reader:
     """Reads the engine's records; numbers become structural constants or places in p."""
 
-    def __init__(self, packed: Packed, known: Known) -> None:
-        self.packed, self.ffi = packed, packed.ffi
+    def __init__(self, packed: Packed, known: Known, bake: bool) -> None:
+        self.packed, self.ffi, self.bake = packed, packed.ffi, bake
         self.numbers: list[float] = []
         self.elements = {**prebuilt.elements(), **known}
         self._owners = {
@@ -103,7 +103,9 @@ class _Reader:
         ir = KernelIR(kernel.name, inputs, kernel.outputs, tuple(statements))
         return ExpressionStructure(ir, tuple(self._place(Constant(x).number) for x in texts))
 
-    def _place(self, value: float) -> int:
+    def _place(self, value: float) -> Entry:
+        if self.bake:
+            return value
         self.numbers.append(value)
         return len(self.numbers) - 1
 
@@ -112,9 +114,14 @@ class _Reader:
         return list(self.ffi.unpack(pointer, count)) if count else []
 
 
-def structure_of(packed: Packed, known: Known) -> tuple[Structure, NDArray[np.float64]]:
-    """(structure, p) of a packed scene; `known` are elements beyond the prebuilt ones."""
-    reader, model = _Reader(packed, known), packed.model
+def structure_of(
+    packed: Packed, known: Known, bake: bool = False
+) -> tuple[Structure, NDArray[np.float64]]:
+    """(structure, p) of a packed scene; `known` are elements beyond the prebuilt ones.
+
+    With `bake` every number is part of the structure and p is empty.
+    """
+    reader, model = _Reader(packed, known, bake), packed.model
     gravity = reader.entries(model.gravity)
     drives = [model.drives[k] for k in range(model.n_drives)]
     bodies = tuple(_body(reader, i) for i in range(model.n_bodies))
