@@ -32,7 +32,8 @@ _STATE = (
 #: codes[lane] is set, and the result is non-zero if any lane failed.
 DECLARATIONS = f"""\
 /* n states, each array row by row: entry i of a state at [state * width + i].  With a stride of 0
- * all states share one row, otherwise the stride is the distance of rows.  efforts and qdot may be NULL. */
+ * all states share one row, otherwise the stride is the distance of rows.  Efforts and
+ * qdot may be NULL. */
 typedef struct {{
     long long n;
     const double *p, *t, *q, *u, *memory, *efforts;

@@ -20,7 +20,9 @@ SETUPTOOLS = PROJECT["tool"]["setuptools"]
 ROOMS = ("derive", "templates", "generated", "runtime")
 
 # The modules that join derivation and numbers: a command line, a compile, a comparison.
-BRIDGES = {"__init__", "__main__", "cli", "compilation", "crosscheck", "fusion"}
+BRIDGES = {
+    "__init__", "__main__", "cli", "compilation", "crosscheck", "fusion", "kernel_compilation"
+}  # fmt: skip
 
 
 def room_folder(package: str) -> Path:

@@ -1,0 +1,28 @@
+"""Scalar types in which any kernel can be compiled and called (`kernel_compilation`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A real type: the numpy type of its arrays, how many of them make one value, its roundoff."""
+
+    array: str
+    parts: int
+    roundoff: float
+
+
+SCALARS = {
+    "float": Scalar("float32", 1, 2.0**-24),
+    "double": Scalar("float64", 1, 2.0**-53),
+    #: IEEE binary128; values travel as sums of two doubles, which keep 107 of its 113 bits.
+    "quad": Scalar("float64", 2, 2.0**-106),
+}
+
+#: The function that a library of one kernel exports.
+SYMBOL = "mstmm_scalar_call"
+
+#: Flags of the compiler.  No contraction: every operation of the IR is rounded.
+FLAGS = ("-O2", "-std=gnu17", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")

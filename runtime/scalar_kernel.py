@@ -1,0 +1,85 @@
+"""One kernel, compiled in float, double or quadruple precision, called with numpy arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import EnvironmentFailure
+from mstmm.ir import KernelIR
+from mstmm.scalars import SCALARS, SYMBOL
+
+
+class ScalarKernel:
+    """A kernel in one scalar type.
+
+    Arrays have the shapes of the ports; in quadruple precision with one more axis of length 2
+    behind them: the high and the low double of each value, which is their exact sum (`fractions`).
+    """
+
+    def __init__(self, kernel: KernelIR, scalar: str, path: Path) -> None:
+        """Raises EnvironmentFailure if the library cannot be loaded."""
+        self.kernel, self.scalar = kernel, scalar
+        self._type = SCALARS[scalar]
+        try:
+            self._library = ctypes.CDLL(os.fspath(path), mode=os.RTLD_NOW | os.RTLD_LOCAL)
+        except OSError as error:
+            raise EnvironmentFailure(
+                f"{kernel.name} cannot be computed in {scalar} precision here ({error}); "
+                "use another scalar type"
+            ) from error
+        self._function = getattr(self._library, SYMBOL)
+
+    def __call__(
+        self, inputs: Mapping[str, ArrayLike], start: Mapping[str, ArrayLike] | None = None
+    ) -> tuple[int, dict[str, NDArray[Any]]]:
+        """(guard code or 0, outputs by name) for inputs by name.
+
+        In quadruple precision an input may also be given in doubles alone (without the last axis).
+        `start` holds what the arrays of outputs hold beforehand, for those that accumulate; zero
+        otherwise.  Raises ValueError for an input that is missing or of a wrong shape.
+        """
+        given = []
+        for port in self.kernel.inputs:
+            if port.name not in inputs:
+                raise ValueError(f"{self.kernel.name}: no value for the input {port.name!r}")
+            given.append(self._array(port.name, inputs[port.name], _shape(port.shape)))
+        outputs = {
+            port.name: self._array(port.name, (start or {}).get(port.name), _shape(port.shape))
+            for port in self.kernel.outputs
+        }
+        code = int(self._function(_pointers(given), _pointers(list(outputs.values()))))
+        return code, outputs
+
+    def _array(self, name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[Any]:
+        """A contiguous array of its own, with the axis of parts in quadruple precision."""
+        parts = self._type.parts
+        whole = (*shape, parts) if parts > 1 else shape
+        if value is None:
+            return np.zeros(whole, dtype=self._type.array)
+        array = np.array(value, dtype=self._type.array, order="C")
+        if parts > 1 and array.size * parts == np.prod(whole, dtype=int) and array.shape != whole:
+            array = np.stack([array, np.zeros_like(array)], axis=-1)
+        if array.size != np.prod(whole, dtype=int):
+            raise ValueError(f"{self.kernel.name}: {name} has shape {array.shape}, not {whole}")
+        return np.ascontiguousarray(array.reshape(whole))
+
+
+def fractions(array: NDArray[Any]) -> list[Fraction]:
+    """Exact values of a quadruple array, row by row; finite values only."""
+    return [Fraction(float(high)) + Fraction(float(low)) for high, low in array.reshape(-1, 2)]
+
+
+def _shape(shape: tuple[int | str, ...]) -> tuple[int, ...]:
+    return tuple(int(extent) for extent in shape)
+
+
+def _pointers(arrays: list[NDArray[Any]]) -> Any:
+    return (ctypes.c_void_p * max(1, len(arrays)))(*(array.ctypes.data for array in arrays))
