@@ -56,7 +56,7 @@ def eliminate(
         Equation("D = H^T U + J", pivot, inertia),
         Equation("diagonal of D", pivots.symbol, _diagonal(pivot)),
         Equation("D^-1 U^T", full, Solve(pivot, push.T, symmetric=True)),
-        Equation("G, with G H = 1", gain.symbol, _with_unit_columns(full, units)),
+        Equation("G, with G H = 1", gain.symbol, with_unit_columns(full, units)),
         Equation("surplus effort", _symbol("surplus", nu), tau.symbol - h.T * E.symbol),
         Equation(
             "g = D^-1 (tau - H^T e)",
@@ -86,7 +86,7 @@ def _diagonal(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix([matrix[i, i] for i in range(int(matrix.rows))])
 
 
-def _with_unit_columns(full: sp.MatrixSymbol, units: dict[int, int]) -> sp.ImmutableDenseMatrix:
+def with_unit_columns(full: sp.MatrixSymbol, units: dict[int, int]) -> sp.ImmutableDenseMatrix:
     """G with the columns along unit directions replaced by what they are."""
     return sp.ImmutableDenseMatrix(
         int(full.rows), 6, lambda i, j: sp.Integer(i == units[j]) if j in units else full[i, j]

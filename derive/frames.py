@@ -258,6 +258,25 @@ def reaction() -> Derivation:
     )
 
 
+def moment_at() -> Derivation:
+    """Moment of a load about another point of the body, inertial axes."""
+    f, moment = Quantity(_symbol("f", 6), "N, N*m", "load at P, body axes"), _symbol("moment", 3)
+    return Derivation(
+        "frames",
+        "moment about another point",
+        (A, OFFSET, f),
+        (Quantity(moment, "N*m", "about the point, inertial axes"),),
+        (
+            Equation(
+                "moment - offset x force",
+                moment,
+                A.symbol
+                * (_rows(f.symbol, 3) - tilde(_column(OFFSET.symbol)) * _rows(f.symbol, 0)),
+            ),
+        ),
+    )
+
+
 def transport() -> Derivation:
     """Load at P carried to P of the parent: what inverse dynamics sums up."""
     load = Quantity(_symbol("e_I", 6), "N, N*m", "contribution to the parent", accumulate=True)

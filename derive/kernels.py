@@ -12,10 +12,11 @@ from mstmm.ir import KernelIR
 
 from . import body as body_kernels
 from . import force as force_kernels
-from . import frames, laws, screw, sweep
+from . import frames, laws, link, screw, sweep
 from .classical import CLASSICAL, classical_guards
 from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
+from .elements.body_rigid import RigidBody
 from .eliminate import eliminate
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from .lower import lower
@@ -27,7 +28,7 @@ Guards = tuple[tuple[sp.Basic, int, str], ...]
 FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
-    frames.reaction, frames.transport, frames.rotor_energy,
+    frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.length, frames.turned, frames.classical_body, frames.state_deviation,
 )  # fmt: skip
 
@@ -128,6 +129,30 @@ def screw_kernels() -> tuple[Kernel, ...]:
     return tuple(Kernel(name, derivation) for name, derivation in screw.derivations().items())
 
 
+def links() -> dict[str, Hinge]:
+    """Built-in hinges that move about and along z alone, by name."""
+    hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
+    return {hinge.name: hinge for hinge in hinges if hinge.speeds is None and _axial(hinge)}
+
+
+def _axial(hinge: Hinge) -> bool:
+    motion = motion_of(hinge)
+    return motion.nu > 0 and link.along_z(motion) is not None
+
+
+def link_kernels(name: str) -> tuple[Kernel, ...]:
+    """A rigid body behind the hinge `name`, pass by pass."""
+    motion = motion_of(links()[name])
+    subspace = motion.in_arrays(motion.subspace)
+    return (
+        Kernel("forward", link.forward(motion, RigidBody())),
+        Kernel(
+            "condense", link.condense(motion, RigidBody()), sweep.pivot_guards(motion.nu, subspace)
+        ),
+        Kernel("recover", link.recover(motion)),
+    )
+
+
 def classical_kernel(name: str) -> Kernel:
     """The classical transfer matrix `name`."""
     derivation = CLASSICAL[name]()
@@ -143,6 +168,8 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "frames"] = frame_kernels
     table["sweep", "laws"] = law_kernels
     table["sweep", "screw"] = screw_kernels
+    for name in links():
+        table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]
     for nu in range(MAX_SPEEDS + 1):
         table["sweep", f"generic{nu}"] = lambda nu=nu: generic_kernels(nu)  # type: ignore[misc]
     for name in CLASSICAL:

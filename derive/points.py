@@ -85,14 +85,14 @@ class Source:
             return [*_uniform(length - 4, numbers), *_unit(4, numbers)]
         if port.shape == (3, 3) and port.name != "F_scale":
             return rotation(numbers)
-        if port.name in ("S", "J_I"):
+        if port.name in ("S", "S_K", "J_I"):
             return _definite({21: 6, 6: 3, 1: 1}[length], numbers)
-        if port.name in ("M", "J", "F_scale"):
+        if port.name in ("M", "J", "F_scale", "b"):
             return [numbers.uniform(0.2, 2.0) for _ in range(length)]
         if port.name in ("a", "a_n"):
             return _unit(3, numbers)
-        if port.name == "turn":
-            return _cosine_and_sine(numbers.uniform(-4.0, 4.0))
+        if port.name in ("turn", "link"):
+            return _cosine_and_sine(numbers.uniform(-4.0, 4.0)) + _uniform(length - 2, numbers)
         return _uniform(length, numbers)
 
     def coordinate_values(self, numbers: random.Random, turn: str | None = None) -> Numbers:
@@ -131,8 +131,8 @@ class Source:
                 drawn = self.coordinate_values(numbers, "rest")
             elif port.shape == (3, 3) and port.name != "F_scale":
                 drawn = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-            elif port.name == "turn":
-                drawn = [1.0, 0.0]
+            elif port.name in ("turn", "link"):
+                drawn[:2] = [1.0, 0.0]
             elif port.name in ("u", "s", "motion", "motion_I", "v", "w", "tau", "e", "effort"):
                 drawn = [0.0] * port.length()
             inputs[port.name] = drawn

@@ -21,6 +21,8 @@ t = q + r); `condense_plain` is R A R^T as it stands and does.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import sympy as sp
 
 from .derivation import Derivation, Equation, Quantity, tilde
@@ -44,10 +46,9 @@ OUT_S = Quantity(_symbol("S_I", 6, 6), "", "f = S a + e at the inboard origin", 
 OUT_E = Quantity(_symbol("e_I", 6), "N, N*m", "force part at the inboard origin")
 
 AXES = {"x": 0, "z": 2}
-_ROTATION = _symbol("R", 3, 3)
-_COSINE, _SINE, _D = TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT_ALONG.symbol[0, 0]
 
 Scalars = dict[tuple[int, int], sp.Expr]
+Pair = tuple[sp.MatrixSymbol, sp.MatrixSymbol]
 
 
 def _plane(k: int) -> tuple[int, int]:
@@ -55,19 +56,8 @@ def _plane(k: int) -> tuple[int, int]:
     return (k + 1) % 3, (k + 2) % 3
 
 
-def _turn(k: int) -> sp.ImmutableDenseMatrix:
-    i, j = _plane(k)
-    entries: Scalars = {(k, k): sp.Integer(1)}
-    entries |= {(i, i): _COSINE, (j, j): _COSINE, (i, j): -_SINE, (j, i): _SINE}
-    return _matrix(entries)
-
-
 def _matrix(entries: Scalars) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix(3, 3, lambda i, j: entries.get((i, j), sp.Integer(0)))
-
-
-def _along(k: int) -> sp.ImmutableDenseMatrix:
-    return sp.ImmutableDenseMatrix([_D if i == k else sp.Integer(0) for i in range(3)])
 
 
 def _block(symbol: sp.MatrixSymbol, row: int, column: int) -> sp.ImmutableDenseMatrix:
@@ -81,52 +71,158 @@ def _screw(name: str, axis: str) -> str:
 # --- S and e ----------------------------------------------------------------------------------
 
 
-def condense(axis: str, *, plain: bool = False) -> Derivation:
-    """S and e across a screw about `axis`; `plain` without the double angle (constant turns)."""
-    k = AXES[axis]
-    turned = _turned_plainly() if plain else _turned(k)
-    equations = (Equation("rotation", _ROTATION, _turn(k)), *turned, *_shifted(k))
-    title = _screw("S and e", axis) + (", plain products" if plain else "")
-    return Derivation(
-        "screw", title, (TURN, SHIFT_ALONG, S, E), (OUT_S, OUT_E), equations, sources=SOURCES
-    )
+@dataclass(frozen=True)
+class Stage:
+    """A screw about axis k in a longer derivation; `mark` tells its intermediate names apart."""
 
+    k: int
+    cosine: sp.Expr
+    sine: sp.Expr
+    shift: sp.Expr
+    mark: str = ""
 
-def turn() -> Derivation:
-    """S and e in other axes through the same point."""
-    a, b, c = (_symbol(n, 3, 3) for n in ("A", "B", "C"))
-    whole = sp.BlockMatrix([[a, b], [b.T, c]])
-    push, moment = _symbol("push", 3), _symbol("moment", 3)
-    return Derivation(
-        "screw",
-        "S and e in turned axes",
-        (R_GIVEN, S, E),
-        (OUT_S, OUT_E),
-        (
-            Equation("rotation", _ROTATION, R_GIVEN.symbol),
-            *_turned_plainly(),
-            Equation("S, inboard axes", OUT_S.symbol, whole),
-            Equation("e, inboard axes", OUT_E.symbol, _stack(push, moment)),
-        ),
-        sources=SOURCES,
-    )
+    @property
+    def rotation(self) -> sp.ImmutableDenseMatrix:
+        """Outboard axes to inboard axes."""
+        i, j = _plane(self.k)
+        c, s = self.cosine, self.sine
+        return _matrix({(self.k, self.k): sp.Integer(1),
+                        (i, i): c, (j, j): c, (i, j): -s, (j, i): s})  # fmt: skip
 
+    @property
+    def position(self) -> sp.ImmutableDenseMatrix:
+        """Outboard origin from the inboard one."""
+        return sp.ImmutableDenseMatrix(
+            [self.shift if i == self.k else sp.Integer(0) for i in range(3)]
+        )
 
-def _load_turned() -> tuple[Equation, ...]:
-    return (
-        Equation("force, inboard axes", _symbol("push", 3), _ROTATION * _part(E.symbol, 0)),
-        Equation("moment, inboard axes", _symbol("moment", 3), _ROTATION * _part(E.symbol, 3)),
-    )
+    def symbol(self, name: str, rows: int, columns: int = 1) -> sp.MatrixSymbol:
+        """An intermediate quantity of this stage."""
+        return _symbol(name + self.mark, rows, columns)
 
+    def carried(
+        self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair, *, plain: bool = False
+    ) -> tuple[Equation, ...]:
+        """Equations that carry s and e to the inboard origin; `out` are the results' symbols."""
+        rotation = Equation("rotation", self.symbol("R", 3, 3), self.rotation)
+        turned = self._turned_plainly(s) if plain else self._turned(s)
+        return (rotation, *turned, *self._load_turned(e), *self._shifted(*out))
 
-def _turned_plainly() -> tuple[Equation, ...]:
-    """R A R^T, R B R^T, R C R^T, R f, R m."""
-    found = []
-    for name, words, row, column in _BLOCKS:
-        value = _ROTATION * _block(S.symbol, row, column) * _ROTATION.T
-        same = row == column
-        found.append(Equation(f"{words}, inboard axes", _symbol(name, 3, 3), value, symmetric=same))
-    return (*found, *_load_turned())
+    def _load_turned(self, e: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        turn = self.symbol("R", 3, 3)
+        return (
+            Equation("force, inboard axes", self.symbol("push", 3), turn * _part(e, 0)),
+            Equation("moment, inboard axes", self.symbol("moment", 3), turn * _part(e, 3)),
+        )
+
+    def _turned_plainly(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        """R A R^T, R B R^T, R C R^T."""
+        return tuple(self._block(s, *block, None) for block in _BLOCKS)
+
+    def _block(
+        self,
+        s: sp.MatrixSymbol,
+        name: str,
+        words: str,
+        row: int,
+        column: int,
+        computed: sp.Basic | None,
+    ) -> Equation:
+        turn = self.symbol("R", 3, 3)
+        value = turn * _block(s, row, column) * turn.T
+        return Equation(
+            f"{words}, inboard axes", self.symbol(name, 3, 3), value,
+            symmetric=row == column, computed=computed,
+        )  # fmt: skip
+
+    def _turned(self, whole: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        """The same by the double angle."""
+        k, (i, j) = self.k, _plane(self.k)
+        c, s = self.cosine, self.sine
+        found = []
+        for name, words, row, column in _BLOCKS:
+            m = _block(whole, row, column)
+            t = self.symbol(f"t_{name}", 1)
+            # The sum of the two mixed entries is 2 b of a symmetric block.
+            swing = 2 * (c * m[i, j]) if row == column else c * (m[i, j] + m[j, i])
+            found.append(
+                Equation(f"double angle of the {words}", t, s * (m[i, i] - m[j, j]) + swing)
+            )
+            t0 = t[0, 0]
+            entries: Scalars = {
+                (k, k): m[k, k],
+                (i, i): m[i, i] - s * t0, (j, j): m[j, j] + s * t0,
+                (i, j): c * t0 - m[j, i], (j, i): c * t0 - m[i, j],
+                (k, i): c * m[k, i] - s * m[k, j], (k, j): s * m[k, i] + c * m[k, j],
+                (i, k): c * m[i, k] - s * m[j, k], (j, k): s * m[i, k] + c * m[j, k],
+            }  # fmt: skip
+            found.append(self._block(whole, name, words, row, column, _matrix(entries)))
+        return tuple(found)
+
+    def _shifted(self, out_s: sp.MatrixSymbol, out_e: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        """B_I = B - A r~,  C_I = C + r~ B_I - B^T r~,  moment + r x force."""
+        a, b, c, moved, shifted = (self.symbol(n, 3, 3) for n in ("A", "B", "C", "B_I", "C_I"))
+        push, moment = self.symbol("push", 3), self.symbol("moment", 3)
+        lever = tilde(self.position)
+        return (
+            Equation(
+                "mixed block at the inboard origin", moved, b - a * lever,
+                computed=self._moved_mixed(a, b),
+            ),
+            Equation(
+                "moment-rotation block at the inboard origin", shifted,
+                c + lever * moved - b.T * lever,
+                symmetric=True, computed=self._moved_corner(b, c, moved),
+            ),
+            Equation(
+                "S at the inboard origin", out_s, sp.BlockMatrix([[a, moved], [moved.T, shifted]])
+            ),
+            Equation("e at the inboard origin", out_e, _stack(push, moment + lever * push)),
+        )  # fmt: skip
+
+    def _moved_mixed(self, a: sp.MatrixSymbol, b: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+        i, j = _plane(self.k)
+        mixed = _entries(b)
+        for m in range(3):
+            mixed[m, i] = b[m, i] - self.shift * a[m, j]
+            mixed[m, j] = b[m, j] + self.shift * a[m, i]
+        return _matrix(mixed)
+
+    def _moved_corner(
+        self, b: sp.MatrixSymbol, c: sp.MatrixSymbol, moved: sp.MatrixSymbol
+    ) -> sp.ImmutableDenseMatrix:
+        k, (i, j), d = self.k, _plane(self.k), self.shift
+        corner = _entries(c)
+        corner[k, i] = corner[i, k] = c[k, i] - d * b[j, k]
+        corner[k, j] = corner[j, k] = c[k, j] + d * b[i, k]
+        corner[i, i] = c[i, i] - d * (moved[j, i] + b[j, i])
+        corner[j, j] = c[j, j] + d * (moved[i, j] + b[i, j])
+        corner[i, j] = corner[j, i] = c[i, j] + d * (b[i, i] - moved[j, j])
+        return _matrix(corner)
+
+    # --- motion and accelerations ---------------------------------------------------------------
+
+    def behind(self, motion: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        """Bias motion of the outboard frame, at rest in the inboard one."""
+        w, wd, rdd = (_part(motion, n) for n in (0, 3, 6))
+        turn, carrier = self.symbol("R", 3, 3), self.symbol("K", 3, 3)
+        back = turn.T
+        moved = rdd + carrier * self.position
+        return (
+            Equation("rotation", turn, self.rotation),
+            Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
+            Equation("bias motion", out, _stack(back * w, back * wd, back * moved)),
+        )
+
+    def deviation(self, delta: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
+        """X delta."""
+        a, alpha = _part(delta, 0), _part(delta, 3)
+        turn = self.symbol("R", 3, 3)
+        moved = a - tilde(self.position) * alpha
+        return (
+            Equation("rotation", turn, self.rotation),
+            Equation("X delta", out, _stack(turn.T * moved, turn.T * alpha)),
+        )
 
 
 _BLOCKS = (
@@ -136,119 +232,73 @@ _BLOCKS = (
 )
 
 
-def _turned(k: int) -> tuple[Equation, ...]:
-    """The same by the double angle."""
-    i, j = _plane(k)
-    c, s = _COSINE, _SINE
-    found = []
-    for name, words, row, column in _BLOCKS:
-        m = _block(S.symbol, row, column)
-        same = row == column
-        t = _symbol(f"t_{name}", 1)
-        # The sum of the two mixed entries is 2 b of a symmetric block.
-        swing = 2 * (c * m[i, j]) if same else c * (m[i, j] + m[j, i])
-        found.append(Equation(f"double angle of the {words}", t, s * (m[i, i] - m[j, j]) + swing))
-        t0 = t[0, 0]
-        entries: Scalars = {
-            (k, k): m[k, k],
-            (i, i): m[i, i] - s * t0, (j, j): m[j, j] + s * t0,
-            (i, j): c * t0 - m[j, i], (j, i): c * t0 - m[i, j],
-            (k, i): c * m[k, i] - s * m[k, j], (k, j): s * m[k, i] + c * m[k, j],
-            (i, k): c * m[i, k] - s * m[j, k], (j, k): s * m[i, k] + c * m[j, k],
-        }  # fmt: skip
-        found.append(
-            Equation(
-                f"{words}, inboard axes",
-                _symbol(name, 3, 3),
-                _ROTATION * m * _ROTATION.T,
-                symmetric=same,
-                computed=_matrix(entries),
-            )
-        )
-    return (*found, *_load_turned())
+def _entries(symbol: sp.MatrixSymbol) -> Scalars:
+    return {(m, n): symbol[m, n] for m in range(3) for n in range(3)}
 
 
-def _shifted(k: int) -> tuple[Equation, ...]:
-    """B_I = B - A r~,  C_I = C + r~ B_I - B^T r~,  moment + r x force."""
-    i, j = _plane(k)
-    a, b, c, moved = (_symbol(n, 3, 3) for n in ("A", "B", "C", "B_I"))
-    push, moment = _symbol("push", 3), _symbol("moment", 3)
-    lever = tilde(_along(k))
-    mixed = {(m, n): b[m, n] for m in range(3) for n in range(3)}
-    for m in range(3):
-        mixed[m, i] = b[m, i] - _D * a[m, j]
-        mixed[m, j] = b[m, j] + _D * a[m, i]
-    corner = {(m, n): c[m, n] for m in range(3) for n in range(3)}
-    corner[k, i] = corner[i, k] = c[k, i] - _D * b[j, k]
-    corner[k, j] = corner[j, k] = c[k, j] + _D * b[i, k]
-    corner[i, i] = c[i, i] - _D * (moved[j, i] + b[j, i])
-    corner[j, j] = c[j, j] + _D * (moved[i, j] + b[i, j])
-    corner[i, j] = corner[j, i] = c[i, j] + _D * (b[i, i] - moved[j, j])
-    shifted = _symbol("C_I", 3, 3)
-    return (
-        Equation(
-            "mixed block at the inboard origin", moved, b - a * lever, computed=_matrix(mixed)
-        ),
-        Equation(
-            "moment-rotation block at the inboard origin",
-            shifted,
-            c + lever * moved - b.T * lever,
-            symmetric=True,
-            computed=_matrix(corner),
-        ),
-        Equation(
-            "S at the inboard origin",
-            OUT_S.symbol,
-            sp.BlockMatrix([[a, moved], [moved.T, shifted]]),
-        ),
-        Equation("e at the inboard origin", OUT_E.symbol, _stack(push, moment + lever * push)),
+def _given(axis: str) -> Stage:
+    return Stage(AXES[axis], TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT_ALONG.symbol[0, 0])
+
+
+def condense(axis: str, *, plain: bool = False) -> Derivation:
+    """S and e across a screw about `axis`; `plain` without the double angle (constant turns)."""
+    out = (OUT_S.symbol, OUT_E.symbol)
+    return Derivation(
+        "screw",
+        _screw("S and e", axis) + (", plain products" if plain else ""),
+        (TURN, SHIFT_ALONG, S, E),
+        (OUT_S, OUT_E),
+        _given(axis).carried(S.symbol, E.symbol, out, plain=plain),
+        sources=SOURCES,
     )
 
 
-# --- motion and accelerations -----------------------------------------------------------------
+def turn() -> Derivation:
+    """S and e in other axes through the same point."""
+    rotation = R_GIVEN.symbol
+    turned = []
+    for name, words, row, column in _BLOCKS:
+        value = rotation * _block(S.symbol, row, column) * rotation.T
+        same = row == column
+        turned.append(
+            Equation(f"{words}, inboard axes", _symbol(name, 3, 3), value, symmetric=same)
+        )
+    a, b, c = (_symbol(n, 3, 3) for n in ("A", "B", "C"))
+    load = _stack(rotation * _part(E.symbol, 0), rotation * _part(E.symbol, 3))
+    return Derivation(
+        "screw",
+        "S and e in turned axes",
+        (R_GIVEN, S, E),
+        (OUT_S, OUT_E),
+        (
+            *turned,
+            Equation("S, inboard axes", OUT_S.symbol, sp.BlockMatrix([[a, b], [b.T, c]])),
+            Equation("e, inboard axes", OUT_E.symbol, load),
+        ),
+        sources=SOURCES,
+    )
 
 
 def motion(axis: str) -> Derivation:
     """Angular velocity, angular acceleration and acceleration of the outboard origin."""
-    k = AXES[axis]
-    w, wd, rdd = (_part(PARENT_MOTION.symbol, n) for n in (0, 3, 6))
-    carrier, back = _symbol("K", 3, 3), _ROTATION.T
     return Derivation(
         "screw",
         _screw("bias motion", axis),
         (TURN, SHIFT_ALONG, PARENT_MOTION),
         (MOTION,),
-        (
-            Equation("rotation", _ROTATION, _turn(k)),
-            Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
-            Equation(
-                "bias motion",
-                MOTION.symbol,
-                _stack(back * w, back * wd, back * (rdd + carrier * _along(k))),
-            ),
-        ),
+        _given(axis).behind(PARENT_MOTION.symbol, MOTION.symbol),
         sources=SOURCES,
     )
 
 
 def delta(axis: str) -> Derivation:
     """Deviation of the outboard acceleration for a rigid connection."""
-    k = AXES[axis]
-    a, alpha = _part(PARENT_DELTA.symbol, 0), _part(PARENT_DELTA.symbol, 3)
-    back = _ROTATION.T
     return Derivation(
         "screw",
         _screw("deviation", axis),
         (TURN, SHIFT_ALONG, PARENT_DELTA),
         (DELTA,),
-        (
-            Equation("rotation", _ROTATION, _turn(k)),
-            Equation(
-                "X delta_I",
-                DELTA.symbol,
-                _stack(back * (a - tilde(_along(k)) * alpha), back * alpha),
-            ),
-        ),
+        _given(axis).deviation(PARENT_DELTA.symbol, DELTA.symbol),
         sources=SOURCES,
     )
 

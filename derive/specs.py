@@ -19,6 +19,8 @@ from .kernels import (
     generic_kernels,
     kernels_of,
     law_kernels,
+    link_kernels,
+    links,
     screw_kernels,
 )
 from .registry import Element, builtin_elements, kind_of
@@ -75,6 +77,14 @@ def shared_specs() -> list[ElementSpec]:
         plain(name="frames", title="poses, points and loads", kernels=frames),
         plain(name="laws", title="laws on hinge coordinates", kernels=laws),
         plain(name="screw", title="transport across axial screws", kernels=screws),
+        *(
+            plain(
+                name=f"link_{name}",
+                title=f"rigid body behind the {hinge.title}",
+                kernels=_lowered(link_kernels(name)),
+            )
+            for name, hinge in links().items()
+        ),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
     ]
 

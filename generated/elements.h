@@ -272,6 +272,8 @@ int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restri
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
+int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+    const real *restrict f, real *restrict moment);
 int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
@@ -435,6 +437,62 @@ int mstmm_sweep_laws_rotation(const real *restrict p, const real *restrict q,
 int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict B, const real *restrict effort, const real *restrict twist_ref,
     real *restrict tau, real *restrict V, real *restrict P, real *restrict twist);
+
+extern const mstmm_element mstmm_sweep_link_cylindrical;
+int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict b,
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
+    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_cylindrical_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_link_pin;
+int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict b,
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
+    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_pin_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_link_prismatic;
+int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict b,
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
+    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_prismatic_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_link_screw;
+int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict b,
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
+    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_screw;
 int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,

@@ -63,6 +63,7 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
                                     block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_A, load, force,
                                     moment);
         if (wanted->loads) {
+            mstmm_sweep_frames_moment_at(block + MSTMM_BLOCK_A, body->held, load, moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
         }
@@ -107,7 +108,7 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
                   3 * model->n_drives;
     real *qdot = slots + model->tape_slots, *udot = qdot + model->nq;
     int code =
-        mstmm_accelerations(model, workspace, t, q, u, memory, NULL, qdot, udot, &balance, failure);
+        mstmm_accelerations_kept(model, workspace, t, q, u, memory, qdot, udot, &balance, failure);
     if (!code) code = complete(&state, q, u);
     if (code) return code;
     if (wanted->udot) memcpy(wanted->udot, udot, (size_t)model->nu * sizeof(real));

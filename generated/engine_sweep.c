@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "elements.h"
+#include "engine_links.h"
 #include "engine_sweep.h"
 
 typedef int (*forward_kernel)(const real *rt, const real *ro, const real *p, const real *q,
@@ -113,13 +114,17 @@ int mstmm_project(int nu, const real *rotation, const real *shift, const real *s
 static void fill_imposed(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        real *s = mstmm_s(state->workspace + body->block, body->nu);
-        if (state->imposed_all)
-            memcpy(s, state->udot + body->u, (size_t)body->nu * sizeof(real));
-        else
-            memset(s, 0, (size_t)body->nu * sizeof(real));
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (state->linked && run->numbers) continue;
+        for (int i = run->first; i < run->first + run->count; i++) {
+            const mstmm_body *body = &model->bodies[i];
+            real *s = mstmm_s(state->workspace + body->block, body->nu);
+            if (state->imposed_all)
+                memcpy(s, state->udot + body->u, (size_t)body->nu * sizeof(real));
+            else
+                memset(s, 0, (size_t)body->nu * sizeof(real));
+        }
     }
 }
 
@@ -193,34 +198,40 @@ int mstmm_hinge_motion(mstmm_state *state, int index, real *qdot)
     return code ? mstmm_fail(state, MSTMM_FAILED_HINGE, index, code) : 0;
 }
 
-/* Bias motion, own inertia and own load of every body, root to tips. */
+/* Bias motion, own inertia and own load of one body. */
+int mstmm_forward_body(mstmm_state *state, int i, const real *parent_motion, real *qdot)
+{
+    const mstmm_body *body = &state->model->bodies[i];
+    real *block = state->workspace + body->block;
+    const real *rt = body->connection, *ro = body->connection + 9;
+    real *s = mstmm_s(block, body->nu), *motion = block + MSTMM_BLOCK_MOTION;
+    int code;
+    if (body->generic) {
+        code = mstmm_hinge_motion(state, i, qdot + body->q);
+        if (code) return code;
+        code = generic_forward[body->nu](
+            rt, ro, block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_D,
+            mstmm_h(block, body->nu), block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_W,
+            block + MSTMM_BLOCK_HINGE_C, s, parent_motion, block, block + MSTMM_BLOCK_SHIFT,
+            motion);
+    } else {
+        code = ((forward_kernel)body->forward)(rt, ro, body->hinge_p, state->q + body->q,
+                                               state->u + body->u, s, parent_motion, block,
+                                               block + MSTMM_BLOCK_SHIFT, motion, qdot + body->q);
+    }
+    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, i, code);
+    ((inertia_kernel)body->inertia)(body->body_p, block + MSTMM_BLOCK_S);
+    ((bias_load_kernel)body->bias_load)(body->body_p, motion, block + MSTMM_BLOCK_E);
+    return 0;
+}
+
 int mstmm_forward_pass(mstmm_state *state, real *qdot)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        real *block = state->workspace + body->block;
-        const real *parent = mstmm_block(model, state->workspace, body->parent);
-        const real *rt = body->connection, *ro = body->connection + 9;
-        real *s = mstmm_s(block, body->nu), *motion = block + MSTMM_BLOCK_MOTION;
-        int code;
-        if (body->generic) {
-            code = mstmm_hinge_motion(state, i, qdot + body->q);
-            if (code) return code;
-            code = generic_forward[body->nu](
-                rt, ro, block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_D,
-                mstmm_h(block, body->nu), block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_W,
-                block + MSTMM_BLOCK_HINGE_C, s, parent + MSTMM_BLOCK_MOTION, block,
-                block + MSTMM_BLOCK_SHIFT, motion);
-        } else {
-            code = ((forward_kernel)body->forward)(
-                rt, ro, body->hinge_p, state->q + body->q, state->u + body->u, s,
-                parent + MSTMM_BLOCK_MOTION, block, block + MSTMM_BLOCK_SHIFT, motion,
-                qdot + body->q);
-        }
-        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, i, code);
-        ((inertia_kernel)body->inertia)(body->body_p, block + MSTMM_BLOCK_S);
-        ((bias_load_kernel)body->bias_load)(body->body_p, motion, block + MSTMM_BLOCK_E);
+        const real *parent = mstmm_block(model, state->workspace, model->bodies[i].parent);
+        int code = mstmm_forward_body(state, i, parent + MSTMM_BLOCK_MOTION, qdot);
+        if (code) return code;
     }
     return 0;
 }
@@ -244,61 +255,66 @@ static int pack_free(mstmm_state *state, const mstmm_body *body, real *block, re
     return n;
 }
 
-/* S and e of every subtree, tips to root. */
-static int condense_pass(mstmm_state *state)
+/* S and e of one body, complete, carried to its parent. */
+int mstmm_condense_body(mstmm_state *state, int i)
+{
+    const mstmm_model *model = state->model;
+    const mstmm_body *body = &model->bodies[i];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(model, state->workspace, body->parent);
+    real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
+    int code;
+    if (body->generic) {
+        real tau[6], rotor[6];
+        int n = pack_free(state, body, block, tau, rotor);
+        code = generic_condense[n](block, block + MSTMM_BLOCK_SHIFT, mstmm_h_free(block, body->nu),
+                                   rotor, block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E, tau, gain,
+                                   offset, parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
+    } else {
+        code = ((condense_kernel)body->condense)(
+            block, block + MSTMM_BLOCK_SHIFT, body->hinge_p, state->q + body->q,
+            block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E, mstmm_tau(block, body->nu), gain, offset,
+            parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
+    }
+    return code ? mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, i, code) : 0;
+}
+
+/* Accelerations of one body. */
+void mstmm_recover_body(mstmm_state *state, int i, const real *parent_delta, real *udot)
+{
+    const mstmm_body *body = &state->model->bodies[i];
+    real *block = state->workspace + body->block;
+    const real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
+    if (!body->generic) {
+        ((recover_kernel)body->recover)(block, block + MSTMM_BLOCK_SHIFT, body->hinge_p,
+                                        state->q + body->q, gain, offset, parent_delta,
+                                        udot + body->u, block + MSTMM_BLOCK_DELTA);
+        return;
+    }
+    const int imposed = mstmm_imposed(body, state->memory);
+    const real *s = mstmm_s(block, body->nu);
+    real *free_rates = mstmm_free(block, body->nu);
+    int n = 0;
+    for (int j = 0; j < body->nu; j++) n += !imposed || !body->imposed_mask[j];
+    generic_recover[n](block, block + MSTMM_BLOCK_SHIFT, mstmm_h_free(block, body->nu), gain,
+                       offset, parent_delta, free_rates, block + MSTMM_BLOCK_DELTA);
+    for (int j = 0, k = 0; j < body->nu; j++)
+        udot[body->u + j] = imposed && body->imposed_mask[j] ? s[j] : free_rates[k++];
+}
+
+/* S and e of every subtree, tips to root; accelerations, root to tips. */
+static int condense_and_recover(mstmm_state *state, real *udot)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const mstmm_body *body = &model->bodies[i];
-        real *block = state->workspace + body->block;
-        real *parent = mstmm_block(model, state->workspace, body->parent);
-        real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
-        int code;
-        if (body->generic) {
-            real tau[6], rotor[6];
-            int n = pack_free(state, body, block, tau, rotor);
-            code = generic_condense[n](block, block + MSTMM_BLOCK_SHIFT,
-                                       mstmm_h_free(block, body->nu), rotor, block + MSTMM_BLOCK_S,
-                                       block + MSTMM_BLOCK_E, tau, gain, offset,
-                                       parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
-        } else {
-            code = ((condense_kernel)body->condense)(
-                block, block + MSTMM_BLOCK_SHIFT, body->hinge_p, state->q + body->q,
-                block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E, mstmm_tau(block, body->nu), gain,
-                offset, parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
-        }
-        if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, i, code);
+        int code = mstmm_condense_body(state, i);
+        if (code) return code;
+    }
+    for (int i = 0; i < model->n_bodies; i++) {
+        const real *parent = mstmm_block(model, state->workspace, model->bodies[i].parent);
+        mstmm_recover_body(state, i, parent + MSTMM_BLOCK_DELTA, udot);
     }
     return 0;
-}
-
-/* Accelerations, root to tips. */
-static void recover_pass(mstmm_state *state, real *udot)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        real *block = state->workspace + body->block;
-        const real *parent = mstmm_block(model, state->workspace, body->parent);
-        const real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
-        if (!body->generic) {
-            ((recover_kernel)body->recover)(block, block + MSTMM_BLOCK_SHIFT, body->hinge_p,
-                                            state->q + body->q, gain, offset,
-                                            parent + MSTMM_BLOCK_DELTA, udot + body->u,
-                                            block + MSTMM_BLOCK_DELTA);
-            continue;
-        }
-        const int imposed = mstmm_imposed(body, state->memory);
-        const real *s = mstmm_s(block, body->nu);
-        real *free_rates = mstmm_free(block, body->nu);
-        int n = 0;
-        for (int j = 0; j < body->nu; j++) n += !imposed || !body->imposed_mask[j];
-        generic_recover[n](block, block + MSTMM_BLOCK_SHIFT, mstmm_h_free(block, body->nu), gain,
-                           offset, parent + MSTMM_BLOCK_DELTA, free_rates,
-                           block + MSTMM_BLOCK_DELTA);
-        for (int j = 0, k = 0; j < body->nu; j++)
-            udot[body->u + j] = imposed && body->imposed_mask[j] ? s[j] : free_rates[k++];
-    }
 }
 
 /* Power that drives and holds feed in: tau_d . u_d with tau_d = H_d^T f + J udot - given. */
@@ -322,15 +338,20 @@ static void drive_power(mstmm_state *state, const real *udot, mstmm_balance *bal
     }
 }
 
-static void clear_efforts(mstmm_state *state, const real *efforts, mstmm_balance *balance)
+/* Efforts of the caller where the sweep reads them.  Linked runs without laws read `efforts`. */
+static void set_efforts(mstmm_state *state, const real *efforts, mstmm_balance *balance)
 {
     const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        real *tau = mstmm_tau(state->workspace + body->block, body->nu);
-        for (int j = 0; j < body->nu; j++) {
-            tau[j] = efforts ? efforts[body->u + j] : 0;
-            if (balance) balance->power += tau[j] * state->u[body->u + j];
+    state->efforts = efforts;
+    for (int j = 0; balance && efforts && j < model->nu; j++)
+        balance->power += efforts[j] * state->u[j];
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (state->linked && run->numbers && !model->n_laws) continue;
+        for (int i = run->first; i < run->first + run->count; i++) {
+            const mstmm_body *body = &model->bodies[i];
+            real *tau = mstmm_tau(state->workspace + body->block, body->nu);
+            for (int j = 0; j < body->nu; j++) tau[j] = efforts ? efforts[body->u + j] : 0;
         }
     }
 }
@@ -371,40 +392,62 @@ static int compare_product(mstmm_state *state, const real *product, real *udot)
                : mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, worst, MSTMM_FAILED_PRODUCT_ERROR);
 }
 
+/* Forward pass, efforts, loads. */
+static int load_bodies(mstmm_state *state, const real *efforts, real *qdot, real *applied,
+                       mstmm_balance *balance)
+{
+    const mstmm_model *model = state->model;
+    int code = state->linked ? mstmm_linked_forward(state, qdot) : mstmm_forward_pass(state, qdot);
+    if (code) return code;
+    if (balance) balance->power = balance->potential = 0;
+    set_efforts(state, efforts, balance);
+    code = mstmm_law_pass(state, balance);
+    if (code || !(model->needs_pose || model->product)) return code;
+    mstmm_pose_pass(state, 0);
+    return load_pass(state, balance, applied);
+}
+
+static int sweep(mstmm_state *state, const real *q, const real *u, const real *efforts, real *qdot,
+                 real *udot, mstmm_balance *balance)
+{
+    const mstmm_model *model = state->model;
+    const mstmm_product *check = model->product;
+    real *applied = NULL, *product = NULL;
+    if (check) {
+        real *numbers = state->workspace + check->place;
+        applied = numbers + (size_t)MSTMM_PRODUCT_MATRICES * model->n_bodies;
+        product = numbers + (size_t)MSTMM_PRODUCT_PER_BODY * model->n_bodies;
+    }
+    int code = mstmm_state_begin(state, q, u);
+    if (code) return code;
+    code = load_bodies(state, efforts, qdot, applied, balance);
+    if (code) return code;
+    if (check) {
+        code = mstmm_product_pass(state, applied, product);
+        if (code) return code;
+    }
+    code = state->linked ? mstmm_linked_sweep(state, udot) : condense_and_recover(state, udot);
+    if (code) return code;
+    if (balance) drive_power(state, udot, balance);
+    return check ? compare_product(state, product, udot) : 0;
+}
+
 int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
                         const real *u, const real *memory, const real *efforts, real *qdot,
                         real *udot, mstmm_balance *balance, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model, .workspace = workspace, .t = t, .memory = memory,
+                         .linked = !(model->needs_pose || model->product), .failure = failure};
+    return sweep(&state, q, u, efforts, qdot, udot, balance);
+}
+
+int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
+                             const real *u, const real *memory, real *qdot, real *udot,
+                             mstmm_balance *balance, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .memory = memory,
                          .failure = failure};
-    const mstmm_product *check = model->product;
-    real *applied = NULL, *product = NULL;
-    if (check) {
-        applied = workspace + check->place + (size_t)MSTMM_PRODUCT_MATRICES * model->n_bodies;
-        product = workspace + check->place + (size_t)MSTMM_PRODUCT_PER_BODY * model->n_bodies;
-    }
-    int code = mstmm_state_begin(&state, q, u);
-    if (code) return code;
-    code = mstmm_forward_pass(&state, qdot);
-    if (code) return code;
-    if (balance) balance->power = balance->potential = 0;
-    clear_efforts(&state, efforts, balance);
-    code = mstmm_law_pass(&state, balance);
-    if (code) return code;
-    if (model->needs_pose || model->product) {
-        mstmm_pose_pass(&state, 0);
-        code = load_pass(&state, balance, applied);
-        if (code) return code;
-    }
-    if (model->product) {
-        code = mstmm_product_pass(&state, applied, product);
-        if (code) return code;
-    }
-    code = condense_pass(&state);
-    if (code) return code;
-    recover_pass(&state, udot);
-    if (balance) drive_power(&state, udot, balance);
-    return model->product ? compare_product(&state, product, udot) : 0;
+    return sweep(&state, q, u, NULL, qdot, udot, balance);
 }
 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
@@ -418,7 +461,7 @@ int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, co
     if (code) return code;
     code = mstmm_forward_pass(&state, qdot);
     if (code) return code;
-    clear_efforts(&state, NULL, NULL);
+    set_efforts(&state, NULL, NULL);
     code = mstmm_law_pass(&state, NULL);
     if (code) return code;
     if (model->needs_pose) {

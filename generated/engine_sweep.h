@@ -47,12 +47,26 @@ typedef struct {
     const int *imposed_mask; /* per speed: 1 where imposed */
     int release;      /* place in memory that is non-zero once they are free; -1: never */
     const real *connection; /* Rt (9), ro (3) */
+    const real *link; /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    real held[3];     /* the hinge's own P from the origin of the body's frame */
     const real *hinge_p, *body_p;
     const real *rotor;       /* reflected inertia per speed */
     const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
+    void (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
 } mstmm_body;
+
+/* Bodies in a row, each a child of the one before.  With `numbers` they are swept by the kernels of
+ * one type of link, and but for the last each has one child, so that S and e stay at hand. */
+typedef struct {
+    int first, count, parent; /* parent of the first, -1: the ground */
+    int open;                 /* other runs hang on the last */
+    int q, u, nq, nu;         /* of the first; the others follow without gaps */
+    int64_t place, parent_place; /* of its links in the workspace; of the parent's link, or -1 */
+    const real *const *numbers; /* `link` of every body */
+    void (*forward)(void), (*condense)(void), (*recover)(void);
+} mstmm_branch;
 
 /* Law on coordinates of one hinge: `evaluate` is a kernel of sweep_laws. */
 typedef struct {
@@ -108,6 +122,8 @@ typedef struct {
     int n_bodies, nq, nu, n_memory;
     const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
     const mstmm_body *bodies;
+    int n_runs;
+    const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
     real gravity[3];
     int n_drives;
     const mstmm_drive *drives;
@@ -142,6 +158,10 @@ typedef struct {
 int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
                         const real *u, const real *memory, const real *efforts, real *qdot,
                         real *udot, mstmm_balance *balance, mstmm_failure *failure);
+/* Accelerations, with everything of the bodies left in the workspace for observations. */
+int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
+                             const real *u, const real *memory, real *qdot, real *udot,
+                             mstmm_balance *balance, mstmm_failure *failure);
 /* Efforts that the accelerations `udot` need beyond the laws' own (driven coordinates included). */
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
                            const real *u, const real *memory, const real *udot, real *efforts,
@@ -177,13 +197,17 @@ typedef struct mstmm_state {
     const real *q, *u, *memory; /* q and u with driven coordinates filled in */
     real *values, *slots;
     int imposed_all; /* every speed follows `udot` (inverse dynamics) */
-    const real *udot;
+    int linked;      /* runs with numbers are swept as links */
+    const real *udot, *efforts;
     mstmm_failure *failure;
 } mstmm_state;
 
 /* Fills driven coordinates and expression values, resets the ground. */
 int mstmm_state_begin(mstmm_state *state, const real *q, const real *u);
 int mstmm_forward_pass(mstmm_state *state, real *qdot);
+int mstmm_forward_body(mstmm_state *state, int body, const real *parent_motion, real *qdot);
+int mstmm_condense_body(mstmm_state *state, int body);
+void mstmm_recover_body(mstmm_state *state, int body, const real *parent_delta, real *udot);
 void mstmm_pose_pass(mstmm_state *state, int hinges_known);
 int mstmm_hinge_motion(mstmm_state *state, int body, real *qdot);
 int mstmm_law_pass(mstmm_state *state, mstmm_balance *balance);

@@ -32,8 +32,12 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_generic5,
     &mstmm_sweep_generic6,
     &mstmm_sweep_laws,
+    &mstmm_sweep_link_cylindrical,
+    &mstmm_sweep_link_pin,
+    &mstmm_sweep_link_prismatic,
+    &mstmm_sweep_link_screw,
     &mstmm_sweep_screw,
     NULL,
 };
 
-const int mstmm_element_count = 29;
+const int mstmm_element_count = 33;

@@ -34,6 +34,8 @@ int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restri
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
+int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+    const real *restrict f, real *restrict moment);
 int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
@@ -1176,6 +1178,64 @@ static const mstmm_port mstmm_sweep_frames_reaction_outputs[] = {
     {"moment", 3, "N*m", 0, 0},
 };
 
+/* moment about another point
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  offset[3] (m) point of the body from P, body axes
+ * in  f[6] (N, N*m) load at P, body axes
+ * out moment[3] (N*m) about the point, inertial axes
+ */
+int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+    const real *restrict f, real *restrict moment)
+{
+    const real t0 = offset[2] * f[1];
+    const real t1 = offset[1] * f[2];
+    const real t2 = t0 - t1;
+    const real t3 = f[3] + t2;
+    const real t4 = A[0] * t3;
+    const real t5 = offset[0] * f[2];
+    const real t6 = offset[2] * f[0];
+    const real t7 = t5 - t6;
+    const real t8 = f[4] + t7;
+    const real t9 = A[1] * t8;
+    const real t10 = t4 + t9;
+    const real t11 = offset[1] * f[0];
+    const real t12 = offset[0] * f[1];
+    const real t13 = t11 - t12;
+    const real t14 = f[5] + t13;
+    const real t15 = A[2] * t14;
+    const real t16 = t10 + t15;
+    moment[0] = t16;
+    const real t17 = A[3] * t3;
+    const real t18 = A[4] * t8;
+    const real t19 = t17 + t18;
+    const real t20 = A[5] * t14;
+    const real t21 = t19 + t20;
+    moment[1] = t21;
+    const real t22 = A[6] * t3;
+    const real t23 = A[7] * t8;
+    const real t24 = t22 + t23;
+    const real t25 = A[8] * t14;
+    const real t26 = t24 + t25;
+    moment[2] = t26;
+    return 0;
+}
+
+static int mstmm_sweep_frames_moment_at_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_moment_at(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_moment_at_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"offset", 3, "m", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_moment_at_outputs[] = {
+    {"moment", 3, "N*m", 0, 0},
+};
+
 /* load carried to the parent
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
@@ -1820,6 +1880,18 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "moment_at",
+        .function = (void (*)(void))mstmm_sweep_frames_moment_at,
+        .call = mstmm_sweep_frames_moment_at_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_moment_at_inputs,
+        .outputs = mstmm_sweep_frames_moment_at_outputs,
+        .ir_hash = "51f6f53bbb6e700a6c5fabba521581c9f92d11bedef18f10334d05b0b9d768b9",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "transport",
         .function = (void (*)(void))mstmm_sweep_frames_transport,
         .call = mstmm_sweep_frames_transport_call,
@@ -1897,7 +1969,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "e0b812cf3b15b8ececcc6d0fc91439e6714f59b95ac64d6d75f7fa09fd4318c0",
+    .hash = "ddd4cd75285f0af9a062608156f95b34479ff991226dd5f8ec73dc318767b3a3",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1907,6 +1979,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 17,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mstmm.errors import SceneError
 from mstmm.hinge_types import HINGE_TYPES
+from mstmm.rotations import Matrix
 from mstmm.scene import Body, Hinge, Scene
 from mstmm.tape import Tape
 from mstmm.topology import Run, Topology
 
-from . import placement, prebuilt
+from . import alignment, placement, prebuilt
+from .alignment import connection_of
 from .layout import Group, HingeSlots, Layout
-from .placement import GROUND, KERNEL_OF, Placement
+from .placement import GROUND, KERNEL_OF, Placement, rigid_parameters
 from .prebuilt import Element
 from .records import Lookup, Records
 
@@ -106,12 +109,15 @@ class BodyRecords:
         lib: Any,
         kept: list[Any],
         c_tape: Callable[[Tape], Any],
+        align: bool,
     ) -> None:
         self.scene, self.topology, self.layout, self.elements = scene, topology, layout, elements
         self.releases, self.ffi, self.lib, self.kept = releases, ffi, lib, kept
-        self.c_tape = c_tape
+        self.c_tape, self.align = c_tape, align
         #: First body of a run -> placements of one period.
         self._placements: dict[int, list[Placement]] = {}
+        #: First body of a chain -> placement of its last member.
+        self._last: dict[int, Placement] = {}
 
     @property
     def placements(self) -> Mapping[str, Placement]:
@@ -123,7 +129,10 @@ class BodyRecords:
         if body < len(self.scene.body):
             return self._placements[body][0]
         chain, k = self.scene.bodies.member(body)
-        period = self._placements[self.scene.bodies.starts[chain]]
+        first = self.scene.bodies.starts[chain]
+        if k + 1 == self.scene.chain[chain].count:
+            return self._last[first]
+        period = self._placements[first]
         return period[k % len(period)]
 
     def fill(self) -> tuple[Records, int]:
@@ -139,14 +148,20 @@ class BodyRecords:
         return records, self._blocks(records)
 
     def _chain(self, records: Records, run: Run) -> None:
-        """Prototypes 0: the first member; then members 1 to period + 1, which repeat."""
-        period = self.scene.chain[self.scene.bodies.member(run.body)[0]].period
+        """Prototypes 0: the first member; then members 1 to period + 1, which repeat; the last one,
+        whose frame suits what hangs on it."""
+        period = self._period(run)
         count = min(run.count, period + 1)
-        prototypes = Records(self.ffi, "mstmm_body", count)
+        more = run.count > count
+        prototypes = Records(self.ffi, "mstmm_body", count + more)
         for k in range(count):
             self._body(prototypes.array[k], run, k)
         which = np.arange(run.count)
         which[1:] = 1 + (which[1:] - 1) % period
+        if more:
+            self._body(prototypes.array[count], run, run.count - 1)
+            which[-1] = count
+        self._last[run.body] = self._placements[run.body][-1]
         records.copy(slice(run.place, run.place + run.count), prototypes, which)
         del self._placements[run.body][period:]
 
@@ -177,19 +192,58 @@ class BodyRecords:
         slots = self.layout.slots(run.hinge + k)
         kernel = self.elements.get("hinge", kernel_type(hinge, self.releases), hinge.name)
         inboard, outboard, numbers = placement.alignment(hinge)
-        place = placement.place(body, run.outboard_end, outboard)
+        own = placement.place(body, run.outboard_end, outboard)
+        child = self._child(run, k) if self.align else None
+        place = alignment.aligned(own, body, hinge, child)
         self._placements.setdefault(run.body, []).append(place)
-        parent, parent_place = self._parent(run, k)
         record.nq, record.nu = slots.nq, slots.nu
-        record.connection = self.reals(placement.connection(parent_place, parent, hinge, inboard))
         record.hinge_p = self.reals(self._hinge_parameters(hinge, kernel, numbers))
         self._hinge_functions(record, kernel)
         self._body_functions(record, body, place)
         self._imposed(record, hinge, slots)
+        self._connection(record, run, k, inboard, place)
+
+    def _connection(self, record: Any, run: Run, k: int, inboard: Matrix, own: Placement) -> None:
+        """Way from the parent's frame; as a link where it is one."""
+        body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
+        parent, parent_place = self._parent(run, k)
+        turned, point = placement.connection(parent_place, parent, hinge, inboard, own)
+        numbers = (*turned[0], *turned[1], *turned[2], *point)
+        axial = self.align and alignment.is_axial(hinge)
+        link = alignment.link_of(turned, point) if axial else None
+        record.held[2] = -own.height
+        record.connection = self.reals(numbers if link is None else connection_of(link))
+        if link is None:
+            return
+        kernel = prebuilt.elements()["sweep", f"link_{hinge.type}"]
+        rigid = rigid_parameters(body, own) if body.type == "rigid" else ()
+        record.link = self.reals((*link, *rigid, *placement.alignment(hinge)[2]))
+        if rigid and not record.generic:
+            for name, function in kernel.functions.items():
+                setattr(record, f"link_{name}", function)
+
+    def _child(self, run: Run, k: int) -> tuple[Hinge, str] | None:
+        """First hinge on a body, and the body's end that it hangs on."""
+        if k + 1 < run.count:
+            return self.scene.hinges[run.hinge + k + 1], run.ends[k % len(run.ends)]
+        found = self._first_children.get(run.place + k)
+        return None if found is None else (self.scene.hinges[found.hinge], found.inboard_end)
+
+    def _period(self, run: Run) -> int:
+        return self.scene.chain[self.scene.bodies.member(run.body)[0]].period
+
+    @cached_property
+    def _first_children(self) -> dict[int, Run]:
+        """Place of a body -> the first run that hangs on it."""
+        found: dict[int, Run] = {}
+        for run in self.topology.runs:
+            found.setdefault(run.parent, run)
+        return found
 
     def _parent(self, run: Run, k: int) -> tuple[Body | None, Placement]:
         if k:
-            return self.scene.bodies[run.body + k - 1], self._placements[run.body][k - 1]
+            before = self._placements[run.body][(k - 1) % self._period(run)]
+            return self.scene.bodies[run.body + k - 1], before
         if run.parent < 0:
             return None, GROUND
         number = self.topology.at(run.parent)[0]
@@ -219,7 +273,7 @@ class BodyRecords:
         for name in ("inertia", "bias_load", "energy"):
             setattr(record, name, element.functions[name])
         if body.type == "rigid":
-            record.body_p = self.reals(placement.rigid_parameters(body, place))
+            record.body_p = self.reals(rigid_parameters(body, place))
         else:
             record.body_p = self.reals(self._user_body(body, element, place))
 

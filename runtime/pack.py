@@ -17,6 +17,7 @@ from . import prebuilt, values
 from .bodies import BodyRecords, Elements, Known, kernel_type, layout_of, user_parameters
 from .laws import pack_laws
 from .layout import Layout
+from .links import attach_runs
 from .placement import Placement
 from .product import attach
 from .records import Lookup, Records
@@ -70,15 +71,22 @@ def releasable(scene: Scene) -> list[str]:
     return names
 
 
-def pack(scene: Scene, known: Known | None = None, product_accuracy: float | None = None) -> Packed:
+def pack(
+    scene: Scene,
+    known: Known | None = None,
+    product_accuracy: float | None = None,
+    *,
+    align: bool = True,
+) -> Packed:
     """Engine arrays of a scene; `known` are elements beyond the prebuilt ones.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
-    may deviate from the Riccati sweep by that much.
+    may deviate from the Riccati sweep by that much.  Without `align` every internal frame is that of
+    the body's own hinge, whatever hangs on the body: its numbers are smooth functions of the scene's.
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    packed = _Packing(scene, known or {}).run()
+    packed = _Packing(scene, known or {}, align).run()
     if product_accuracy is not None:
         attach(packed, product_accuracy)
         resize(packed, int(packed.model.tape_slots))
@@ -88,8 +96,8 @@ def pack(scene: Scene, known: Known | None = None, product_accuracy: float | Non
 class _Packing:
     """One pass over a scene; every method fills one part of the model."""
 
-    def __init__(self, scene: Scene, known: Known) -> None:
-        self.scene, self.elements = scene, Elements(known)
+    def __init__(self, scene: Scene, known: Known, align: bool) -> None:
+        self.scene, self.elements, self.align = scene, Elements(known), align
         self.ffi, self.lib = prebuilt.module()
         self.kept: list[Any] = []
         self.topology = build(scene)
@@ -103,7 +111,7 @@ class _Packing:
         tree, scene = self.topology, self.scene
         bodies = BodyRecords(
             scene, tree, self.layout, self.elements, self.releases, self.ffi, self.lib, self.kept,
-            self._c_tape,
+            self._c_tape, self.align,
         )  # fmt: skip
         records, model.scratch = bodies.fill()
         packed = Packed(
@@ -120,6 +128,7 @@ class _Packing:
         self._loads(packed)
         self._forces(packed)
         self._tapes(packed)
+        attach_runs(packed)
         self._sizes(packed)
         packed.breaks = tuple(sorted(self._breaks()))
         return packed

@@ -2,7 +2,8 @@
 
 Users see their own body axes and ends.  Inside, a body's axes are those of its inboard hinge, with
 the hinge axis along z and the origin at its input end; a joint axis is then a coordinate axis and
-its elimination leaves exact zeros.
+its elimination leaves exact zeros.  Where the hinge moves about and along z alone, the frame is
+turned about z and moved along it to suit the next hinge (`alignment`).
 """
 
 from __future__ import annotations
@@ -31,10 +32,16 @@ KERNEL_OF = {"elastic": "free"}
 
 @dataclass(frozen=True)
 class Placement:
-    """Internal frame of a body: rotation internal -> user axes, origin in user axes (m)."""
+    """Internal frame of a body: rotation internal -> user axes, origin in user axes (m).
+
+    It is the outboard frame of the body's hinge turned by `turn` about z and moved by `height` (m)
+    along it.
+    """
 
     rotation: Matrix
     origin: Vector
+    turn: Matrix = IDENTITY
+    height: float = 0.0
 
     def point(self, position: Vector) -> Vector:
         """A point in user axes from the user's origin -> internal axes from P."""
@@ -89,16 +96,23 @@ def place(body: Body, end: str, outboard: Matrix) -> Placement:
 
 
 def connection(
-    parent: Placement, parent_body: Body | None, hinge: Hinge, inboard: Matrix
-) -> tuple[float, ...]:
-    """Rt (inboard hinge axes -> parent's internal axes, 9 numbers) and ro (3)."""
+    parent: Placement, parent_body: Body | None, hinge: Hinge, inboard: Matrix, own: Placement
+) -> tuple[Matrix, Vector]:
+    """Rt (inboard hinge axes -> parent's internal axes) and ro, as the frame `own` asks for them.
+
+    A turn about z and a shift along it of the outboard frame pass through the hinge.
+    """
     if parent_body is None:
         rotation, position = IDENTITY, hinge.position
     else:
         rotation = parent_body.end_rotation(hinge.inboard_end)
         position = parent_body.end_position(hinge.inboard_end)
     turned = parent.axes(product(product(rotation, hinge.rotation), inboard))
-    return (*turned[0], *turned[1], *turned[2], *parent.point(position))
+    point = parent.point(position)
+    if own.turn == IDENTITY and own.height == 0.0:
+        return turned, point
+    lift = apply(turned, (0.0, 0.0, own.height))
+    return product(turned, own.turn), (point[0] + lift[0], point[1] + lift[1], point[2] + lift[2])
 
 
 def rigid_parameters(body: Body, placement: Placement) -> tuple[float, ...]:

@@ -38,10 +38,11 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     moves is a place in p.  Raises SceneError for a name that the scene does not have.
     """
     marks = Marks()
-    structure, raw = structure_of(pack(_seeded(scene, names, marks), known), known)
+    structure, raw = structure_of(pack(_seeded(scene, names, marks), known, align=False), known)
     found = [marks.resolve(x) for x in raw.tolist()]
     values = np.array([value_of(x) for x in found])
-    _check(structure_of(pack(scene, known), known)[1].tolist(), values.tolist())
+    plain = pack(scene, known, align=False)  # frames that are chosen by cases have no slopes
+    _check(structure_of(plain, known)[1].tolist(), values.tolist())
     moved = np.zeros((len(found), len(names)))
     for place, dual in enumerate(found):
         if isinstance(dual, Dual):

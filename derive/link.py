@@ -1,0 +1,164 @@
+"""A rigid body behind a hinge that moves along and about z, in three kernels for the looped engine.
+
+Between the frames of such a body and of its parent lie two axial screws, both of them chosen when
+the scene is packed (modified Denavit-Hartenberg parameters): a constant one about x, and the
+hinge's own about z with its constant angle and shift.  One link is
+
+    forward    bias motion of the body and the load that it needs
+    condense   own inertia and what hangs on the body; elimination; transport to the parent
+    recover    accelerations
+
+and nothing of it but turn, d, e, G and g has to wait in memory between the passes.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from . import body as body_kernels
+from .derivation import Derivation, Equation, Quantity, tilde
+from .element import Body
+from .eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from .hinge import HingeMotion, hinge_quantities
+from .screw import OUT_E, OUT_S, Stage
+from .sweep import (
+    DELTA,
+    MOTION,
+    PARENT_DELTA,
+    PARENT_MOTION,
+    SOURCES,
+    E,
+    S,
+    _gain,
+    _part,
+    _stack,
+    _symbol,
+    unit_directions,
+)
+
+LINK = Quantity(
+    _symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"
+)
+TURN = Quantity(_symbol("turn", 2), "", "cosine and sine of the angle about z")
+SHIFT = Quantity(_symbol("d", 1), "m", "shift along z")
+BODY = Quantity(_symbol("b", 10), "", "parameters of the rigid body, body axes")
+OWN_LOAD = Quantity(_symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
+OUTER_S = Quantity(_symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
+OUTER_E = Quantity(_symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
+
+
+def _about_x() -> Stage:
+    link = LINK.symbol
+    return Stage(0, link[0, 0], link[1, 0], link[2, 0], "_x")
+
+
+def _about_z() -> Stage:
+    return Stage(2, TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT.symbol[0, 0], "_z")
+
+
+def along_z(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr] | None:
+    """Angle and shift as functions of q of a hinge that moves about and along z alone."""
+    rotation, position = motion.rotation, motion.position
+    if any(rotation[k, 2] != (k == 2) or rotation[2, k] != (k == 2) for k in range(3)):
+        return None
+    if position[0] != 0 or position[1] != 0:
+        return None
+    angles = [q for q in motion.q if rotation == sp.Matrix(sp.rot_axis3(-q))]
+    if not angles and rotation != sp.eye(3):
+        return None
+    return angles[0] if angles else sp.Integer(0), position[2]
+
+
+def forward(motion: HingeMotion, body: Body) -> Derivation:
+    """Place of the hinge, bias motion of the body, and the load that this motion needs."""
+    found = along_z(motion)
+    assert found is not None
+    angle, shift = (motion.in_arrays(sp.Matrix([value]))[0] for value in found)
+    link, rest = LINK.symbol, _symbol("motion_Q", 9)
+    between = _symbol("motion_x", 9)
+    theta = angle + link[3, 0]
+    place = sp.ImmutableDenseMatrix([sp.cos(theta), sp.sin(theta)])
+    rates = _symbol("qdot", motion.rates.rows)
+    return Derivation(
+        motion.hinge.name,
+        f"bias motion of a rigid body behind the {motion.hinge.title}",
+        (LINK, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
+        (TURN, SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
+        (
+            *_about_x().behind(PARENT_MOTION.symbol, between),
+            Equation("turn about z", TURN.symbol, place),
+            Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
+            *_about_z().behind(between, rest),
+            Equation("bias motion", MOTION.symbol, _moved(motion, rest)),
+            Equation("load", OWN_LOAD.symbol, _of_body(body_kernels.bias_load(body), "e")),
+            Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def _moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
+    """Motion of P from that of Q in P axes: the hinge's own velocity and acceleration added."""
+    w, wd, rdd = (_part(rest, n) for n in (0, 3, 6))
+    v_own, w_own = motion.in_arrays(motion.velocity), motion.in_arrays(motion.spin)
+    c = motion.in_arrays(motion.bias)
+    c_v, c_w = sp.ImmutableDenseMatrix(c[:3, :]), sp.ImmutableDenseMatrix(c[3:, :])
+    return _stack(w + w_own, wd + tilde(w) * w_own + c_w, rdd + 2 * (tilde(w) * v_own) + c_v)
+
+
+def _of_body(derivation: Derivation, name: str) -> sp.Basic:
+    """A definition of the body's, its parameters under this file's name."""
+    own = next(q for q in derivation.inputs if q.name == "p").symbol
+    matrix = sp.ImmutableDenseMatrix(derivation.definition(name))
+    return matrix.xreplace({own[i, 0]: BODY.symbol[i, 0] for i in range(int(own.rows))})
+
+
+def condense(motion: HingeMotion, body: Body) -> Derivation:
+    """S and e of the body and all behind it at the parent's origin, parent's axes."""
+    nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
+    inputs = hinge_quantities(motion.hinge)[:1]
+    elimination = eliminate(nu, subspace, inputs)
+    gain, offset = _gain(nu)
+    tau = next(q for q in elimination.inputs if q.name == "tau")
+    middle = (_symbol("S_x", 6, 6), _symbol("e_x", 6))
+    mass = _of_body(body_kernels.inertia(body), "S")
+    return Derivation(
+        motion.hinge.name,
+        f"S and e of a rigid body carried across the {motion.hinge.title}",
+        (LINK, TURN, SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
+        (gain, offset, OUT_S, OUT_E),
+        (
+            Equation(
+                "S of body and outboard part", S.symbol, mass + OUTER_S.symbol, symmetric=True
+            ),
+            Equation("e of body and outboard part", E.symbol, OWN_LOAD.symbol + OUTER_E.symbol),
+            *elimination.definitions,
+            *_about_z().carried(REDUCED_S.symbol, REDUCED_E.symbol, middle),
+            *_about_x().carried(*middle, (OUT_S.symbol, OUT_E.symbol)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def recover(motion: HingeMotion) -> Derivation:
+    """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
+    nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
+    gain, offset = _gain(nu)
+    rates = Quantity(_symbol("udot", nu), "", "accelerations of the free coordinates")
+    between, carried = _symbol("delta_x", 6), _symbol("delta_Q", 6)
+    full = with_unit_columns(gain.symbol, unit_directions(subspace))
+    return Derivation(
+        motion.hinge.name,
+        f"accelerations of a rigid body behind the {motion.hinge.title}",
+        (LINK, TURN, SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
+        (rates, DELTA),
+        (
+            *_about_x().deviation(PARENT_DELTA.symbol, between),
+            *_about_z().deviation(between, carried),
+            Equation(
+                "udot = g - G X delta_I, G H = 1", rates.symbol, offset.symbol - full * carried
+            ),
+            Equation("deviation of the body", DELTA.symbol, carried + subspace * rates.symbol),
+        ),
+        sources=SOURCES,
+    )

@@ -1,0 +1,27 @@
+/* Runs of bodies that are swept as links: a rigid body behind a hinge that moves about and along z,
+ * one kernel a pass, and between the passes no more in memory than the next pass reads. */
+#ifndef MSTMM_ENGINE_LINKS_H
+#define MSTMM_ENGINE_LINKS_H
+
+#include "engine_sweep.h"
+
+/* cdef begin */
+/* Numbers of a link in the workspace: bias motion and, over it, the deviation; load; turn; shift;
+ * then g (nu) and G (6 nu). */
+#define MSTMM_LINK_MOTION 0
+#define MSTMM_LINK_LOAD 9
+#define MSTMM_LINK_TURN 15
+#define MSTMM_LINK_SHIFT 17
+#define MSTMM_LINK_FIXED 18
+#define MSTMM_LINK_PER_SPEED 7
+
+/* Splits the bodies into runs; returns their number.  `runs` holds n_bodies entries and `numbers`
+ * one per body; links lie in the workspace from `place`; `size` receives how much they take. */
+int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **numbers, int64_t place,
+                    int64_t *size);
+/* cdef end */
+
+int mstmm_linked_forward(mstmm_state *state, real *qdot);
+int mstmm_linked_sweep(mstmm_state *state, real *udot);
+
+#endif
