@@ -72,6 +72,7 @@ def attributes(result: Result) -> dict[str, Any]:
         "format_version": FORMAT,
         "scene_sha256": scene_hash(result),
         "kernels_sha256": kernels_hash(result.model),
+        "engine": result.model.engine,
         "versions": json.dumps(versions()),
         "settings": json.dumps(settings),
         "status": "INTERRUPTED" if run.status is None else run.status.name,

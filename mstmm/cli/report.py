@@ -76,6 +76,8 @@ def to_json(result: Result, seconds: float) -> dict[str, Any]:
         "q": dict(zip(layout.q_names, result.q[last].tolist(), strict=True)) if last >= 0 else {},
         "u": dict(zip(layout.u_names, result.u[last].tolist(), strict=True)) if last >= 0 else {},
         "method": result.settings.method,
+        "engine": result.model.engine,
+        "engine_choice": result.model.engine_choice,
         "seconds": seconds,
         "statistics": None if counted is None else asdict(counted),
         "warnings": list(result.warnings),

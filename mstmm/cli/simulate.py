@@ -52,6 +52,7 @@ class Plan:
     certify: bool | None
     resume: bool
     sweep: str = "riccati"
+    engine: str = "auto"
 
     @property
     def checkpoint(self) -> Path:
@@ -116,6 +117,11 @@ def simulate(
         typer.Option("--sweep", metavar="NAME", help="riccati, or product: the plain product of "
                      "transfer matrices, for chains, guarded."),
     ] = "riccati",
+    engine: Annotated[
+        str,
+        typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled for "
+                     "this scene."),
+    ] = "auto",
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -123,7 +129,7 @@ def simulate(
         scene, t_end, method, step, rtol, atol, times,
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
-        tuple(quantity or ()), certify, resume, sweep,
+        tuple(quantity or ()), certify, resume, sweep, engine,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -179,7 +185,7 @@ def _model(plan: Plan) -> Model:
     """The compiled scene, with every quantity that was asked for in it."""
     import mstmm
 
-    model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep)
+    model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep, plan.engine)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         for name in plan.quantities:
@@ -190,7 +196,7 @@ def _model(plan: Plan) -> Model:
     return model
 
 
-def compiled(path: str, scene: Scene, sweep: str = "riccati") -> Model:
+def compiled(path: str, scene: Scene, sweep: str = "riccati", engine: str = "auto") -> Model:
     """The model of a scene file.
 
     SceneError, with the file named, also where the accelerations of the start cannot be computed:
@@ -201,7 +207,7 @@ def compiled(path: str, scene: Scene, sweep: str = "riccati") -> Model:
     import mstmm
 
     try:
-        model = mstmm.compile(scene, sweep=sweep)
+        model = mstmm.compile(scene, engine=engine, sweep=sweep)
         udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
         lines = str(error).splitlines()
@@ -296,7 +302,7 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
     from . import output, report
 
     console = output.console()
-    output.say(f"{plan.scene}: {report.sizes(result)}")
+    output.say(f"{plan.scene}: {report.sizes(result)}, {result.model.engine} engine")
     output.say(report.effort(result, seconds))
     output.say(result.message)
     if len(result.t):

@@ -61,6 +61,20 @@ def test_json_is_one_document(mstmm: Command) -> None:
     assert set(data["q"]) == {"pivot.angle"} and data["files"] == ["pendulum.nc"]
 
 
+def test_engine_is_chosen_and_named(mstmm: Command, folder: Path) -> None:
+    results = {}
+    for engine in ("looped", "fused"):
+        done = mstmm("simulate", "pendulum.toml", "--t-end", "0.5", "--engine", engine, "--json")
+        assert done.code == 0, done.err
+        results[engine] = json.loads(done.out)
+        assert results[engine]["engine"] == engine
+    angles = [results[engine]["q"]["pivot.angle"] for engine in ("looped", "fused")]
+    assert angles[0] == pytest.approx(angles[1], abs=1e-9)
+    refused = mstmm("simulate", "pendulum.toml", "--engine", "quick")
+    assert refused.code == 2
+    assert "auto, fused, looped" in refused.err
+
+
 def test_plot_of_quantities(mstmm: Command, folder: Path) -> None:
     options = ("--t-end", "0.5", "--plot", "a.png", "-q", "rod.tip.position", "-q", "energy")
     done = mstmm("simulate", "pendulum.toml", *options)
