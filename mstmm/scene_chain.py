@@ -11,7 +11,7 @@ from pydantic import BaseModel, model_validator
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .rotations import Vector
-from .scene_parts import BodyTable, HingeTable
+from .scene_parts import BodyTable, HingeTable, Orientation
 from .scene_rules import GROUND, Location, Refused, Shorthand, Table, refuse, split
 
 #: The longest chain; 1e6 bodies take some gigabytes.
@@ -38,12 +38,14 @@ class Chain(Table):
     Member k, from 0, has the body `body[k % len(body)]` on the hinge `hinge[k % len(hinge)]`.  It
     is called "rope[3]", its hinge "rope[3].hinge"; "rope[last]" is the last one.  The first hangs
     on `inboard`, every other on the `end` of the body before it (None: its only end).
+    `orientation` is that of the first hinge, in place of the one in its table (None: that one).
     """
 
     name: Annotated[str, texts.name("the chain's name")]
     count: Annotated[int, rules.whole(1, MAX_COUNT)]
     inboard: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation | None, rules.orientation()] = None
     end: Annotated[str | None, texts.name("the end on which the next body hangs")] = None
     body: Annotated[tuple[BodyTable, ...], _pattern("body")]
     hinge: Annotated[tuple[HingeTable, ...], _pattern("hinge")]

@@ -145,10 +145,13 @@ class Hinges(Members[Hinge]):
     behind = f".{HINGE}"
 
     def _make(self, chain: Chain, k: int) -> Hinge:
+        table = vars(chain.hinge_of(k))
+        if k == 0 and chain.orientation is not None:
+            table = {**table, "orientation": chain.orientation}
         return Hinge.model_construct(
             name=f"{chain.name}[{k}]{self.behind}", inboard=chain.inboard_of(k),
             outboard=f"{chain.name}[{k}]", position=chain.position if k == 0 else (0.0, 0.0, 0.0),
-            **vars(chain.hinge_of(k)),
+            **table,
         )  # fmt: skip
 
 

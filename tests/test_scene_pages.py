@@ -10,6 +10,7 @@ import mstmm
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import (
     Body,
+    Chain,
     Event,
     Friction,
     Hinge,
@@ -55,7 +56,7 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "table",
-    [Scene, Body, Hinge, Law, Friction, Limits, Load, Spring, SpringLaw, Event],
+    [Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event],
     ids=lambda t: t.__name__,
 )
 def test_every_key_is_described(table: type[Table]) -> None:

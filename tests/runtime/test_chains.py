@@ -57,9 +57,9 @@ def branched() -> Data:
         "hinge": [{"name": "hook", "type": "planar", "inboard": "rope[5].side",
                    "outboard": "weight"}],
         "chain": [
-            chain("rope", 23, "ground", position=[1, 2, 3]),
+            chain("rope", 23, "ground", position=[1, 2, 3], orientation=[0.5, -0.2, 0.1]),
             chain("side", 7, "rope[3].tip", hinge=HINGES[:3]),
-            chain("twig", 8, "side[last].tip", body=ROD),
+            chain("twig", 8, "side[last].tip", body=ROD, orientation=[0.9, 0.1, 0.3, 0]),
             chain("other", 11, "ground", hinge=[HINGES[3], HINGES[0]]),
         ],
         "load": [{"on": "rope[last].tip", "force": [0, "1 + rope[6].hinge.q + cos(t)", 0]},

@@ -62,7 +62,7 @@ def _hinge(chain: Data, k: int) -> Data:
     name = chain["name"]
     hinge = {"name": f"{name}_{k}_hinge", "outboard": f"{name}_{k}", **_pattern(chain["hinge"], k)}
     if k == 0:
-        place = {"position": chain["position"]} if "position" in chain else {}
+        place: Data = {key: chain[key] for key in ("position", "orientation") if key in chain}
         return {**hinge, "inboard": chain["inboard"], **place}
     end = chain.get("end") or next(iter(_pattern(chain["body"], k - 1)["ends"]))
     return {**hinge, "inboard": f"{name}_{k - 1}.{end}"}
