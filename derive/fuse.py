@@ -14,7 +14,14 @@ from fractions import Fraction
 from mstmm.errors import ElementError
 from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR, Port
-from mstmm.structure import BodyStructure, Entries, ExpressionStructure, Key, Structure
+from mstmm.structure import (
+    ANGLE,
+    BodyStructure,
+    Entries,
+    ExpressionStructure,
+    Key,
+    Structure,
+)
 
 from .balance import balance
 from .fused_loads import LoadPass
@@ -172,12 +179,7 @@ class _Fusion:
         ground: Nodes,
     ) -> BodyNodes:
         """Hinge motion, bias motion, own inertia and own load of a body."""
-        q, u = self.q[body.q : body.q + body.nq], self.u[body.u : body.u + body.nu]
-        hinge = self.inline.run(
-            self.kernels(body.hinge, "hinge"),
-            {"p": self.entries(body.hinge_p), "q": q, "u": u},
-            lambda condition, code: self.fail_unless(condition, HINGE, index, code),
-        )
+        hinge = self._hinge(index, body)
         s = [imposed.get((index, k), self.zero) for k in range(body.nu)]
         stages = stages_of(self, body, hinge)
         motion = self.bodies[body.parent].motion if body.parent >= 0 else ground
@@ -195,6 +197,28 @@ class _Fusion:
         return BodyNodes(
             stages, axial, hinge, s, motion, own, load["e"], own, tau, none, none, none, none
         )
+
+    def _hinge(self, index: int, body: BodyStructure) -> dict[str, Nodes]:
+        """Outputs of the hinge kernel; behind a link the constant part of its screw included."""
+
+        def run(q: Nodes) -> dict[str, Nodes]:
+            return self.inline.run(
+                self.kernels(body.hinge, "hinge"),
+                {"p": self.entries(body.hinge_p), "q": q, "u": u},
+                lambda condition, code: self.fail_unless(condition, HINGE, index, code),
+            )
+
+        q, u = self.q[body.q : body.q + body.nq], self.u[body.u : body.u + body.nu]
+        hinge = run(q)
+        if body.link:
+            angle, shift = self.entries(body.link[3:])
+            x, y, z = hinge["d"]
+            hinge["d"] = [x, y, z + shift]
+            if angle.value != 0:
+                place = ANGLE[body.hinge[1]]
+                turned = [x + angle if k == place else x for k, x in enumerate(q)]
+                hinge["R"] = run(turned)["R"]
+        return hinge
 
     @staticmethod
     def _moves(entry: float | int) -> bool:

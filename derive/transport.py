@@ -118,5 +118,11 @@ class Stage:
 
 def stages_of(fusion: Fusion, body: BodyStructure, hinge: dict[str, Nodes]) -> tuple[Stage, ...]:
     """Constant stages from the parent's frame to the inboard hinge axes, then the hinge's own."""
-    connection = Stage(fusion, fusion.entries(body.rotation), fusion.entries(body.position))
-    return connection, Stage(fusion, hinge["R"], hinge["d"])
+    if body.link:
+        cosine, sine, shift, _, _ = fusion.entries(body.link)
+        rotation, position = fusion.identity(), fusion.zeros(3)
+        rotation[4], rotation[5], rotation[7], rotation[8] = cosine, -sine, sine, cosine
+        position[0] = shift
+    else:
+        rotation, position = fusion.entries(body.rotation), fusion.entries(body.position)
+    return Stage(fusion, rotation, position), Stage(fusion, hinge["R"], hinge["d"])

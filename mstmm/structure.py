@@ -20,6 +20,10 @@ Entries = tuple[Entry, ...]
 Key = tuple[str, str]
 
 
+#: The coordinate that turns a hinge about z, of hinges that move about and along z alone.
+ANGLE = {"pin": 0, "screw": 0, "cylindrical": 1}
+
+
 @dataclass(frozen=True)
 class ExpressionStructure:
     """Expressions of the scene; their numbers are read from the kernel's input "constants"."""
@@ -33,6 +37,8 @@ class BodyStructure:
     """One body with its inboard hinge, in the engine's internal frames.
 
     rotation, position: inboard hinge axes in the parent (9, row by row) and its point Q (3).
+    link: instead of both, cosine, sine and shift of a screw about x, then the constant angle and
+    shift of the hinge's own screw about z; empty where the connection is none.
     `imposed[k]` marks a driven speed; `rotor` is the reflected inertia per speed.
     """
 
@@ -48,6 +54,7 @@ class BodyStructure:
     hinge_p: Entries
     body_p: Entries
     rotor: Entries
+    link: Entries
     imposed: tuple[int, ...]
 
 

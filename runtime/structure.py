@@ -21,6 +21,7 @@ from mstmm.ir import (
     Element as ArrayEntry,
 )
 from mstmm.structure import (
+    ANGLE,
     BodyStructure,
     Entries,
     Entry,
@@ -147,7 +148,8 @@ def _hash(reader: _Reader, element: Element) -> str:
 def _body(reader: _Reader, index: int) -> BodyStructure:
     record = reader.packed.model.bodies[index]
     hinge, body = reader.owner("hinge", record.hinge), reader.owner("inertia", record.inertia)
-    connection = reader.unpack(record.connection, 12)
+    link = _link(reader, record, hinge)
+    connection = [] if link else reader.unpack(record.connection, 12)
     count = reader.elements[body].descriptor.np
     own = reader.unpack(record.body_p, count if body[1] == "rigid" else count + _USER_FRAME)
     return BodyStructure(
@@ -155,9 +157,22 @@ def _body(reader: _Reader, index: int) -> BodyStructure:
         int(record.nu), reader.entries(connection[:9], axes=True), reader.entries(connection[9:]),
         reader.entries(reader.unpack(record.hinge_p, reader.elements[hinge].descriptor.np)),
         (*reader.entries(own[:count]), *reader.entries(own[count:], axes=True)),
-        reader.entries(reader.unpack(record.rotor, record.nu)),
+        reader.entries(reader.unpack(record.rotor, record.nu)), link,
         tuple(reader.unpack(record.imposed_mask, record.nu)),
     )  # fmt: skip
+
+
+def _link(reader: _Reader, record: Any, hinge: Key) -> Entries:
+    """Screws about x and z of a connection between axial hinges; empty if it is none.
+
+    A slide has no coordinate that could take up a constant angle about z.
+    """
+    if record.link == reader.ffi.NULL:
+        return ()
+    cosine, sine, shift, angle, height = reader.unpack(record.link, 5)
+    if hinge[1] not in ANGLE and angle != 0.0:
+        return ()
+    return (*reader.entries((cosine, sine), axes=True), *reader.entries((shift, angle, height)))
 
 
 def _law(reader: _Reader, record: Any) -> LawStructure:
