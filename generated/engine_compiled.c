@@ -92,3 +92,46 @@ void mstmm_compiled_system(mstmm_scene_run *run, mstmm_system *system)
     system->lanes = run->fused_lanes->lanes;
     system->rhs_lanes = accelerations_in_lanes;
 }
+
+/* --- trajectories side by side ---------------------------------------------------------------- */
+
+static int settle_one(void *context, double t, double *y)
+{
+    mstmm_scene_lanes *lanes = context;
+    return mstmm_scene_settle(lanes->settle, t, y);
+}
+
+static int lanes_rhs(void *context, const double *t, const double *y, double *dy, int *codes)
+{
+    const mstmm_scene_lanes *lanes = context;
+    const mstmm_fused *fused = lanes->fused;
+    const int64_t width = fused->lanes, start = fused->nq * width;
+    const real *efforts = lanes->numbers + width * fused->np;
+    return fused->accelerations_lanes(lanes->numbers, t, y, y + start, efforts, efforts, dy,
+                                      dy + start, codes);
+}
+
+static void lanes_enter(void *context, int lane, int64_t trajectory)
+{
+    const mstmm_scene_lanes *lanes = context;
+    const real *p = lanes->p + trajectory * lanes->p_stride;
+    for (int64_t i = 0; i < lanes->fused->np; i++)
+        lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
+}
+
+int64_t mstmm_lanes_numbers(const mstmm_fused *fused)
+{
+    return (int64_t)fused->lanes * (fused->np + fused->nu);
+}
+
+void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, mstmm_group *group)
+{
+    mstmm_scene_system(lanes->settle, system);
+    memset(lanes->numbers, 0, (size_t)mstmm_lanes_numbers(lanes->fused) * sizeof(real));
+    system->context = lanes;
+    if (system->accept) system->accept = settle_one;
+    system->lanes = lanes->fused->lanes;
+    system->rhs_lanes = lanes_rhs;
+    group->system = system;
+    group->enter = lanes_enter;
+}

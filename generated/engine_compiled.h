@@ -4,6 +4,7 @@
 #ifndef MSTMM_ENGINE_COMPILED_H
 #define MSTMM_ENGINE_COMPILED_H
 
+#include "engine_lanes.h"
 #include "engine_scene.h"
 
 /* cdef begin */
@@ -14,6 +15,20 @@ int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes);
  * mstmm_scene_system.  Everything given must live as long as the run. */
 void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const mstmm_fused *lanes,
                           const real *p, real *numbers);
+
+/* Trajectories of a scene without events and memory side by side, on one thread. */
+typedef struct {
+    const mstmm_fused *fused;
+    const real *p;           /* n x np, or one row for all */
+    int64_t p_stride;        /* distance of rows, 0 for one row */
+    real *numbers;           /* mstmm_lanes_numbers */
+    mstmm_scene_run *settle; /* of this thread: what it settles after every step */
+} mstmm_scene_lanes;
+
+int64_t mstmm_lanes_numbers(const mstmm_fused *fused);
+/* Fills the integrator's view, whose failure codes are the guards' own, and the group's `enter`. */
+void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
+                              mstmm_group *group);
 /* cdef end */
 
 /* Right-hand sides of a run with compiled code; called by mstmm_scene_system. */

@@ -53,7 +53,7 @@ static double factor_from(const mstmm_run *run, double error) {
   return fmin(LARGEST_FACTOR, factor);
 }
 
-static void propose(mstmm_run *run, double error) {
+void mstmm_propose(mstmm_run *run, double error) {
   double factor = fmax(SMALLEST_FACTOR, factor_from(run, error));
   if (run->count.rejected_last) factor = fmin(1.0, factor);
   const double proposal = run->real.h * factor;
@@ -61,26 +61,29 @@ static void propose(mstmm_run *run, double error) {
   run->real.error_previous = fmax(error, 1e-4);
 }
 
-/* Makes the step smaller after a failure already noted, or returns its status when it cannot be. */
-static int shrink(mstmm_run *run, double factor) {
+int mstmm_reject(mstmm_run *run, int failed, double error, int64_t worst) {
+  const double factor = failed ? AFTER_FAILURE : fmax(SMALLEST_FACTOR, factor_from(run, error));
+  if (!failed) mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, worst, run->real.t);
   run->count.rejected++;
-  run->count.rejected_last = 1;
-  run->real.h_next = run->real.h * factor;
-  if (run->fixed_step > 0.0 || run->real.h_next < smallest_step(run))
-    return (int)run->count.fail_status;
-  return 0;
+  run->count.rejected_last++;
+  run->real.h_next = run->real.h * fmin(factor, 0.95);
+  const int small = run->real.h_next < smallest_step(run);
+  const int enough = run->count.rejected_last > MOST_REJECTIONS;
+  return run->fixed_step > 0.0 || small || enough ? (int)run->count.fail_status : 0;
 }
 
-static void count_step(const mstmm_work *work, double error, double absolute) {
-  mstmm_run *run = work->run;
-  mstmm_run_count *count = &run->count;
-  count->steps++;
+void mstmm_count_step(mstmm_run *run, double error, double absolute) {
+  run->count.steps++;
   run->real.sum_local_error += absolute;
   run->real.sum_scaled_error += error;
-  if (!count->cut_short) {
-    run->real.smallest_step = fmin(run->real.smallest_step, run->real.h);
-    run->real.largest_step = fmax(run->real.largest_step, run->real.h);
-  }
+  if (run->count.cut_short) return;
+  run->real.smallest_step = fmin(run->real.smallest_step, run->real.h);
+  run->real.largest_step = fmax(run->real.largest_step, run->real.h);
+}
+
+static void watch_stability(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  mstmm_run_count *count = &run->count;
   run->real.stiffness = mstmm_stiffness(work);
   run->real.largest_stiffness = fmax(run->real.largest_stiffness, run->real.stiffness);
   if (run->real.stiffness > NEAR_LIMIT * work->tableau->stability_limit)
@@ -89,9 +92,7 @@ static void count_step(const mstmm_work *work, double error, double absolute) {
                              LARGE_PART * count->stability_limited_steps >= count->steps;
 }
 
-/* One attempt; *error < 1 on success.  0, or the status of a stage that could not be evaluated. */
-static int attempt(const mstmm_work *work, double *error, double *absolute) {
-  mstmm_run *run = work->run;
+int mstmm_aim(mstmm_run *run) {
   int is_break;
   const double stop = next_stop(run, &is_break);
   if (run->fixed_step > 0.0)
@@ -99,18 +100,31 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
   else
     aim_adaptive(run, stop, is_break);
   run->real.h = run->real.t_new - run->real.t;
+  return run->real.h > 0.0 ? 0 : mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, -1, run->real.t);
+}
+
+double mstmm_interval(const mstmm_run *run) {
+  int is_break;
+  return next_stop(run, &is_break) - run->real.t;
+}
+
+int mstmm_output_inside(const mstmm_run *run) {
+  const int64_t i = run->count.output_index;
+  return i < run->n_outputs && run->outputs[i] < run->real.t_new;
+}
+
+/* One attempt; *error < 1 on success.  0, or the status of a stage that could not be evaluated. */
+static int attempt(const mstmm_work *work, double *error, double *absolute) {
+  mstmm_run *run = work->run;
   *error = *absolute = 0.0;
-  if (!(run->real.h > 0.0))
-    return mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, -1, run->real.t);
-  int status = mstmm_stages(work);
+  int status = mstmm_aim(run);
+  if (!status) status = mstmm_stages(work);
   if (status) return status;
   if (work->tableau->n_errors) *error = mstmm_error_norm(work, absolute);
   if (isnan(*error) || isinf(*error))
     return mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_worst_component(work), run->real.t_new);
   if (run->fixed_step == 0.0 && *error >= 1.0) return 0;
-  const int64_t i = run->count.output_index;
-  const int inside = i < run->n_outputs && run->outputs[i] < run->real.t_new;
-  return inside || work->system->n_events ? mstmm_build_dense(work) : 0;
+  return mstmm_output_inside(run) || work->system->n_events ? mstmm_build_dense(work) : 0;
 }
 
 int mstmm_try_step(const mstmm_work *work) {
@@ -121,23 +135,19 @@ int mstmm_try_step(const mstmm_work *work) {
     return mstmm_note(run, MSTMM_TOO_MANY_STEPS, 0, -1, run->real.t);
   int status = mstmm_first_stage(work);
   if (status) return status;
-  if (!fixed && run->real.h_next == 0.0) {
-    int is_break;
-    const double interval = next_stop(run, &is_break) - run->real.t;
-    run->real.h_next = run->first_step > 0.0 ? run->first_step : mstmm_initial_step(work, interval);
-  }
+  if (!fixed && run->real.h_next == 0.0)
+    run->real.h_next = run->first_step > 0.0 ? run->first_step
+                                             : mstmm_initial_step(work, mstmm_interval(run));
   run->count.rejected_last = 0;
-  for (int rejections = 0;; rejections++) {
-    status = attempt(work, &error, &absolute);
-    if (!status && (fixed || error < 1.0)) break;
-    const double factor = status ? AFTER_FAILURE : fmax(SMALLEST_FACTOR, factor_from(run, error));
-    if (!status)
-      mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, mstmm_worst_component(work), run->real.t);
-    status = shrink(run, fmin(factor, 0.95));
-    if (status || rejections >= MOST_REJECTIONS) return (int)run->count.fail_status;
+  for (;;) {
+    const int failed = attempt(work, &error, &absolute) != 0;
+    if (!failed && (fixed || error < 1.0)) break;
+    status = mstmm_reject(run, failed, error, failed ? -1 : mstmm_worst_component(work));
+    if (status) return status;
   }
-  if (!fixed) propose(run, error);
-  count_step(work, error, absolute);
+  if (!fixed) mstmm_propose(run, error);
+  mstmm_count_step(run, error, absolute);
+  watch_stability(work);
   run->real.t_scan = run->real.t;
   run->count.phase = PHASE_SCAN;
   return 0;

@@ -78,7 +78,7 @@ MSTMM_INLINE int iterate(const mstmm_work *work, int nodes, int lanes) {
   double t[WIDE];
   int status = 0;
   for (int j = 0; j < WIDE; j++)
-    t[j] = mstmm_stage_time(work, tableau->c[1 + (j < nodes ? j : nodes - 1)]);
+    t[j] = mstmm_time_in(work->run, tableau->c[1 + (j < nodes ? j : nodes - 1)]);
   for (int iteration = 0; iteration < tableau->n_iterations && !status; iteration++) {
     mix_nodes(work, nodes, lanes, iteration == 0);
     status = work->system->lanes ? evaluate_lanes(work, t) : evaluate_in_turn(work, t);

@@ -21,7 +21,7 @@ MSTMM_INLINE void larger(const wide *a, const wide *b, wide *out) {
 
 /* RMS of one error vector, or the combination err5^2 / sqrt(err5^2 + 0.01 err3^2) of two (Hairer,
  * Norsett, Wanner, Solving Ordinary Differential Equations I, II.10), from sums of squares. */
-static double combined(double h, double high, double low, int64_t n, int both) {
+double mstmm_combined_error(double h, double high, double low, int64_t n, int both) {
   if (high == 0.0) return 0.0;
   if (!both) return h * sqrt(high / (double)n);
   return h * high / sqrt((high + 0.01 * low) * (double)n);
@@ -50,8 +50,8 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
     low_scaled += (b * scale) * (b * scale);
   }
   const double h = work->run->real.h;
-  *absolute = n ? combined(h, mstmm_total(&high), mstmm_total(&low), n, both) : 0.0;
-  return n ? combined(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled), n, both) : 0.0;
+  *absolute = n ? mstmm_combined_error(h, mstmm_total(&high), mstmm_total(&low), n, both) : 0.0;
+  return n ? mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled), n, both) : 0.0;
 }
 
 int64_t mstmm_worst_component(const mstmm_work *work) {
@@ -98,32 +98,42 @@ MSTMM_WIDE double mstmm_stiffness(const mstmm_work *work) {
   return below > 1e-26 ? sqrt(above / below) : 0.0;
 }
 
-static double scaled_norm(const mstmm_work *work, const double *x, const double *minus) {
-  const int64_t n = work->system->n_error;
+static double scaled_norm(const mstmm_slopes *at, const double *x, const double *minus) {
   double sum = 0.0;
-  for (int64_t i = 0; i < n; i++) {
-    const double unit = work->atol[i] + work->run->rtol * fabs(work->y[i]);
-    const double e = (x[i] - (minus ? minus[i] : 0.0)) / unit;
+  for (int64_t i = 0; i < at->n; i++) {
+    const int64_t j = i * at->stride;
+    const double unit = at->atol[i] + at->rtol * fabs(at->y[j]);
+    const double e = (x[j] - (minus ? minus[j] : 0.0)) / unit;
     sum += e * e;
   }
-  return n ? sqrt(sum / (double)n) : 0.0;
+  return at->n ? sqrt(sum / (double)at->n) : 0.0;
 }
 
 /* Hairer, Norsett, Wanner I, II.4: a step over which an explicit Euler step errs by 1 % of the
- * tolerance.  A failing trial evaluation only makes the step cautious. */
+ * tolerance. */
+double mstmm_guess_step(const mstmm_slopes *at) {
+  const double d0 = scaled_norm(at, at->y, NULL), d1 = scaled_norm(at, at->k, NULL);
+  return fmin(d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1, at->interval);
+}
+
+double mstmm_step_from(const mstmm_slopes *at, double guess, const double *f1, int error_order) {
+  const double d1 = scaled_norm(at, at->k, NULL), d2 = scaled_norm(at, f1, at->k) / guess;
+  const double largest = fmax(d1, d2), power = 1.0 / (error_order + 1);
+  const double h1 = largest <= 1e-15 ? fmax(1e-6, 1e-3 * guess) : pow(0.01 / largest, power);
+  return fmin(fmin(100.0 * guess, h1), at->interval);
+}
+
+/* A failing trial evaluation only makes the step cautious. */
 double mstmm_initial_step(const mstmm_work *work, double interval) {
-  const double d0 = scaled_norm(work, work->y, NULL), d1 = scaled_norm(work, work->k, NULL);
-  double h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
   const int64_t n = work->system->n_state;
+  const mstmm_slopes at = {.n = work->system->n_error, .stride = 1, .y = work->y, .k = work->k,
+                           .atol = work->atol, .rtol = work->run->rtol, .interval = interval};
+  const double h0 = mstmm_guess_step(&at), end = work->run->real.t + interval;
+  const double t = fmin(work->run->real.t + h0, nextafter(end, -INFINITY));
   double *f1 = work->k + work->row;
-  h0 = fmin(h0, interval);
-  const double t = fmin(work->run->real.t + h0, nextafter(work->run->real.t + interval, -INFINITY));
   for (int64_t i = 0; i < n; i++) work->y_stage[i] = work->y[i] + h0 * work->k[i];
   if (!mstmm_all_finite(n, work->y_stage) || mstmm_evaluate(work, t, work->y_stage, f1) ||
       !mstmm_all_finite(n, f1))
     return 1e-3 * h0;
-  const double d2 = scaled_norm(work, f1, work->k) / h0, largest = fmax(d1, d2);
-  const double power = 1.0 / (work->tableau->error_order + 1);
-  const double h1 = largest <= 1e-15 ? fmax(1e-6, 1e-3 * h0) : pow(0.01 / largest, power);
-  return fmin(fmin(100.0 * h0, h1), interval);
+  return mstmm_step_from(&at, h0, f1, work->tableau->error_order);
 }

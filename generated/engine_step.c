@@ -37,8 +37,7 @@ int mstmm_check_finite(const mstmm_work *work, double t, const double *x) {
 
 /* A break belongs to neither side: stages of the step that ends there see the last number before
  * it, stages of the step that starts there the first number after it. */
-double mstmm_stage_time(const mstmm_work *work, double c) {
-  const mstmm_run *run = work->run;
+double mstmm_time_in(const mstmm_run *run, double c) {
   double t = c == 1.0 ? run->real.t_new : run->real.t + c * run->real.h;
   if (run->count.lands_on_break && t >= run->real.t_new) t = nextafter(run->real.t_new, -INFINITY);
   if (run->count.at_break && t <= run->real.t) t = nextafter(run->real.t, INFINITY);
@@ -77,7 +76,7 @@ MSTMM_INLINE int explicit_stages(const mstmm_work *work, int64_t row) {
   int status = 0;
   for (int i = 1; i < tableau->n_stages && !status; i++) {
     combine(work, mstmm_stage_terms(tableau, i), row, work->y_stage);
-    status = mstmm_evaluate(work, mstmm_stage_time(work, tableau->c[i]), work->y_stage,
+    status = mstmm_evaluate(work, mstmm_time_in(work->run, tableau->c[i]), work->y_stage,
                             work->k + i * row);
   }
   return status;
@@ -93,7 +92,7 @@ MSTMM_WIDE int mstmm_stages(const mstmm_work *work) {
   if (status) return status;
   combine(work, mstmm_step_terms(tableau), row, work->y_new);
   status = mstmm_check_finite(work, work->run->real.t_new, work->y_new);
-  if (!status) status = mstmm_evaluate(work, mstmm_stage_time(work, 1.0), work->y_new, last);
+  if (!status) status = mstmm_evaluate(work, mstmm_time_in(work->run, 1.0), work->y_new, last);
   if (!status) status = mstmm_check_finite(work, work->run->real.t_new, last);
   return status;
 }
@@ -105,7 +104,7 @@ MSTMM_WIDE int mstmm_build_dense(const mstmm_work *work) {
   int status = 0;
   for (int i = 0; i < tableau->n_extra && !status; i++) {
     double *k = work->k + (tableau->n_stages + 1 + i) * row;
-    const double t = mstmm_stage_time(work, tableau->c_extra[i]);
+    const double t = mstmm_time_in(work->run, tableau->c_extra[i]);
     combine(work, mstmm_extra_terms(tableau, i), row, work->y_event);
     status = mstmm_evaluate(work, t, work->y_event, k);
     if (!status) status = mstmm_check_finite(work, t, k);

@@ -80,7 +80,8 @@ int64_t mstmm_first_not_finite(int64_t n, const double *x);
 /* Notes a failure in the run and returns its status. */
 int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time);
 
-double mstmm_stage_time(const mstmm_work *work, double c);
+/* Time of a stage with node c in the trial step. */
+double mstmm_time_in(const mstmm_run *run, double c);
 int mstmm_evaluate(const mstmm_work *work, double t, const double *y, double *dy);
 int mstmm_check_finite(const mstmm_work *work, double t, const double *x);
 /* Stages 1 .. s - 1 of an iterated method. */
@@ -94,6 +95,28 @@ double mstmm_error_norm(const mstmm_work *work, double *absolute);
 int64_t mstmm_worst_component(const mstmm_work *work);
 double mstmm_stiffness(const mstmm_work *work);
 double mstmm_initial_step(const mstmm_work *work, double interval);
+
+/* The parts of step control, which look at nothing but the run.
+ * Aim: where the trial step ends (t_new, h); 0, or a failure.  Interval: to the next stop.
+ * Reject: a shorter step after an error above 1 or a failure already noted; 0, or the status with
+ * which the run ends.  Propose: the next step, after a step with this error.  */
+int mstmm_aim(mstmm_run *run);
+double mstmm_interval(const mstmm_run *run);
+int mstmm_output_inside(const mstmm_run *run);
+int mstmm_reject(mstmm_run *run, int failed, double error, int64_t worst);
+void mstmm_propose(mstmm_run *run, double error);
+void mstmm_count_step(mstmm_run *run, double error, double absolute);
+/* First step: a guess from y and k, and the step from the slope f1 at y + guess k.  Components lie
+ * `stride` doubles apart, tolerances side by side. */
+typedef struct mstmm_slopes {
+  int64_t n, stride;
+  const double *y, *k, *atol;
+  double rtol, interval;
+} mstmm_slopes;
+double mstmm_guess_step(const mstmm_slopes *at);
+double mstmm_step_from(const mstmm_slopes *at, double guess, const double *f1, int error_order);
+/* RMS of one error vector, or the combination of two, from sums of squares of n components. */
+double mstmm_combined_error(double h, double high, double low, int64_t n, int both);
 
 /* Makes the next step, shorter and shorter until its error is small enough. */
 int mstmm_try_step(const mstmm_work *work);

@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,35 @@ class Statistics:
     stability_limited_steps: int
 
 
+@cache
+def c_tableau(ffi: Any, tableau: Tableau) -> Any:
+    """`mstmm_tableau *` of a method; it and what it points to live as long as the program."""
+    t, kept = ffi.new("mstmm_tableau *"), list[Any]()
+
+    def doubles(array: Array) -> Any:
+        kept.append(np.array(array, dtype=np.float64, order="C"))
+        return ffi.from_buffer("double[]", kept[-1])
+
+    def integers(values: Sequence[int]) -> Any:
+        kept.append(ffi.new("int[]", values or 1))
+        return kept[-1]
+
+    t.n_stages, t.n_extra, t.n_dense = tableau.n_stages, tableau.n_extra, tableau.n_dense
+    t.n_errors = (tableau.E is not None) + (tableau.E_low is not None)
+    t.error_order, t.beta = tableau.error_order, tableau.beta
+    starts, columns, weights = tableau.rows
+    t.starts, t.columns, t.weights = integers(starts), integers(columns), doubles(weights)
+    t.c, t.c_extra = doubles(tableau.C), doubles(tableau.C_extra)
+    t.stability_limit = tableau.real_stability_limit
+    t.n_nodes, t.n_iterations = tableau.iterated or (0, 0)
+    t.mix, t.is_read = doubles(tableau.mix), integers(tableau.read_blocks)
+    _tableaus_kept.append(kept)
+    return t
+
+
+_tableaus_kept: list[list[Any]] = []
+
+
 class Run:
     """One time integration, advanced in slices.
 
@@ -171,7 +201,7 @@ class Run:
         self.kept_bytes = 0  # of all samples so far
         self._run = run = ffi.new("mstmm_run *")
         run.system = system
-        run.tableau = self._tableau(tableau)
+        run.tableau = c_tableau(ffi, tableau)
         run.t_start, run.t_end, run.rtol = t_start, t_end, rtol
         run.fixed_step = 0.0 if step is None else step
         run.first_step, run.min_step, run.max_step = first_step, min_step, max_step
@@ -196,27 +226,6 @@ class Run:
         pointer = self._ffi.from_buffer("double[]", copy)
         self._kept += [copy, pointer]
         return pointer
-
-    def _integers(self, values: Sequence[int]) -> Any:
-        """`int *` to a copy that lives as long as the run."""
-        copy = self._ffi.new("int[]", [int(x) for x in values] or 1)
-        self._kept.append(copy)
-        return copy
-
-    def _tableau(self, tableau: Tableau) -> Any:
-        t = self._ffi.new("mstmm_tableau *")
-        t.n_stages, t.n_extra, t.n_dense = tableau.n_stages, tableau.n_extra, tableau.n_dense
-        t.n_errors = (tableau.E is not None) + (tableau.E_low is not None)
-        t.error_order, t.beta = tableau.error_order, tableau.beta
-        starts, columns, weights = tableau.rows
-        t.starts, t.columns = self._integers(starts), self._integers(columns)
-        t.weights = self._doubles(weights)
-        t.c, t.c_extra = self._doubles(tableau.C), self._doubles(tableau.C_extra)
-        t.stability_limit = tableau.real_stability_limit
-        t.n_nodes, t.n_iterations = tableau.iterated or (0, 0)
-        t.mix, t.is_read = self._doubles(tableau.mix), self._integers(tableau.read_blocks)
-        self._kept.append(t)
-        return t
 
     def _times(self, run: Any, output_times: ArrayLike | None, breaks: ArrayLike) -> None:
         stops = np.atleast_1d(np.asarray(breaks, dtype=np.float64))
@@ -345,17 +354,14 @@ class Run:
             components: a name per component of y.
             events: a name per event.
         """
-        c, fail = self._run.count, self.failure
-        event = _name("event", int(c.event), events)
+        fail = self.failure
         if fail is None:
+            event = _name("event", int(self._run.count.event), events)
             return {
                 Status.FINISHED: f"finished at t = {self.t:.9g} s",
                 Status.STOPPED: f"stopped by {event} at t = {self.t:.9g} s",
             }.get(self.status, f"running, t = {self.t:.9g} s")
-        component = -1 if fail.component is None else fail.component
-        what = _name("component", component, components)
-        at = f"at t = {fail.time:.9g} s"
-        return _failure_text(fail, what, event, at) + f"; last good state at t = {self.t:.9g} s"
+        return failure_text(fail, components, events) + f"; last good state at t = {self.t:.9g} s"
 
     def state(self) -> dict[str, Array | Integers]:
         """The run as plain arrays {"real", "integer"}: everything a new process needs to continue
@@ -393,8 +399,13 @@ def _name(kind: str, index: int, names: Sequence[str] | None) -> str:
     return names[index] if names is not None and 0 <= index < len(names) else f"{kind} {index}"
 
 
-def _failure_text(fail: Failure, what: str, event: str, at: str) -> str:
-    """One sentence for each failure, with a way out where there is one."""
+def failure_text(
+    fail: Failure, components: Sequence[str] | None = None, events: Sequence[str] | None = None
+) -> str:
+    """One sentence for each failure, with a way out where there is one; names as in `message`."""
+    what = _name("component", -1 if fail.component is None else fail.component, components)
+    event = _name("event", -1 if fail.event is None else fail.event, events)
+    at = f"at t = {fail.time:.9g} s"
     texts = {
         Status.STEP_TOO_SMALL: f"step too small {at}: {what} has the largest error; the motion "
         "may be singular or too stiff for an explicit method, or the tolerance too tight",

@@ -25,6 +25,7 @@ from .start import start_values
 if TYPE_CHECKING:
     from .derivatives import Derivatives, Differentiation
     from .result import Result
+    from .simulate_batch import BatchResult
 
 Array = NDArray[np.float64]
 
@@ -276,6 +277,47 @@ class Model:
             self._engine.batch("u", u, self.nu)[0],
             certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
         )  # fmt: skip
+
+    def simulate_batch(
+        self,
+        initial_states: tuple[ArrayLike, ArrayLike],
+        parameters: Mapping[str, ArrayLike] | None = None,
+        *,
+        t_end: float,
+        output_times: ArrayLike | Sequence[float] | None = None,
+        method: str = "dop853",
+        step: float | None = None,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        t_start: float = 0.0,
+        max_step: float = 0.0,
+        max_steps: int = 0,
+        threads: int | None = None,
+    ) -> BatchResult:
+        """Integrate n independent trajectories to `t_end` (s).
+
+        Args:
+            initial_states: q (n, nq) and u (n, nu); one of them may be a single row for all.
+            parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
+            output_times: times of the samples (s, increasing); otherwise `t_end` alone.
+            threads: as many as the machine has processors if not given.
+            method, step, rtol, atol, t_start, max_step, max_steps: as in `simulate`.
+
+        Trajectories run side by side in the lanes of vectors where the scene has neither events,
+        releases, twist springs nor drives, and over threads.  The numbers of one depend on no
+        other: not on the size of the batch, its neighbours or the threads, to the last bit.  A
+        trajectory that fails has `success` False, a message, and nan where it did not come.
+
+        Raises SceneError for settings, shapes or parameters that make no sense.
+        """
+        from .simulate_batch import checked, simulate_batch
+
+        times = None if output_times is None else tuple(np.ravel(output_times).tolist())
+        if not np.isfinite(t_end) or not t_end > t_start:
+            raise SceneError(f"t_end = {t_end!r}: expected a time in s, after t_start")
+        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step, max_steps)
+        settings, q, u = checked(self, settings, initial_states)
+        return simulate_batch(self, settings, q, u, parameters or {}, threads)
 
 
 __all__ = ["Model", "NumericalFailure"]

@@ -97,9 +97,12 @@ class SceneSystem:
     """`mstmm_system` of a model: events, power and memory of its own.
 
     With `compiled` the right-hand side is that code; events and settling stay with the engine.
+    Without `with_power` the work of what is not stored is not integrated.
     """
 
-    def __init__(self, engine: Engine, compiled: Compiled | None = None) -> None:
+    def __init__(
+        self, engine: Engine, compiled: Compiled | None = None, with_power: bool = True
+    ) -> None:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
         conditions, actions, self.event_names = _conditions(engine)
@@ -107,9 +110,8 @@ class SceneSystem:
         model = packed.model
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
-        run.with_power = int(
-            bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
-        )
+        works = bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
+        run.with_power = int(with_power and works)
         run.memory = engine.pointer(self.memory)
         first = np.append(packed.layout.quaternions, 0).astype(np.int32)
         run.quaternions = ffi.from_buffer("int[]", first)

@@ -21,9 +21,9 @@ from .c_library import compile_library
 
 SOURCES = (
     "engine_integrate", "engine_run", "engine_control", "engine_step", "engine_norm",
-    "engine_iterate", "engine_event",
+    "engine_iterate", "engine_event", "engine_lanes",
 )  # fmt: skip
-HEADERS = ("engine_integrate", "engine_step", "engine_wide")
+HEADERS = ("engine_integrate", "engine_step", "engine_wide", "engine_lanes")
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
 TEST_DECLARATIONS = """
 typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
@@ -79,7 +79,8 @@ class Lab:
         sources = [folder / f"{s}.c" for s in SOURCES]
         sources.append(folder / TEST_SYSTEMS.name)
         self.ffi = cffi.FFI()
-        self.ffi.cdef(cdef(folder / "engine_integrate.h") + TEST_DECLARATIONS)
+        declared = [cdef(folder / f"{h}.h") for h in ("engine_integrate", "engine_lanes")]
+        self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
         options = ("-O2", *flags)
         self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
 
