@@ -1,8 +1,8 @@
 """Many independent runs of a model: side by side in the lanes of vectors, and on several threads.
 
 Where the scene has compiled code and neither events, releases, memory nor drives, every thread
-advances as many trajectories at a time as a vector has lanes, each with its own error control.  Other
-scenes run one trajectory after the other on every thread.  Which of the two is taken depends on the
+advances as many trajectories at a time as a vector has lanes, each with its own error control.
+Other scenes run one trajectory after the other on every thread.  Which of the two is taken depends on the
 scene and the machine alone, so that the numbers of a trajectory depend neither on the size of the
 batch, nor on its neighbours, nor on the number of threads.
 """

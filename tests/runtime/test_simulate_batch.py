@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from support.integration_lab import same_bits
 
 import mstmm
@@ -41,7 +42,7 @@ def rods(*types: str, **more: Any) -> mstmm.Scene:
 def states(model: Model, n: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     """n starts around the scene's own."""
     rng = np.random.default_rng(5)
-    q, u = model.initial_state()
+    q, _ = model.initial_state()
     return q + 0.3 * rng.standard_normal((n, model.nq)), rng.standard_normal((n, model.nu))
 
 
@@ -81,6 +82,7 @@ def test_a_batch_gives_what_single_runs_give(model: Model) -> None:
         assert batch.q[i] == pytest.approx(one.q, abs=1e-9)
         assert batch.u[i] == pytest.approx(one.u, abs=1e-8)
         assert batch.messages[i] == one.message
+        assert one.statistics is not None
         assert batch.evaluations[i] == one.statistics.evaluations  # the same control of steps
 
 
@@ -91,6 +93,7 @@ def test_other_methods(pins: Model, options: dict[str, Any]) -> None:
     for i in (0, 8):
         one = pins.simulate(initial=(q[i], u[i]), **RUN | options)
         assert batch.q[i] == pytest.approx(one.q, abs=1e-10)
+        assert one.statistics is not None
         assert batch.evaluations[i] == one.statistics.evaluations
 
 
@@ -125,7 +128,7 @@ def test_parameters_by_name(engine: str) -> None:
     model = mstmm.compile(scene, engine=engine)
     masses, stiffness = np.array([0.5, 1.0, 2.0]), 7.0
     q, u = model.initial_state()
-    changes = {"rod1.mass": masses, "hinge0.law.stiffness": stiffness}
+    changes: dict[str, ArrayLike] = {"rod1.mass": masses, "hinge0.law.stiffness": stiffness}
     batch = model.simulate_batch((np.tile(q, (3, 1)), u), changes, **RUN)
     assert batch.success.all()
     for i, mass in enumerate(masses):

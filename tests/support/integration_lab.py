@@ -78,7 +78,7 @@ class Lab:
         shutil.copy(TEST_SYSTEMS, folder)
         sources = [folder / f"{s}.c" for s in SOURCES]
         sources.append(folder / TEST_SYSTEMS.name)
-        self.ffi = cffi.FFI()
+        self.ffi: Any = cffi.FFI()
         declared = [cdef(folder / f"{h}.h") for h in ("engine_integrate", "engine_lanes")]
         self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
         options = ("-O2", *flags)
