@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from mstmm.hinge_types import HINGE_TYPES
 
-from .certificate import Certificate, certificate
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
 from .execution import Watch, first_run, second_run
@@ -25,6 +24,7 @@ from .simulate import Settings, Trajectory
 from .stability import StepCheck
 
 if TYPE_CHECKING:
+    from .certificate import Certificate
     from .model import Model
 
 Array = NDArray[np.float64]
@@ -81,6 +81,8 @@ class Result:
     @cached_property
     def certificate(self) -> Certificate:
         """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
+        from .certificate import certificate
+
         return certificate(self, self._error, self._step)
 
     @property

@@ -2,7 +2,7 @@
 
 Where the scene has compiled code and neither events, releases, memory nor drives, every thread
 advances as many trajectories at a time as a vector has lanes, each with its own error control.
-Other scenes run one trajectory after the other on every thread.  Which of the two is taken depends on the
+Other scenes run one trajectory after the other on every thread.  Which way is taken depends on the
 scene and the machine alone, so that the numbers of a trajectory depend neither on the size of the
 batch, nor on its neighbours, nor on the number of threads.
 """

@@ -202,8 +202,11 @@ class Tableau:
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
         """R(z) of one step on y' = lambda y with z = h lambda: y(t + h) = R(z) y(t)."""
-        powers = np.polynomial.polynomial.polyval(np.asarray(z, complex), self.stability_polynomial)
-        return np.asarray(powers, dtype=np.complex128)
+        at = np.asarray(z, dtype=np.complex128)
+        value = np.zeros_like(at)
+        for coefficient in self.stability_polynomial[::-1]:
+            value = value * at + coefficient
+        return value
 
     @cached_property
     def real_stability_limit(self) -> float:
