@@ -155,7 +155,7 @@ def _expressions(scene: Scene) -> Iterator[Problem]:
             yield from _names(hinge.release, released, ("hinge", i, "release"))
     for i, chain in enumerate(scene.chain):
         for j, table in enumerate(chain.hinge):
-            member = Scope(hinges, bodies, own=table)
+            member = Scope(hinges, bodies, own=hinges[hinges.starts[i] + j])
             for k, effort in enumerate(table.law.effort):
                 yield from _names(effort, member, ("chain", i, "hinge", j, "law", "effort", k))
     for i, load in enumerate(scene.load):

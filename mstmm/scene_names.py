@@ -11,7 +11,7 @@ from .scene_errors import near
 
 if TYPE_CHECKING:
     from .scene_members import Bodies, Hinges
-    from .scene_parts import HingeTable
+    from .scene_parts import Hinge
 
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
 
@@ -26,7 +26,7 @@ class Scope:
 
     hinges: Hinges
     bodies: Bodies
-    own: HingeTable | None = None
+    own: Hinge | None = None
     spring: bool = False
     positions: bool = False
 
@@ -56,7 +56,7 @@ def _bare(name: Name, scope: Scope) -> str | None:
         return None if name.index is None else f"{word!r} is one number; leave out [{name.index}]"
     if word in ("q", "u"):
         if scope.own is not None:
-            return _indexed(name, scope.own, getattr(scope.own, "name", "of a chain"))
+            return _indexed(name, scope.own, scope.own.name)
         if scope.spring:
             return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
         return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
@@ -64,7 +64,7 @@ def _bare(name: Name, scope: Scope) -> str | None:
     return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
 
 
-def _indexed(name: Name, hinge: HingeTable, called: str) -> str | None:
+def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:
     """Does the hinge have this coordinate?  User types are checked with their definition."""
     kind = hinge.builtin
     if kind is None:

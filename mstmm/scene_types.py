@@ -134,10 +134,16 @@ def _indices(scene: Scene, hinge: HingeTable, spec: ElementSpec) -> Iterator[Pro
             if meant is not hinge:
                 continue
             entries = spec.coordinates if name.quantity == "q" else spec.speeds
-            message = index_problem(name, name.hinge or getattr(own, "name", "of a chain"),
-                                    len(entries))  # fmt: skip
+            message = index_problem(name, name.hinge or _called(scene, place), len(entries))
             if message is not None:
                 yield place, message
+
+
+def _called(scene: Scene, place: Location) -> str:
+    """Name of the hinge at a place: of a chain's pattern, the first member that has it."""
+    if place[0] == "chain":
+        return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
+    return scene.hinge[int(place[1])].name
 
 
 def _table(scene: Scene, name: str) -> HingeTable | None:

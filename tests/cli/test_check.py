@@ -18,6 +18,27 @@ def test_scene_is_summed_up(mstmm: Command) -> None:
     assert "rod  (pivot: pin)" in done.out
 
 
+def test_a_chain_is_one_line(mstmm: Command, folder: Path) -> None:
+    (folder / "rope.toml").write_text(
+        """
+        gravity = [0, 0, -9.81]
+        body = [{ name = "weight", mass = 2.0, inertia = [1, 1, 1] }]
+        hinge = [{ name = "hook", type = "pin", inboard = "rope[last].tip", outboard = "weight" }]
+        [[chain]]
+        name = "rope"
+        count = 1000
+        inboard = "ground"
+        body = { mass = 0.1, inertia = [1, 1, 1], ends = { tip = [0.1, 0, 0] } }
+        hinge = { type = "ball" }
+        """
+    )
+    done = mstmm("check", "rope.toml")
+    assert "1001 bodies, 1001 hinges, 4001 coordinates, 3001 speeds" in done.out
+    assert "    rope[0] to rope[999]  (ball)\n" in done.out and "weight  (hook: pin)" in done.out
+    done = mstmm("simulate", "rope.toml", "--t-end", "0.001", "--no-certify")
+    assert done.code == 0 and "1001 bodies on 1001 hinges, 3001 degrees of freedom" in done.out
+
+
 def test_echo_loads_back_to_the_same_scene(mstmm: Command, folder: Path) -> None:
     done = mstmm("check", "pendulum.toml", "--echo")
     (folder / "echo.toml").write_text(done.out)

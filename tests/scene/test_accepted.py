@@ -231,11 +231,23 @@ def everything() -> dict[str, Any]:
         hinge("h6", type="elastic", inboard="b4.tip", outboard="wheel",
               law={"stiffness": [1, 1, 1, 2, 2, 2], "rest": [0.1, 0, 0, 0, 0, 0]}),
     ]  # fmt: skip
+    link = {key: value for key, value in bodies[0].items() if key != "name"}
     return {
         "gravity": [0, 0, -9.81],
         "body": bodies,
         "hinge": joints,
-        "load": [{"on": "b1", "moment": ["h1.q[2]", 0, "where(t < 1, 1, 0)"], "axes": "b2"}],
+        "chain": [
+            {"name": "rope", "count": 9, "inboard": "b5.mid", "end": "tip",
+             "body": [link, {"type": "flywheel", "ends": {"tip": [1, 1, 1]}}],
+             "hinge": [{"type": "ball", "initial": {"q": [2, 0, 0, 0]}},
+                       {"type": "planar", "normal": [1, 0, 0]},
+                       {"type": "knee", "parameters": {"radius": 2.0}}]},
+            {"name": "whip", "count": 3, "inboard": "rope[last]", "orientation": [0, 1, 0],
+             "body": {"mass": 1.0, "ends": {"end": [1, 0, 0]}},
+             "hinge": {"type": "pin", "law": {"effort": "q*rope[2].hinge.u[1]"}}},
+        ],
+        "load": [{"on": "whip[last].end", "axes": "rope[2]"},
+                 {"on": "b1", "moment": ["h1.q[2]", 0, "where(t < 1, 1, 0)"], "axes": "b2"}],
         "event": [{"when": "b1.mid.vz >= h5.q[0]", "do": "release", "hinge": "h4"}],
         "spring": [{"from": "ground", "to": "b5", "position": [1, 2, 3], "law": {"effort": "q*u"}},
                    {"from": "b0", "to": "b5.tip", "type": "rope", "parameters": {"length": 2}}],

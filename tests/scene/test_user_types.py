@@ -90,6 +90,45 @@ def test_what_does_not_fit_the_definition(data: dict[str, Any], fragment: str) -
     assert str(caught.value).startswith("arm.toml: ")
 
 
+def roped(**changes: Any) -> dict[str, Any]:
+    """A chain whose second body and hinge are of users' types."""
+    own = {"type": "knee", "parameters": {"radius": 0.1}} | changes
+    flywheel = {"type": "flywheel", "parameters": {"spin": 5}, "ends": {"tip": [1, 0, 0]}}
+    link = {"mass": 1.0, "inertia": [1, 1, 1], "ends": {"tip": [1, 0, 0]}}
+    rope = {"name": "rope", "count": 6, "inboard": "ground", "body": [link, flywheel],
+            "hinge": [{"type": "pin"}, own]}  # fmt: skip
+    return {"gravity": [0, 0, 0], "chain": [rope]}
+
+
+def test_user_types_in_chains() -> None:
+    Scene(**roped(law={"effort": ["q[1]", "radius"]})).check_types(KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("data", "fragment"),
+    [
+        (roped(parameters={}), 'chain "rope": hinge[1].parameters.radius: missing; expected a num'),
+        (roped(type="kne"), 'chain "rope": hinge[1].type: there is no hinge type "kne"; did you'),
+        (roped(initial={"q": [1]}), "hinge[1].initial.q: knee has 2 entries here, found 1"),
+        (roped(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "rope[1].hinge" is [1]'),
+        (
+            roped() | {"event": [{"when": "rope[3].hinge.u[2] > 1", "do": "stop"}]},
+            "'rope[3].hinge.u[2]': the last entry of hinge \"rope[3].hinge\" is [1]",
+        ),
+        (
+            roped(law={"effort": ["rope[5].hinge.q", 0]}),
+            "write rope[5].hinge.q[0] to rope[5].hinge.q[1]",
+        ),
+    ],
+)
+def test_what_does_not_fit_in_a_chain(data: dict[str, Any], fragment: str) -> None:
+    scene = Scene(**data)
+    with pytest.raises(SceneError) as caught:
+        scene.check_types(KNOWN, "rope.toml")
+    assert fragment in str(caught.value)
+    Scene(**roped()).check_types(KNOWN)
+
+
 def test_check_against_looks_at_its_own_type_only() -> None:
     scene = Scene(**knee(initial={"q": [1]}))
     scene.check_against(FLYWHEEL)
