@@ -18,7 +18,7 @@ from mstmm.fused_abi import ABI, DECLARATIONS, FLAGS, SYMBOL
 from mstmm.ir import Assign, Guard, KernelIR
 
 from .c_text import string
-from .fused_sincos import Angle, gather, plain
+from .fused_sincos import Angle, gather
 from .straight_c import LANES, NUMBERS, Dialect, StraightText, port_name, signature
 
 __all__ = ["ABI", "FLAGS", "function_text", "fused_sources", "support"]
@@ -87,15 +87,15 @@ def support(name: str) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def function_text(kernel: KernelIR, name: str, dialect: Dialect, gathered: bool = True) -> str:
+def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
     """C function `name` of a straight-line kernel; returns 0 or the code of the first failed guard.
 
     Guards are judged in the end: nothing depends on them, and a branch would only stand in the way
     of what comes behind it.  In lanes there is one more argument, `int *codes`, and the result is
-    non-zero if any lane failed.  `gathered` computes sines together by the inlined polynomials.
+    non-zero if any lane failed.
     """
     text = StraightText(kernel, dialect)
-    ordered = gather(kernel.statements) if gathered else plain(kernel.statements)
+    ordered = gather(kernel.statements)
     lines = [f"(void){port_name(port.name)};" for port in (*kernel.inputs, *kernel.outputs)]
     guards: list[tuple[str, int]] = []
     angles = _lanes_angles if dialect.vector else _four_angles

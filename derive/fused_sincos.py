@@ -65,11 +65,6 @@ def gather(statements: Sequence[Statement]) -> Ordered:
     return _placed(levels, statements, needed)
 
 
-def plain(statements: Sequence[Statement]) -> Ordered:
-    """The statements as they are, sines by the C library."""
-    return Ordered((), tuple(s for s in statements if isinstance(s, (Assign, Store, Guard))))
-
-
 def _depth(operand: Operand, depth: dict[int, int]) -> int:
     return depth[operand.number] if isinstance(operand, Temporary) else 0
 

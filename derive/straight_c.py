@@ -9,10 +9,8 @@ name of the text.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
-from fractions import Fraction
 
 from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
 
@@ -25,46 +23,19 @@ _LOGIC = {"and": "&", "or": "|"}
 
 @dataclass(frozen=True)
 class Dialect:
-    """How C spells values: types in registers and arrays, truths, prefix of functions, literals."""
+    """How C spells values: their types in registers and in arrays, truths, prefix of functions."""
 
     real: str
     array: str
     truth: str
     prefix: str
     vector: bool = False
-    literals: str = "double"
 
 
 #: One number at a time, of the type `real` of the text around it.
 NUMBERS = Dialect("real", "real", "int", "real_")
 #: `lanes` numbers side by side.
 LANES = Dialect("lanes_t", "lanes_array_t", "mask_t", "lanes_", vector=True)
-
-
-def _float_literal(text: str) -> str:
-    if text == "pi":
-        return "MSTMM_PI"
-    return f"(MSTMM_LITERAL({Constant(text).number!r}))"
-
-
-def _quad_literal(text: str) -> str:
-    """Exact where the type holds it, else a quotient of whole numbers or 45 digits."""
-    if text == "pi":
-        return "MSTMM_PI"
-    value = Fraction(text)
-    top, bottom = value.numerator, value.denominator
-    if max(abs(top), bottom) < 2**113:
-        return f"(MSTMM_LITERAL({top}.0) / MSTMM_LITERAL({bottom}.0))"
-    with localcontext() as context:
-        context.prec = 45
-        digits = str(Decimal(top) / Decimal(bottom))
-    return f"(MSTMM_LITERAL({digits if '.' in digits or 'E' in digits else digits + '.0'}))"
-
-
-#: Scalar type -> how C writes a constant of the IR.
-_LITERALS: dict[str, Callable[[str], str]] = {
-    "double": literal, "float": _float_literal, "quad": _quad_literal,
-}  # fmt: skip
 
 
 def port_name(name: str) -> str:
@@ -119,7 +90,7 @@ class StraightText:
     def word(self, operand: Operand) -> str:
         """An operand beside an arithmetic sign: a literal, an entry of a port or a temporary."""
         if isinstance(operand, Constant):
-            return _LITERALS[self.dialect.literals](operand.text)
+            return literal(operand.text)
         if isinstance(operand, Temporary):
             return f"t{operand.number}"
         return f"{port_name(operand.port)}[{self.ports[operand.port].offset(operand.index)}]"

@@ -7,22 +7,23 @@ from __future__ import annotations
 
 from hashlib import sha256
 
-from .derive.scalar_c import scalar_source
+from .derive.scalar_c import library_source
 from .ir import KernelIR
 from .runtime.cache import Recipe, opened
 from .runtime.scalar_kernel import ScalarKernel
-from .scalars import FLAGS, SCALARS, SYMBOL
+from .scalars import FLAGS, NEEDS, SCALARS, SYMBOL
 
 
 def compile_kernel(kernel: KernelIR, scalar: str = "double") -> ScalarKernel:
-    """A straight-line kernel in "float", "double" or "quad" (IEEE binary128) precision.
+    """A straight-line kernel in "float", "double" or "quadruple" (IEEE binary128) precision.
 
     Raises ValueError for another scalar type or a kernel of run-time size, EnvironmentFailure if
     there is no compiler or it does not have the type.
     """
     if scalar not in SCALARS:
         raise ValueError(f"scalar type {scalar!r}: there are {', '.join(SCALARS)}")
-    text = scalar_source(kernel, scalar)
+    text = library_source(kernel, scalar)
     identity = {"text": sha256(text.encode()).hexdigest(), "scalar": scalar}
-    recipe = Recipe("kernel", identity, lambda key: {"kernel.c": text}, FLAGS, (SYMBOL,))
+    flags = (*FLAGS, *NEEDS.get(scalar, ()))
+    recipe = Recipe("kernel", identity, lambda key: {"kernel.c": text}, flags, (SYMBOL,))
     return opened(recipe, lambda path, key: ScalarKernel(kernel, scalar, path))[0]

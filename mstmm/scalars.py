@@ -18,7 +18,7 @@ SCALARS = {
     "float": Scalar("float32", 1, 2.0**-24),
     "double": Scalar("float64", 1, 2.0**-53),
     #: IEEE binary128; values travel as sums of two doubles, which keep 107 of its 113 bits.
-    "quad": Scalar("float64", 2, 2.0**-106),
+    "quadruple": Scalar("float64", 2, 2.0**-106),
 }
 
 #: The function that a library of one kernel exports.
@@ -26,3 +26,6 @@ SYMBOL = "mstmm_scalar_call"
 
 #: Flags of the compiler.  No contraction: every operation of the IR is rounded.
 FLAGS = ("-O2", "-std=gnu17", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+
+#: Flags that a scalar type needs besides.
+NEEDS = {"quadruple": ("-Wl,--no-as-needed,-lquadmath",)}

@@ -22,7 +22,8 @@ Codes = NDArray[np.int32]
 def open_library(path: Path, key: str) -> FusedLibrary:
     """Open a library that was built under `key`.
 
-    Raises EnvironmentFailure if the file cannot be loaded (missing, cut short, made for another
+    The cache has compared its checksum before: loaders crash on files that were cut short.  Raises
+    EnvironmentFailure if the file cannot be loaded (missing, no library, made for another
     machine), is no fused library, has another ABI number, or carries another key; then it is
     closed again.
     """
