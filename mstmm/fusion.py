@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import columns_abi
 from .errors import ElementError, EnvironmentFailure
 from .fused_abi import ABI, FLAGS, TUNING
 from .ir import KernelIR, from_json
 from .runtime.cache import Built, Recipe, find, opened
+from .runtime.columns import ColumnsLibrary, open_columns
 from .runtime.fused import FusedLibrary, open_library
 from .runtime.structure import structure_of
 from .spec import ElementSpec
@@ -38,10 +40,13 @@ _SAVED_PER_BODY = 1e-7
 
 #: What decides the text besides structure and kernels: the modules that print it.
 PRINTERS = {
-    "mstmm": ("fused_abi.py", "graph.py", "ir.py", "structure.py", "abi.py"),
+    "mstmm": (
+        "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "ir.py", "structure.py",
+        "tangent.py",
+    ),
     "mstmm.derive": (
-        "balance.py", "c_text.py", "fuse.py", "fused_c.py", "fused_loads.py", "fused_sincos.py",
-        "inline.py", "straight_c.py", "transport.py",
+        "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fused_c.py", "fused_loads.py",
+        "fused_sincos.py", "inline.py", "straight_c.py", "transport.py",
     ),
 }  # fmt: skip
 
@@ -153,6 +158,34 @@ class Fusion:
         from .derive.fused_c import fused_sources
 
         return fused_sources(self.fused(self.structure), key, part)
+
+    def columns(
+        self,
+        structure: Structure,
+        kernels: Callable[[], Sequence[KernelIR]],
+        what: str,
+        build: bool,
+    ) -> ColumnsLibrary | None:
+        """The library of tangent kernels (`what` names them) of a structure; None if there is none.
+
+        Without `build` it is only looked for.  Raises EnvironmentFailure if it cannot be built.
+        """
+        if self.obstacle:
+            return None
+
+        def sources(key: str) -> dict[str, str]:
+            from .derive.columns_c import columns_sources
+
+            return columns_sources(kernels(), key)
+
+        identity = {
+            "structure": structure.identity(), "part": f"columns {what}",
+            "abi": str(columns_abi.ABI), "printers": _printers_hash(), "kernels": _manifest_hash(),
+        }  # fmt: skip
+        recipe = Recipe("columns", identity, sources, FLAGS, (columns_abi.SYMBOL,), TUNING)
+        if not build and find(recipe) is None:
+            return None
+        return opened(recipe, open_columns)[0]
 
     def fused(self, structure: Structure) -> Fused:
         """The IR of a structure whose elements this scene has; no compiler, no cache."""

@@ -8,7 +8,6 @@ the quaternion of a ball or free hinge it is the rotation vector in outboard axe
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -17,13 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.ir import Constant, KernelIR, Store
-from mstmm.tangent import PREFIX, tangent
+from mstmm.hinge_types import HINGE_TYPES
 
 from .pack import pack
 from .seeded import slopes
 from .structure import structure_of
-from .tape_kernel import TapeKernel
+from .tangents import Tangents
 
 if TYPE_CHECKING:
     from .model import Model
@@ -62,7 +60,7 @@ class Derivatives:
 
 
 class Differentiation:
-    """Tangent kernels of one model with one set of parameters, made when they are asked for."""
+    """Derivatives of one model with one set of parameters; kernels are made when asked for."""
 
     def __init__(self, model: Model, names: Sequence[str]) -> None:
         self._model = model
@@ -70,82 +68,70 @@ class Differentiation:
         known = model.known or {}
         _refuse(model)
         if names:
-            self.structure, self.p, self.slopes = slopes(model.scene, known, names)
+            structure, self.p, self.slopes = slopes(model.scene, known, names)
         else:
-            self.structure, self.p = structure_of(pack(model.scene, known), known)
+            structure, self.p = structure_of(pack(model.scene, known), known)
             self.slopes = np.zeros((len(self.p), 0))
-        self._kernel = model.fusion.fused(self.structure).kernels["accelerations"]
-        self._tapes: dict[tuple[str, str], TapeKernel | None] = {}
-        self._lock = threading.Lock()
+        self.tangents = Tangents(model.fusion, structure, bool(names))
+        self._memory = np.zeros(structure.n_memory)
+        kinds = [HINGE_TYPES.get(hinge.type) for hinge in model.layout.hinges.values()]
+        self._straight = all(kind is not None and kind.quaternion is None for kind in kinds)
 
-    def _tape(self, port: str, output: str) -> TapeKernel | None:
-        """The derivative of `output` along directions of `port`; None where it is zero."""
-        if (port, output) not in self._tapes:
-            kernel = tangent(self._kernel, [port], [output], values=False, guards=False)
-            self._tapes[port, output] = None if _vanishes(kernel) else TapeKernel(kernel)
-        return self._tapes[port, output]
-
-    def _columns(
-        self, port: str, output: str, state: Mapping[str, Array], directions: Array
-    ) -> Array:
-        """Derivatives of `output` along each column of `directions`, side by side."""
-        tape = self._tape(port, output)
-        length = self._model.nq if output == "qdot" else self._model.nu
-        found = np.zeros((length, directions.shape[1]))
-        if tape is None:
-            return found
-        for k in range(directions.shape[1]):
-            _, outputs = tape.run({**state, PREFIX + port: directions[:, k]})
-            found[:, k] = outputs[PREFIX + output][:length]
+    def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
+        """Derivatives of n states, t (n, 1), q (n, nq), u and efforts (n, nu), by the names of
+        `Derivatives`; (n, row, column), parameters as columns."""
+        nu = self._model.nu
+        states = {
+            "p": self.p[None], "t": t, "q": q, "u": u, "memory": self._memory[None],
+            "efforts": efforts,
+        }  # fmt: skip
+        self.tangents.expect(len(q) * (4 * nu + 1 + len(self.names)))
+        units, columns = np.eye(nu)[None], self.tangents.columns
+        # qdot = N(q) u, so the columns of N are its derivatives with respect to u.
+        increments = columns("u", "qdot", states, units)
+        rows = {
+            "q": columns("q", "udot", states, increments),
+            "u": columns("u", "udot", states, units),
+            "efforts": columns("efforts", "udot", states, units),
+            "t": columns("t", "udot", states, np.ones((1, 1, 1))),
+        }
+        if self.names:
+            rows["parameters"] = columns("p", "udot", states, self.slopes.T[None])
+        found = {name: np.swapaxes(array, 1, 2) for name, array in rows.items()}
+        self._refuse_infinite(found, t)
+        found["rate_q"], found["rate_u"] = self._rates(states, increments)
         return found
 
-    def at(self, t: float, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
-        """Derivatives of one state, by the names of `Derivatives`, parameters as columns."""
-        with self._lock:
-            found = self._at(t, q, u, efforts)
+    def _refuse_infinite(self, found: Mapping[str, Array], t: Array) -> None:
         for name, array in found.items():
             if not np.isfinite(array).all():
-                row = int(np.nonzero(~np.isfinite(array))[0][0])
+                state, row, _ = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
                 raise NumericalFailure(
                     f"the derivative of {self._model.layout.u_names[row]}'s acceleration with "
-                    f"respect to {name} is not finite at t = {t:.9g} s"
+                    f"respect to {name} is not finite at t = {t[state, 0]:.9g} s"
                 )
-        return found
 
-    def _at(self, t: float, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
-        one = np.eye(self._model.nu)
-        state = {"p": self.p, "t": np.array([t]), "q": q, "u": u, "efforts": efforts}
-        # qdot = N(q) u, so the columns of N are its derivatives with respect to u.
-        increments = self._columns("u", "qdot", state, one)
-        found = {
-            "q": self._columns("q", "udot", state, increments),
-            "u": self._columns("u", "udot", state, one),
-            "efforts": self._columns("efforts", "udot", state, one),
-            "t": self._columns("t", "udot", state, np.ones((1, 1)))[:, 0],
-            "parameters": self._columns("p", "udot", state, self.slopes),
-        }
-        found["rate_q"], found["rate_u"] = self._rates(state, increments, u)
-        return found
-
-    def _rates(self, state: Mapping[str, Array], n: Array, u: Array) -> tuple[Array, Array]:
+    def _rates(self, states: Mapping[str, Array], n: Array) -> tuple[Array, Array]:
         """Derivatives of dphi' where q = q(t) + N dphi: N dphi' = (d qdot/dq N - N') dphi + N du.
 
-        Column j of N' is the derivative of qdot(q, u = e_j) along the motion.
+        `n` holds the columns of N as rows, (states, nu, nq).  Column j of N' is the derivative of
+        qdot(q, u = e_j) along the motion.
         """
-        rate_q, rate_u = np.zeros_like(n.T @ n), np.zeros_like(n.T @ n)
-        if not n.size:
-            return rate_q, rate_u
-        moved = self._columns("q", "qdot", state, n)
-        motion = (n @ u)[:, None]
-        turned = [
-            self._columns("q", "qdot", {**state, "u": unit}, motion) for unit in np.eye(len(u))
-        ]
-        bend = moved - np.hstack(turned)
+        count, nu = n.shape[:2]
+        rate_q, rate_u = np.zeros((count, nu, nu)), np.zeros((count, nu, nu))
+        if self._straight:  # N is 1, and 0 where a drive decides
+            return rate_q, n @ np.swapaxes(n, 1, 2)
+        columns = self.tangents.columns
+        bend = columns("q", "qdot", states, n)
+        motion = np.ascontiguousarray(states["u"][:, None] @ n)
+        for j, unit in enumerate(np.eye(nu)):
+            bend[:, j] -= columns("q", "qdot", {**states, "u": unit[None]}, motion)[:, 0]
+        n, bend = np.swapaxes(n, 1, 2), np.swapaxes(bend, 1, 2)
         for hinge in self._model.layout.hinges.values():
-            rows, columns = hinge.q_slice, hinge.u_slice
-            back = np.linalg.pinv(n[rows, columns])
-            rate_q[columns, columns] = back @ bend[rows, columns]
-            rate_u[columns, columns] = back @ n[rows, columns]
+            rows, own = hinge.q_slice, hinge.u_slice
+            back = np.linalg.pinv(n[:, rows, own])
+            rate_q[:, own, own] = back @ bend[:, rows, own]
+            rate_u[:, own, own] = back @ n[:, rows, own]
         return rate_q, rate_u
 
 
@@ -165,12 +151,6 @@ def _refuse(model: Model) -> None:
         )
 
 
-def _vanishes(kernel: KernelIR) -> bool:
-    """Whether everything that the kernel stores is the constant zero."""
-    stores = [s for s in kernel.statements if isinstance(s, Store)]
-    return all(s.value == Constant("0") for s in stores)
-
-
 def derivatives(
     model: Model,
     differentiation: Differentiation,
@@ -179,7 +159,7 @@ def derivatives(
     t: ArrayLike,
     efforts: ArrayLike | None,
 ) -> Derivatives:
-    """`Model.derivatives` of all states of a batch, one after the other."""
+    """`Model.derivatives` of all states of a batch."""
     lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
     engine, nu = model._engine, model.nu
     given = np.zeros(nu) if efforts is None else efforts
@@ -188,16 +168,16 @@ def derivatives(
     extra = engine.batch("efforts", given, nu, lead)
     times = np.broadcast_to(np.asarray(t, dtype=np.float64), lead).reshape(-1)
     udot = model.accelerations(q, u, t, efforts)  # refuses states that have no accelerations
-    states = zip(times, coordinates, speeds, extra, strict=True)
-    found = [differentiation.at(float(time), *state) for time, *state in states]
+    found = differentiation.at(times[:, None].copy(), coordinates, speeds, extra)
 
-    def batch(name: str, *shape: int) -> Array:
-        return np.array([one[name] for one in found]).reshape(*lead, *shape)
+    def shaped(name: str, *shape: int) -> Array:
+        return found[name].reshape(*lead, *shape)
 
-    columns = batch("parameters", nu, len(differentiation.names))
+    names = differentiation.names
+    columns = shaped("parameters", nu, len(names)) if names else np.zeros((*lead, nu, 0))
     return Derivatives(
         udot=udot,
-        t=batch("t", nu),
-        parameters={name: columns[..., k] for k, name in enumerate(differentiation.names)},
-        **{name: batch(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
+        t=shaped("t", nu),
+        parameters={name: columns[..., k] for k, name in enumerate(names)},
+        **{name: shaped(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from .columns import ColumnsLibrary
     from .fused import FusedLibrary
 
 Array = NDArray[np.float64]
@@ -35,6 +37,9 @@ class Fusing(Protocol):
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
+    def columns(
+        self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
+    ) -> ColumnsLibrary | None: ...
 
 
 @dataclass
@@ -66,3 +71,6 @@ class NotFused:
 
     def fused(self, structure: Any) -> Any:
         return self.build()
+
+    def columns(self, structure: Any, kernels: Callable[[], Any], what: str, build: bool) -> None:
+        return None
