@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from mstmm.errors import EnvironmentFailure
+
 from .simulate import Compiled
 from .steppers import get
 
@@ -37,7 +39,15 @@ def at_once(model: Model, settings: Settings, recorded: str | None) -> Compiled 
     """
     if recorded == LOOPED:
         return None
-    library = model.fusion.build() if recorded == FUSED else model.fusion.library
+    library = model.fusion.library
+    if library is None and recorded == FUSED:
+        try:
+            library = model.fusion.build()
+        except EnvironmentFailure as error:
+            raise EnvironmentFailure(
+                f"the run began on compiled code, which cannot be had now ({error}); "
+                "run without resume to start again"
+            ) from None
     return None if library is None else _compiled(model, settings, library, math.inf)
 
 
