@@ -31,10 +31,20 @@ Number = int | float | Fraction
 _COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
 
 
+#: What folding asks of a constant, answered once: comparing fractions is slow.
+_ZERO, _ONE, _MINUS_ONE, _POSITIVE, _NEGATIVE = 1, 2, 3, 4, 5
+
+
+def _kind(value: Fraction) -> int:
+    if value.denominator == 1 and -1 <= value.numerator <= 1:
+        return (_ZERO, _ONE, _MINUS_ONE)[value.numerator]
+    return _POSITIVE if value.numerator > 0 else _NEGATIVE
+
+
 class Node:
     """One value of a `Graph`.  Made by the graph's methods and by + - * / ** on other nodes."""
 
-    __slots__ = ("args", "graph", "leaf", "looped", "number", "op", "value")
+    __slots__ = ("args", "graph", "kind", "leaf", "looped", "number", "op", "value")
 
     def __init__(
         self,
@@ -49,6 +59,7 @@ class Node:
         self.leaf, self.looped = leaf, looped
         #: The exact number if this node is a rational constant, else None.
         self.value: Fraction | None = leaf if isinstance(leaf, Fraction) else None
+        self.kind = 0 if self.value is None else _kind(self.value)
 
     def __add__(self, other: Node | Number) -> Node:
         return self.graph.add(self, self.graph.node(other))
@@ -148,7 +159,7 @@ class Graph:
 
     def neg(self, a: Node) -> Node:
         if a.value is not None:
-            return self.constant(-a.value)
+            return a if a.kind == _ZERO else self.constant(-a.value)
         if a.op == "neg":
             return a.args[0]
         if a.op == "sub":
@@ -156,12 +167,13 @@ class Graph:
         return self._make("neg", (a,))
 
     def add(self, a: Node, b: Node) -> Node:
-        if a.value is not None and b.value is not None:
-            return self.constant(a.value + b.value)
-        if a.value == 0:
-            return b
-        if b.value == 0:
-            return a
+        if a.kind or b.kind:
+            if a.kind == _ZERO:
+                return b
+            if b.kind == _ZERO:
+                return a
+            if a.value is not None and b.value is not None:
+                return self.constant(a.value + b.value)
         if b.op == "neg":
             return self.sub(a, b.args[0])
         if a.op == "neg":
@@ -169,12 +181,13 @@ class Graph:
         return self._ordered("add", a, b)
 
     def sub(self, a: Node, b: Node) -> Node:
-        if a.value is not None and b.value is not None:
-            return self.constant(a.value - b.value)
-        if b.value == 0:
-            return a
-        if a.value == 0:
-            return self.neg(b)
+        if a.kind or b.kind:
+            if b.kind == _ZERO:
+                return a
+            if a.kind == _ZERO:
+                return self.neg(b)
+            if a.value is not None and b.value is not None:
+                return self.constant(a.value - b.value)
         if a is b:
             return self.constant(0)
         if b.op == "neg":
@@ -191,20 +204,29 @@ class Graph:
         return self._make("neg", (a,))
 
     def mul(self, a: Node, b: Node) -> Node:
-        if a.value is not None and b.value is not None:
-            return self.constant(a.value * b.value)
-        for one, other in ((a, b), (b, a)):
-            if one.value == 0:
-                return self.constant(0)
-            if one.value == 1:
-                return other
-            if one.value == -1:
-                return self.neg(other)
-            if one.op == "neg":
-                return self.neg(self.mul(one.args[0], other))
-            if one.value is not None and one.value < 0:
-                return self.neg(self.mul(self.constant(-one.value), other))
+        if a.kind or b.kind:
+            folded = self._scaled(a, b) if a.kind else self._scaled(b, a)
+            if folded is not None:
+                return folded
+        if a.op == "neg":
+            return self.neg(self.mul(a.args[0], b))
+        if b.op == "neg":
+            return self.neg(self.mul(b.args[0], a))
         return self._ordered("mul", a, b)
+
+    def _scaled(self, number: Node, other: Node) -> Node | None:
+        """Product with a constant, folded; None where nothing folds."""
+        if number.kind == _ZERO or other.kind == _ZERO:
+            return self.constant(0)
+        if number.value is not None and other.value is not None:
+            return self.constant(number.value * other.value)
+        if number.kind == _ONE:
+            return other
+        if number.kind == _MINUS_ONE:
+            return self.neg(other)
+        if number.kind == _NEGATIVE and number.value is not None:
+            return self.neg(self.mul(self.constant(-number.value), other))
+        return None
 
     def div(self, a: Node, b: Node) -> Node:
         if b.value is not None and b.value != 0:
