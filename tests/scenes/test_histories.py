@@ -34,7 +34,9 @@ def load(name: str) -> dict[str, Any]:
 
 
 def test_every_example_is_compared() -> None:
-    assert {path.parent.name for path in EXAMPLES.glob("*/scene.toml")} == set(SPANS)
+    # A chain is compared with the same scene written out in tests/scene.
+    names = {path.parent.name for path in EXAMPLES.glob("*/scene.toml")}
+    assert {name for name in names if "chain" not in load(name)} == set(SPANS)
 
 
 @pytest.mark.parametrize("name", SPANS)
