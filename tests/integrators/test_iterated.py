@@ -79,7 +79,7 @@ def test_another_number_of_lanes_is_another_run(lab: Lab) -> None:
         run(4).restore(first.state())
 
 
-def test_dense_output_of_the_last_stages_alone_is_smooth_and_exact_to_tenth_order() -> None:
+def test_dense_output_integrates_polynomials_in_time_exactly() -> None:
     tableau = get("pirk13")
     nodes = np.append(tableau.C, 1.0)
     for theta in (0.1, 0.37, 0.5, 0.93):
