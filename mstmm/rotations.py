@@ -30,12 +30,11 @@ def unit(v: Sequence[float]) -> tuple[float, ...]:
     """
     if moving(v):
         return _moving_unit(v)
+    if abs(math.hypot(*v) - 1) <= 1e-15:
+        return tuple(float(x) for x in v)
     largest = max(abs(x) for x in v)
     if largest == 0 or not all(math.isfinite(x) for x in v):
         raise ValueError("a vector without direction")
-    length = norm(v)
-    if abs(length - 1) <= 1e-15:
-        return tuple(float(x) for x in v)
     # A power of two scales exactly.
     scale = 2.0 ** -math.frexp(largest)[1]
     scaled = [x * scale for x in v]
@@ -73,13 +72,30 @@ def product(a: Matrix, b: Matrix) -> Matrix:
     """a b."""
     if a is IDENTITY or b is IDENTITY:
         return b if a is IDENTITY else a
-    columns = list(zip(*b, strict=True))
-    return rows([[dot(row, column) for column in columns] for row in a])
+    if moving((*a[0], *a[1], *a[2], *b[0], *b[1], *b[2])):
+        columns = list(zip(*b, strict=True))
+        return rows([[dot(row, column) for column in columns] for row in a])
+    first, second, third = (_row_times(row, b) for row in a)
+    return (first, second, third)
+
+
+def _row_times(row: Vector, b: Matrix) -> Vector:
+    """A row times a matrix of plain numbers, each entry rounded once."""
+    (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = b
+    x, y, z = row
+    return (
+        math.fsum((x * b00, y * b10, z * b20)),
+        math.fsum((x * b01, y * b11, z * b21)),
+        math.fsum((x * b02, y * b12, z * b22)),
+    )
 
 
 def transpose(a: Matrix) -> Matrix:
     """Rows and columns exchanged."""
-    return IDENTITY if a is IDENTITY else rows(list(zip(*a, strict=True)))
+    if a is IDENTITY:
+        return a
+    first, second, third = zip(*a, strict=True)
+    return (first, second, third)
 
 
 def apply(a: Matrix, v: Sequence[float]) -> Vector:

@@ -24,6 +24,7 @@ from .records import Lookup, Records
 
 Known = Mapping[tuple[str, str], Element]
 Texts = tuple[str, ...]
+Numbers = tuple[float, ...]
 
 
 def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
@@ -199,13 +200,15 @@ class BodyRecords:
         record.nq, record.nu = slots.nq, slots.nu
         record.hinge_p = self.reals(self._hinge_parameters(hinge, kernel, numbers))
         self._hinge_functions(record, kernel)
-        self._body_functions(record, body, place)
+        rigid = self._body_functions(record, body, place)
         self._imposed(record, hinge, slots)
-        self._connection(record, run, k, inboard, place)
+        self._connection(record, run, k, inboard, place, rigid)
 
-    def _connection(self, record: Any, run: Run, k: int, inboard: Matrix, own: Placement) -> None:
-        """Way from the parent's frame; as a link where it is one."""
-        body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
+    def _connection(
+        self, record: Any, run: Run, k: int, inboard: Matrix, own: Placement, rigid: Numbers
+    ) -> None:
+        """Way from the parent's frame; as a link where it is one.  `rigid`: the body's numbers."""
+        hinge = self.scene.hinges[run.hinge + k]
         parent, parent_place = self._parent(run, k)
         turned, point = placement.connection(parent_place, parent, hinge, inboard, own)
         numbers = (*turned[0], *turned[1], *turned[2], *point)
@@ -216,7 +219,6 @@ class BodyRecords:
         if link is None:
             return
         kernel = prebuilt.elements()["sweep", f"link_{hinge.type}"]
-        rigid = rigid_parameters(body, own) if body.type == "rigid" else ()
         record.link = self.reals((*link, *rigid, *placement.alignment(hinge)[2]))
         if rigid and not record.generic:
             for name, function in kernel.functions.items():
@@ -268,14 +270,17 @@ class BodyRecords:
             record.tape = self.c_tape(kernel.tape)
         record.generic = int(record.condense == self.ffi.NULL)
 
-    def _body_functions(self, record: Any, body: Body, place: Placement) -> None:
+    def _body_functions(self, record: Any, body: Body, place: Placement) -> Numbers:
+        """Kernels and numbers of the body; returns the numbers of a rigid one, else none."""
         element = self.elements.get("body", body.type, body.name)
         for name in ("inertia", "bias_load", "energy"):
             setattr(record, name, element.functions[name])
         if body.type == "rigid":
-            record.body_p = self.reals(rigid_parameters(body, place))
-        else:
-            record.body_p = self.reals(self._user_body(body, element, place))
+            rigid = rigid_parameters(body, place)
+            record.body_p = self.reals(rigid)
+            return rigid
+        record.body_p = self.reals(self._user_body(body, element, place))
+        return ()
 
     def _user_body(self, body: Body, element: Element, place: Placement) -> tuple[float, ...]:
         """Parameters, then the internal frame in the body's own: rotation (9) and origin (3)."""
