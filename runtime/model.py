@@ -80,6 +80,12 @@ class Model:
 
     def initial_state(self) -> tuple[Array, Array]:
         """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
+        q, u = self._start
+        return q.copy(), u.copy()
+
+    @cached_property
+    def _start(self) -> tuple[Array, Array]:
+        """What `initial_state` gives, computed once: a scene does not change."""
         from .simulate import SceneSystem
 
         q, u = start_values(self.scene, self.layout)
