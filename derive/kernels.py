@@ -145,6 +145,7 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
     motion = motion_of(links()[name])
     subspace = motion.in_arrays(motion.subspace)
     return (
+        Kernel("angle", link.angle(motion)),
         Kernel("forward", link.forward(motion, RigidBody())),
         Kernel(
             "condense", link.condense(motion, RigidBody()), sweep.pivot_guards(motion.nu, subspace)

@@ -1,9 +1,10 @@
-"""A rigid body behind a hinge that moves along and about z, in three kernels for the looped engine.
+"""A rigid body behind a hinge that moves along and about z, in four kernels for the looped engine.
 
 Between the frames of such a body and of its parent lie two axial screws, both of them chosen when
 the scene is packed (modified Denavit-Hartenberg parameters): a constant one about x, and the
 hinge's own about z with its constant angle and shift.  One link is
 
+    angle      angle about z, whose sine and cosine the engine takes two links at a time
     forward    bias motion of the body and the load that it needs
     condense   own inertia and what hangs on the body; elimination; transport to the parent
     recover    accelerations
@@ -69,24 +70,39 @@ def along_z(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr] | None:
     return angles[0] if angles else sp.Integer(0), position[2]
 
 
-def forward(motion: HingeMotion, body: Body) -> Derivation:
-    """Place of the hinge, bias motion of the body, and the load that this motion needs."""
+def _place(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
     found = along_z(motion)
     assert found is not None
     angle, shift = (motion.in_arrays(sp.Matrix([value]))[0] for value in found)
+    return angle, shift
+
+
+def angle(motion: HingeMotion) -> Derivation:
+    """Angle about z."""
+    theta = Quantity(_symbol("theta", 1), "rad", "angle about z")
+    value = _place(motion)[0] + LINK.symbol[3, 0]
+    return Derivation(
+        motion.hinge.name,
+        f"angle of the {motion.hinge.title}",
+        (LINK, *hinge_quantities(motion.hinge)[1:2]),
+        (theta,),
+        (Equation("angle about z", theta.symbol, sp.ImmutableDenseMatrix([value])),),
+    )
+
+
+def forward(motion: HingeMotion, body: Body) -> Derivation:
+    """Shift along z, bias motion of the body, and the load that this motion needs."""
+    _, shift = _place(motion)
     link, rest = LINK.symbol, _symbol("motion_Q", 9)
     between = _symbol("motion_x", 9)
-    theta = angle + link[3, 0]
-    place = sp.ImmutableDenseMatrix([sp.cos(theta), sp.sin(theta)])
     rates = _symbol("qdot", motion.rates.rows)
     return Derivation(
         motion.hinge.name,
         f"bias motion of a rigid body behind the {motion.hinge.title}",
-        (LINK, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
-        (TURN, SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
+        (LINK, TURN, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
+        (SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
             *_about_x().behind(PARENT_MOTION.symbol, between),
-            Equation("turn about z", TURN.symbol, place),
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
             *_about_z().behind(between, rest),
             Equation("bias motion", MOTION.symbol, _moved(motion, rest)),

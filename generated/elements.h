@@ -439,10 +439,12 @@ int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const r
     real *restrict tau, real *restrict V, real *restrict P, real *restrict twist);
 
 extern const mstmm_element mstmm_sweep_link_cylindrical;
-int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_cylindrical_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_cylindrical_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -453,10 +455,12 @@ int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_pin;
-int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_pin_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_pin_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -467,10 +471,12 @@ int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_prismatic;
-int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_prismatic_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_prismatic_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -481,10 +487,12 @@ int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *re
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_screw;
-int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_screw_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,

@@ -15,10 +15,15 @@
 #define MSTMM_LINK_FIXED 18
 #define MSTMM_LINK_PER_SPEED 7
 
+/* Numbers of a link that stay: link (5), b (10), p of the hinge (1 at most). */
+#define MSTMM_LINK_NUMBERS 16
+
 /* Splits the bodies into runs; returns their number.  `runs` holds n_bodies entries and `numbers`
- * one per body; links lie in the workspace from `place`; `size` receives how much they take. */
-int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **numbers, int64_t place,
-                    int64_t *size);
+ * one per body; links lie in the workspace from `place`; `size` receives how much they take.
+ * `gathered` (MSTMM_LINK_NUMBERS per body) receives the links' numbers side by side; NULL: they are
+ * few and shared, and stay where they are. */
+int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **numbers,
+                    real *gathered, int64_t place, int64_t *size);
 /* cdef end */
 
 int mstmm_linked_forward(mstmm_state *state, real *qdot);

@@ -54,7 +54,7 @@ typedef struct {
     const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
-    void (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+    void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
 } mstmm_body;
 
 /* Bodies in a row, each a child of the one before.  With `numbers` they are swept by the kernels of
@@ -65,7 +65,7 @@ typedef struct {
     int q, u, nq, nu;         /* of the first; the others follow without gaps */
     int64_t place, parent_place; /* of its links in the workspace; of the parent's link, or -1 */
     const real *const *numbers; /* `link` of every body */
-    void (*forward)(void), (*condense)(void), (*recover)(void);
+    void (*angle)(void), (*forward)(void), (*condense)(void), (*recover)(void);
 } mstmm_branch;
 
 /* Law on coordinates of one hinge: `evaluate` is a kernel of sweep_laws. */

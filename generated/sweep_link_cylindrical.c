@@ -8,10 +8,12 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_link_cylindrical;
-int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_cylindrical_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_cylindrical_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -21,214 +23,237 @@ int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+/* angle of the cylindrical hinge
+ * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * out theta[1] (rad) angle about z
+ */
+int mstmm_sweep_link_cylindrical_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta)
+{
+    const real t0 = link[3] + q[1];
+    theta[0] = t0;
+    return 0;
+}
+
+static int mstmm_sweep_link_cylindrical_angle_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_link_cylindrical_angle(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_link_cylindrical_angle_inputs[] = {
+    {"link", 5, "", 0, 0},
+    {"q", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_link_cylindrical_angle_outputs[] = {
+    {"theta", 1, "rad", 0, 0},
+};
+
 /* bias motion of a rigid body behind the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  turn[2] cosine and sine of the angle about z
  * in  b[10] parameters of the rigid body, body axes
  * in  p[0] parameters
  * in  q[2] coordinates: displacement [m], angle [rad]
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
- * out turn[2] cosine and sine of the angle about z
  * out d[1] (m) shift along z
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e_B[6] (N, N*m) load that the bias motion of the body needs
  * out qdot[2] coordinate rates
  */
-int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot)
+int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot)
 {
     (void)p;
-    const real t0 = link[3] + q[1];
-    const real t1 = cos(t0);
-    turn[0] = t1;
-    const real t2 = sin(t0);
-    turn[1] = t2;
-    const real t3 = link[4] + q[0];
-    d[0] = t3;
-    const real t4 = motion_I[0] * t1;
-    const real t5 = link[0] * motion_I[1];
-    const real t6 = link[1] * motion_I[2];
-    const real t7 = t5 + t6;
-    const real t8 = t7 * t2;
-    const real t9 = t4 + t8;
-    motion[0] = t9;
-    const real t10 = t7 * t1;
-    const real t11 = motion_I[0] * t2;
+    const real t0 = link[4] + q[0];
+    d[0] = t0;
+    const real t1 = turn[0] * motion_I[0];
+    const real t2 = link[0] * motion_I[1];
+    const real t3 = link[1] * motion_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = turn[1] * t4;
+    const real t6 = t1 + t5;
+    motion[0] = t6;
+    const real t7 = turn[0] * t4;
+    const real t8 = turn[1] * motion_I[0];
+    const real t9 = t7 - t8;
+    motion[1] = t9;
+    const real t10 = link[0] * motion_I[2];
+    const real t11 = link[1] * motion_I[1];
     const real t12 = t10 - t11;
-    motion[1] = t12;
-    const real t13 = link[0] * motion_I[2];
-    const real t14 = link[1] * motion_I[1];
-    const real t15 = t13 - t14;
-    const real t16 = u[1] + t15;
-    motion[2] = t16;
-    const real t17 = motion_I[3] * t1;
-    const real t18 = link[0] * motion_I[4];
-    const real t19 = link[1] * motion_I[5];
-    const real t20 = t18 + t19;
-    const real t21 = t20 * t2;
-    const real t22 = t17 + t21;
-    const real t23 = u[1] * t12;
-    const real t24 = t22 + t23;
-    motion[3] = t24;
-    const real t25 = t20 * t1;
-    const real t26 = motion_I[3] * t2;
-    const real t27 = t25 - t26;
-    const real t28 = u[1] * t9;
+    const real t13 = u[1] + t12;
+    motion[2] = t13;
+    const real t14 = turn[0] * motion_I[3];
+    const real t15 = link[0] * motion_I[4];
+    const real t16 = link[1] * motion_I[5];
+    const real t17 = t15 + t16;
+    const real t18 = turn[1] * t17;
+    const real t19 = t14 + t18;
+    const real t20 = u[1] * t9;
+    const real t21 = t19 + t20;
+    motion[3] = t21;
+    const real t22 = turn[0] * t17;
+    const real t23 = turn[1] * motion_I[3];
+    const real t24 = t22 - t23;
+    const real t25 = u[1] * t6;
+    const real t26 = t24 - t25;
+    motion[4] = t26;
+    const real t27 = link[0] * motion_I[5];
+    const real t28 = link[1] * motion_I[4];
     const real t29 = t27 - t28;
-    motion[4] = t29;
-    const real t30 = link[0] * motion_I[5];
-    const real t31 = link[1] * motion_I[4];
-    const real t32 = t30 - t31;
-    motion[5] = t32;
-    const real t33 = motion_I[1] * motion_I[1];
-    const real t34 = motion_I[2] * motion_I[2];
-    const real t35 = t33 + t34;
-    const real t36 = link[2] * t35;
-    const real t37 = motion_I[6] - t36;
-    const real t38 = motion_I[0] * t15;
-    const real t39 = t20 + t38;
-    const real t40 = t3 * t39;
-    const real t41 = t37 + t40;
-    const real t42 = t1 * t41;
-    const real t43 = motion_I[0] * motion_I[1];
-    const real t44 = motion_I[5] + t43;
-    const real t45 = link[2] * t44;
-    const real t46 = motion_I[7] + t45;
-    const real t47 = link[0] * t46;
-    const real t48 = motion_I[0] * motion_I[2];
-    const real t49 = t48 - motion_I[4];
-    const real t50 = link[2] * t49;
-    const real t51 = motion_I[8] + t50;
-    const real t52 = link[1] * t51;
-    const real t53 = t47 + t52;
-    const real t54 = t7 * t15;
-    const real t55 = t54 - motion_I[3];
-    const real t56 = t3 * t55;
-    const real t57 = t53 + t56;
-    const real t58 = t2 * t57;
-    const real t59 = t42 + t58;
-    const real t60 = u[0] * t12;
-    const real t61 = 2.0 * t60;
-    const real t62 = t59 + t61;
-    motion[6] = t62;
-    const real t63 = t1 * t57;
-    const real t64 = t2 * t41;
-    const real t65 = t63 - t64;
-    const real t66 = u[0] * t9;
-    const real t67 = 2.0 * t66;
-    const real t68 = t65 - t67;
-    motion[7] = t68;
-    const real t69 = link[0] * t51;
-    const real t70 = link[1] * t46;
-    const real t71 = t69 - t70;
-    const real t72 = motion_I[0] * motion_I[0];
-    const real t73 = t7 * t7;
-    const real t74 = t72 + t73;
-    const real t75 = t3 * t74;
-    const real t76 = t71 - t75;
-    motion[8] = t76;
-    const real t77 = b[0] * t62;
-    const real t78 = t31 - t30;
-    const real t79 = t9 * t12;
-    const real t80 = t78 + t79;
-    const real t81 = b[2] * t80;
-    const real t82 = t9 * t16;
-    const real t83 = t29 + t82;
-    const real t84 = b[3] * t83;
-    const real t85 = t81 + t84;
-    const real t86 = t12 * t12;
-    const real t87 = t16 * t16;
-    const real t88 = t86 + t87;
-    const real t89 = b[1] * t88;
-    const real t90 = t85 - t89;
-    const real t91 = t77 + t90;
-    e_B[0] = t91;
-    const real t92 = b[0] * t68;
-    const real t93 = t32 + t79;
-    const real t94 = b[1] * t93;
-    const real t95 = t12 * t16;
-    const real t96 = t95 - t24;
-    const real t97 = b[3] * t96;
-    const real t98 = t94 + t97;
-    const real t99 = t9 * t9;
-    const real t100 = t87 + t99;
-    const real t101 = b[2] * t100;
-    const real t102 = t98 - t101;
-    const real t103 = t92 + t102;
-    e_B[1] = t103;
-    const real t104 = b[0] * t76;
-    const real t105 = t28 - t27;
-    const real t106 = t82 + t105;
-    const real t107 = b[1] * t106;
-    const real t108 = t24 + t95;
-    const real t109 = b[2] * t108;
-    const real t110 = t107 + t109;
-    const real t111 = t86 + t99;
-    const real t112 = b[3] * t111;
-    const real t113 = t110 - t112;
-    const real t114 = t104 + t113;
-    e_B[2] = t114;
-    const real t115 = b[6] * t32;
-    const real t116 = b[5] * t29;
-    const real t117 = b[4] * t24;
-    const real t118 = b[2] * t76;
-    const real t119 = b[9] * t16;
-    const real t120 = b[6] * t9;
-    const real t121 = b[8] * t12;
-    const real t122 = t120 + t121;
-    const real t123 = t119 + t122;
-    const real t124 = t12 * t123;
-    const real t125 = b[8] * t16;
-    const real t126 = b[5] * t9;
-    const real t127 = b[7] * t12;
-    const real t128 = t126 + t127;
-    const real t129 = t125 + t128;
-    const real t130 = t16 * t129;
-    const real t131 = t124 - t130;
-    const real t132 = t118 + t131;
-    const real t133 = b[3] * t68;
-    const real t134 = t132 - t133;
-    const real t135 = t117 + t134;
-    const real t136 = t116 + t135;
-    const real t137 = t115 + t136;
-    e_B[3] = t137;
-    const real t138 = b[8] * t32;
-    const real t139 = b[7] * t29;
-    const real t140 = b[5] * t24;
-    const real t141 = b[3] * t62;
-    const real t142 = b[6] * t16;
-    const real t143 = b[4] * t9;
-    const real t144 = b[5] * t12;
-    const real t145 = t143 + t144;
-    const real t146 = t142 + t145;
-    const real t147 = t16 * t146;
-    const real t148 = t9 * t123;
-    const real t149 = t147 - t148;
-    const real t150 = b[1] * t76;
-    const real t151 = t149 - t150;
-    const real t152 = t141 + t151;
-    const real t153 = t140 + t152;
-    const real t154 = t139 + t153;
-    const real t155 = t138 + t154;
-    e_B[4] = t155;
-    const real t156 = b[9] * t32;
-    const real t157 = b[8] * t29;
-    const real t158 = b[6] * t24;
-    const real t159 = b[1] * t68;
-    const real t160 = t9 * t129;
-    const real t161 = t12 * t146;
+    motion[5] = t29;
+    const real t30 = motion_I[1] * motion_I[1];
+    const real t31 = motion_I[2] * motion_I[2];
+    const real t32 = t30 + t31;
+    const real t33 = link[2] * t32;
+    const real t34 = motion_I[6] - t33;
+    const real t35 = motion_I[0] * t12;
+    const real t36 = t17 + t35;
+    const real t37 = t0 * t36;
+    const real t38 = t34 + t37;
+    const real t39 = turn[0] * t38;
+    const real t40 = motion_I[0] * motion_I[1];
+    const real t41 = motion_I[5] + t40;
+    const real t42 = link[2] * t41;
+    const real t43 = motion_I[7] + t42;
+    const real t44 = link[0] * t43;
+    const real t45 = motion_I[0] * motion_I[2];
+    const real t46 = t45 - motion_I[4];
+    const real t47 = link[2] * t46;
+    const real t48 = motion_I[8] + t47;
+    const real t49 = link[1] * t48;
+    const real t50 = t44 + t49;
+    const real t51 = t4 * t12;
+    const real t52 = t51 - motion_I[3];
+    const real t53 = t0 * t52;
+    const real t54 = t50 + t53;
+    const real t55 = turn[1] * t54;
+    const real t56 = t39 + t55;
+    const real t57 = u[0] * t9;
+    const real t58 = 2.0 * t57;
+    const real t59 = t56 + t58;
+    motion[6] = t59;
+    const real t60 = turn[0] * t54;
+    const real t61 = turn[1] * t38;
+    const real t62 = t60 - t61;
+    const real t63 = u[0] * t6;
+    const real t64 = 2.0 * t63;
+    const real t65 = t62 - t64;
+    motion[7] = t65;
+    const real t66 = link[0] * t48;
+    const real t67 = link[1] * t43;
+    const real t68 = t66 - t67;
+    const real t69 = motion_I[0] * motion_I[0];
+    const real t70 = t4 * t4;
+    const real t71 = t69 + t70;
+    const real t72 = t0 * t71;
+    const real t73 = t68 - t72;
+    motion[8] = t73;
+    const real t74 = b[0] * t59;
+    const real t75 = t28 - t27;
+    const real t76 = t6 * t9;
+    const real t77 = t75 + t76;
+    const real t78 = b[2] * t77;
+    const real t79 = t6 * t13;
+    const real t80 = t26 + t79;
+    const real t81 = b[3] * t80;
+    const real t82 = t78 + t81;
+    const real t83 = t9 * t9;
+    const real t84 = t13 * t13;
+    const real t85 = t83 + t84;
+    const real t86 = b[1] * t85;
+    const real t87 = t82 - t86;
+    const real t88 = t74 + t87;
+    e_B[0] = t88;
+    const real t89 = b[0] * t65;
+    const real t90 = t29 + t76;
+    const real t91 = b[1] * t90;
+    const real t92 = t9 * t13;
+    const real t93 = t92 - t21;
+    const real t94 = b[3] * t93;
+    const real t95 = t91 + t94;
+    const real t96 = t6 * t6;
+    const real t97 = t84 + t96;
+    const real t98 = b[2] * t97;
+    const real t99 = t95 - t98;
+    const real t100 = t89 + t99;
+    e_B[1] = t100;
+    const real t101 = b[0] * t73;
+    const real t102 = t25 - t24;
+    const real t103 = t79 + t102;
+    const real t104 = b[1] * t103;
+    const real t105 = t21 + t92;
+    const real t106 = b[2] * t105;
+    const real t107 = t104 + t106;
+    const real t108 = t83 + t96;
+    const real t109 = b[3] * t108;
+    const real t110 = t107 - t109;
+    const real t111 = t101 + t110;
+    e_B[2] = t111;
+    const real t112 = b[6] * t29;
+    const real t113 = b[5] * t26;
+    const real t114 = b[4] * t21;
+    const real t115 = b[2] * t73;
+    const real t116 = b[9] * t13;
+    const real t117 = b[6] * t6;
+    const real t118 = b[8] * t9;
+    const real t119 = t117 + t118;
+    const real t120 = t116 + t119;
+    const real t121 = t9 * t120;
+    const real t122 = b[8] * t13;
+    const real t123 = b[5] * t6;
+    const real t124 = b[7] * t9;
+    const real t125 = t123 + t124;
+    const real t126 = t122 + t125;
+    const real t127 = t13 * t126;
+    const real t128 = t121 - t127;
+    const real t129 = t115 + t128;
+    const real t130 = b[3] * t65;
+    const real t131 = t129 - t130;
+    const real t132 = t114 + t131;
+    const real t133 = t113 + t132;
+    const real t134 = t112 + t133;
+    e_B[3] = t134;
+    const real t135 = b[8] * t29;
+    const real t136 = b[7] * t26;
+    const real t137 = b[5] * t21;
+    const real t138 = b[3] * t59;
+    const real t139 = b[6] * t13;
+    const real t140 = b[4] * t6;
+    const real t141 = b[5] * t9;
+    const real t142 = t140 + t141;
+    const real t143 = t139 + t142;
+    const real t144 = t13 * t143;
+    const real t145 = t6 * t120;
+    const real t146 = t144 - t145;
+    const real t147 = b[1] * t73;
+    const real t148 = t146 - t147;
+    const real t149 = t138 + t148;
+    const real t150 = t137 + t149;
+    const real t151 = t136 + t150;
+    const real t152 = t135 + t151;
+    e_B[4] = t152;
+    const real t153 = b[9] * t29;
+    const real t154 = b[8] * t26;
+    const real t155 = b[6] * t21;
+    const real t156 = b[1] * t65;
+    const real t157 = t6 * t126;
+    const real t158 = t9 * t143;
+    const real t159 = t157 - t158;
+    const real t160 = t156 + t159;
+    const real t161 = b[2] * t59;
     const real t162 = t160 - t161;
-    const real t163 = t159 + t162;
-    const real t164 = b[2] * t62;
-    const real t165 = t163 - t164;
-    const real t166 = t158 + t165;
-    const real t167 = t157 + t166;
-    const real t168 = t156 + t167;
-    e_B[5] = t168;
+    const real t163 = t155 + t162;
+    const real t164 = t154 + t163;
+    const real t165 = t153 + t164;
+    e_B[5] = t165;
     qdot[0] = u[0];
     qdot[1] = u[1];
     return 0;
@@ -237,11 +262,12 @@ int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *
 static int mstmm_sweep_link_cylindrical_forward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_link_cylindrical_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_link_cylindrical_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_link_cylindrical_forward_inputs[] = {
     {"link", 5, "", 0, 0},
+    {"turn", 2, "", 0, 0},
     {"b", 10, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 2, "", 0, 0},
@@ -250,7 +276,6 @@ static const mstmm_port mstmm_sweep_link_cylindrical_forward_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_link_cylindrical_forward_outputs[] = {
-    {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
     {"motion", 9, "", 0, 0},
     {"e_B", 6, "N, N*m", 0, 0},
@@ -732,14 +757,26 @@ static const mstmm_port mstmm_sweep_link_cylindrical_recover_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_link_cylindrical_kernels[] = {
     {
+        .name = "angle",
+        .function = (void (*)(void))mstmm_sweep_link_cylindrical_angle,
+        .call = mstmm_sweep_link_cylindrical_angle_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_link_cylindrical_angle_inputs,
+        .outputs = mstmm_sweep_link_cylindrical_angle_outputs,
+        .ir_hash = "919ebcf870c8d2221e6d1cf579d513f68b6767bb026a2e291150a113dd4c9c7e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward",
         .function = (void (*)(void))mstmm_sweep_link_cylindrical_forward,
         .call = mstmm_sweep_link_cylindrical_forward_call,
-        .n_inputs = 6,
-        .n_outputs = 5,
+        .n_inputs = 7,
+        .n_outputs = 4,
         .inputs = mstmm_sweep_link_cylindrical_forward_inputs,
         .outputs = mstmm_sweep_link_cylindrical_forward_outputs,
-        .ir_hash = "be48426eb929f12e2d913755ba48a0d639cf40fd3850b56a3fb85c2964afef61",
+        .ir_hash = "c245e6dfedd11d547215640c328f6e913d2327914ae6f17a08f0595039635486",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -773,7 +810,7 @@ const mstmm_element mstmm_sweep_link_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_cylindrical",
-    .hash = "0f53f78f1408d1c68f315e1075b0a1710093e8cc699d8a99e604429a86757efd",
+    .hash = "6d3a217f7f1ac1d8616fab1b5d8cd70398b00b662990bc20b8d17cbf692c97ae",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -783,6 +820,6 @@ const mstmm_element mstmm_sweep_link_cylindrical = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_link_cylindrical_kernels,
 };

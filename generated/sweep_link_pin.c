@@ -8,10 +8,12 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_link_pin;
-int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_pin_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_pin_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -21,207 +23,231 @@ int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+/* angle of the pin hinge
+ * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  q[1] coordinates: angle [rad]
+ * out theta[1] (rad) angle about z
+ */
+int mstmm_sweep_link_pin_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta)
+{
+    const real t0 = link[3] + q[0];
+    theta[0] = t0;
+    return 0;
+}
+
+static int mstmm_sweep_link_pin_angle_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_link_pin_angle(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_link_pin_angle_inputs[] = {
+    {"link", 5, "", 0, 0},
+    {"q", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_link_pin_angle_outputs[] = {
+    {"theta", 1, "rad", 0, 0},
+};
+
 /* bias motion of a rigid body behind the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  turn[2] cosine and sine of the angle about z
  * in  b[10] parameters of the rigid body, body axes
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
- * out turn[2] cosine and sine of the angle about z
  * out d[1] (m) shift along z
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e_B[6] (N, N*m) load that the bias motion of the body needs
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot)
+int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot)
 {
     (void)p;
-    const real t0 = link[3] + q[0];
-    const real t1 = cos(t0);
-    turn[0] = t1;
-    const real t2 = sin(t0);
-    turn[1] = t2;
+    (void)q;
     d[0] = link[4];
-    const real t3 = motion_I[0] * t1;
-    const real t4 = link[0] * motion_I[1];
-    const real t5 = link[1] * motion_I[2];
-    const real t6 = t4 + t5;
-    const real t7 = t6 * t2;
-    const real t8 = t3 + t7;
-    motion[0] = t8;
-    const real t9 = t6 * t1;
-    const real t10 = motion_I[0] * t2;
+    const real t0 = turn[0] * motion_I[0];
+    const real t1 = link[0] * motion_I[1];
+    const real t2 = link[1] * motion_I[2];
+    const real t3 = t1 + t2;
+    const real t4 = turn[1] * t3;
+    const real t5 = t0 + t4;
+    motion[0] = t5;
+    const real t6 = turn[0] * t3;
+    const real t7 = turn[1] * motion_I[0];
+    const real t8 = t6 - t7;
+    motion[1] = t8;
+    const real t9 = link[0] * motion_I[2];
+    const real t10 = link[1] * motion_I[1];
     const real t11 = t9 - t10;
-    motion[1] = t11;
-    const real t12 = link[0] * motion_I[2];
-    const real t13 = link[1] * motion_I[1];
-    const real t14 = t12 - t13;
-    const real t15 = u[0] + t14;
-    motion[2] = t15;
-    const real t16 = motion_I[3] * t1;
-    const real t17 = link[0] * motion_I[4];
-    const real t18 = link[1] * motion_I[5];
-    const real t19 = t17 + t18;
-    const real t20 = t19 * t2;
-    const real t21 = t16 + t20;
-    const real t22 = u[0] * t11;
-    const real t23 = t21 + t22;
-    motion[3] = t23;
-    const real t24 = t19 * t1;
-    const real t25 = motion_I[3] * t2;
-    const real t26 = t24 - t25;
-    const real t27 = u[0] * t8;
+    const real t12 = u[0] + t11;
+    motion[2] = t12;
+    const real t13 = turn[0] * motion_I[3];
+    const real t14 = link[0] * motion_I[4];
+    const real t15 = link[1] * motion_I[5];
+    const real t16 = t14 + t15;
+    const real t17 = turn[1] * t16;
+    const real t18 = t13 + t17;
+    const real t19 = u[0] * t8;
+    const real t20 = t18 + t19;
+    motion[3] = t20;
+    const real t21 = turn[0] * t16;
+    const real t22 = turn[1] * motion_I[3];
+    const real t23 = t21 - t22;
+    const real t24 = u[0] * t5;
+    const real t25 = t23 - t24;
+    motion[4] = t25;
+    const real t26 = link[0] * motion_I[5];
+    const real t27 = link[1] * motion_I[4];
     const real t28 = t26 - t27;
-    motion[4] = t28;
-    const real t29 = link[0] * motion_I[5];
-    const real t30 = link[1] * motion_I[4];
-    const real t31 = t29 - t30;
-    motion[5] = t31;
-    const real t32 = motion_I[1] * motion_I[1];
-    const real t33 = motion_I[2] * motion_I[2];
-    const real t34 = t32 + t33;
-    const real t35 = link[2] * t34;
-    const real t36 = motion_I[6] - t35;
-    const real t37 = motion_I[0] * t14;
-    const real t38 = t19 + t37;
-    const real t39 = link[4] * t38;
-    const real t40 = t36 + t39;
-    const real t41 = t1 * t40;
-    const real t42 = motion_I[0] * motion_I[1];
-    const real t43 = motion_I[5] + t42;
-    const real t44 = link[2] * t43;
-    const real t45 = motion_I[7] + t44;
-    const real t46 = link[0] * t45;
-    const real t47 = motion_I[0] * motion_I[2];
-    const real t48 = t47 - motion_I[4];
-    const real t49 = link[2] * t48;
-    const real t50 = motion_I[8] + t49;
-    const real t51 = link[1] * t50;
-    const real t52 = t46 + t51;
-    const real t53 = t6 * t14;
-    const real t54 = t53 - motion_I[3];
-    const real t55 = link[4] * t54;
-    const real t56 = t52 + t55;
-    const real t57 = t2 * t56;
-    const real t58 = t41 + t57;
-    motion[6] = t58;
-    const real t59 = t1 * t56;
-    const real t60 = t2 * t40;
+    motion[5] = t28;
+    const real t29 = motion_I[1] * motion_I[1];
+    const real t30 = motion_I[2] * motion_I[2];
+    const real t31 = t29 + t30;
+    const real t32 = link[2] * t31;
+    const real t33 = motion_I[6] - t32;
+    const real t34 = motion_I[0] * t11;
+    const real t35 = t16 + t34;
+    const real t36 = link[4] * t35;
+    const real t37 = t33 + t36;
+    const real t38 = turn[0] * t37;
+    const real t39 = motion_I[0] * motion_I[1];
+    const real t40 = motion_I[5] + t39;
+    const real t41 = link[2] * t40;
+    const real t42 = motion_I[7] + t41;
+    const real t43 = link[0] * t42;
+    const real t44 = motion_I[0] * motion_I[2];
+    const real t45 = t44 - motion_I[4];
+    const real t46 = link[2] * t45;
+    const real t47 = motion_I[8] + t46;
+    const real t48 = link[1] * t47;
+    const real t49 = t43 + t48;
+    const real t50 = t3 * t11;
+    const real t51 = t50 - motion_I[3];
+    const real t52 = link[4] * t51;
+    const real t53 = t49 + t52;
+    const real t54 = turn[1] * t53;
+    const real t55 = t38 + t54;
+    motion[6] = t55;
+    const real t56 = turn[0] * t53;
+    const real t57 = turn[1] * t37;
+    const real t58 = t56 - t57;
+    motion[7] = t58;
+    const real t59 = link[0] * t47;
+    const real t60 = link[1] * t42;
     const real t61 = t59 - t60;
-    motion[7] = t61;
-    const real t62 = link[0] * t50;
-    const real t63 = link[1] * t45;
-    const real t64 = t62 - t63;
-    const real t65 = motion_I[0] * motion_I[0];
-    const real t66 = t6 * t6;
-    const real t67 = t65 + t66;
-    const real t68 = link[4] * t67;
-    const real t69 = t64 - t68;
-    motion[8] = t69;
-    const real t70 = b[0] * t58;
-    const real t71 = t30 - t29;
-    const real t72 = t8 * t11;
-    const real t73 = t71 + t72;
-    const real t74 = b[2] * t73;
-    const real t75 = t8 * t15;
-    const real t76 = t28 + t75;
-    const real t77 = b[3] * t76;
-    const real t78 = t74 + t77;
-    const real t79 = t11 * t11;
-    const real t80 = t15 * t15;
-    const real t81 = t79 + t80;
-    const real t82 = b[1] * t81;
-    const real t83 = t78 - t82;
-    const real t84 = t70 + t83;
-    e_B[0] = t84;
-    const real t85 = b[0] * t61;
-    const real t86 = t31 + t72;
-    const real t87 = b[1] * t86;
-    const real t88 = t11 * t15;
-    const real t89 = t88 - t23;
-    const real t90 = b[3] * t89;
-    const real t91 = t87 + t90;
-    const real t92 = t8 * t8;
-    const real t93 = t80 + t92;
-    const real t94 = b[2] * t93;
-    const real t95 = t91 - t94;
-    const real t96 = t85 + t95;
-    e_B[1] = t96;
-    const real t97 = b[0] * t69;
-    const real t98 = t27 - t26;
-    const real t99 = t75 + t98;
-    const real t100 = b[1] * t99;
-    const real t101 = t23 + t88;
-    const real t102 = b[2] * t101;
-    const real t103 = t100 + t102;
-    const real t104 = t79 + t92;
-    const real t105 = b[3] * t104;
-    const real t106 = t103 - t105;
-    const real t107 = t97 + t106;
-    e_B[2] = t107;
-    const real t108 = b[6] * t31;
-    const real t109 = b[5] * t28;
-    const real t110 = b[4] * t23;
-    const real t111 = b[2] * t69;
-    const real t112 = b[9] * t15;
-    const real t113 = b[6] * t8;
-    const real t114 = b[8] * t11;
-    const real t115 = t113 + t114;
-    const real t116 = t112 + t115;
-    const real t117 = t11 * t116;
-    const real t118 = b[8] * t15;
-    const real t119 = b[5] * t8;
-    const real t120 = b[7] * t11;
-    const real t121 = t119 + t120;
-    const real t122 = t118 + t121;
-    const real t123 = t15 * t122;
-    const real t124 = t117 - t123;
-    const real t125 = t111 + t124;
-    const real t126 = b[3] * t61;
-    const real t127 = t125 - t126;
-    const real t128 = t110 + t127;
-    const real t129 = t109 + t128;
-    const real t130 = t108 + t129;
-    e_B[3] = t130;
-    const real t131 = b[8] * t31;
-    const real t132 = b[7] * t28;
-    const real t133 = b[5] * t23;
-    const real t134 = b[3] * t58;
-    const real t135 = b[6] * t15;
-    const real t136 = b[4] * t8;
-    const real t137 = b[5] * t11;
-    const real t138 = t136 + t137;
-    const real t139 = t135 + t138;
-    const real t140 = t15 * t139;
-    const real t141 = t8 * t116;
-    const real t142 = t140 - t141;
-    const real t143 = b[1] * t69;
-    const real t144 = t142 - t143;
-    const real t145 = t134 + t144;
-    const real t146 = t133 + t145;
-    const real t147 = t132 + t146;
-    const real t148 = t131 + t147;
-    e_B[4] = t148;
-    const real t149 = b[9] * t31;
-    const real t150 = b[8] * t28;
-    const real t151 = b[6] * t23;
-    const real t152 = b[1] * t61;
-    const real t153 = t8 * t122;
-    const real t154 = t11 * t139;
+    const real t62 = motion_I[0] * motion_I[0];
+    const real t63 = t3 * t3;
+    const real t64 = t62 + t63;
+    const real t65 = link[4] * t64;
+    const real t66 = t61 - t65;
+    motion[8] = t66;
+    const real t67 = b[0] * t55;
+    const real t68 = t27 - t26;
+    const real t69 = t5 * t8;
+    const real t70 = t68 + t69;
+    const real t71 = b[2] * t70;
+    const real t72 = t5 * t12;
+    const real t73 = t25 + t72;
+    const real t74 = b[3] * t73;
+    const real t75 = t71 + t74;
+    const real t76 = t8 * t8;
+    const real t77 = t12 * t12;
+    const real t78 = t76 + t77;
+    const real t79 = b[1] * t78;
+    const real t80 = t75 - t79;
+    const real t81 = t67 + t80;
+    e_B[0] = t81;
+    const real t82 = b[0] * t58;
+    const real t83 = t28 + t69;
+    const real t84 = b[1] * t83;
+    const real t85 = t8 * t12;
+    const real t86 = t85 - t20;
+    const real t87 = b[3] * t86;
+    const real t88 = t84 + t87;
+    const real t89 = t5 * t5;
+    const real t90 = t77 + t89;
+    const real t91 = b[2] * t90;
+    const real t92 = t88 - t91;
+    const real t93 = t82 + t92;
+    e_B[1] = t93;
+    const real t94 = b[0] * t66;
+    const real t95 = t24 - t23;
+    const real t96 = t72 + t95;
+    const real t97 = b[1] * t96;
+    const real t98 = t20 + t85;
+    const real t99 = b[2] * t98;
+    const real t100 = t97 + t99;
+    const real t101 = t76 + t89;
+    const real t102 = b[3] * t101;
+    const real t103 = t100 - t102;
+    const real t104 = t94 + t103;
+    e_B[2] = t104;
+    const real t105 = b[6] * t28;
+    const real t106 = b[5] * t25;
+    const real t107 = b[4] * t20;
+    const real t108 = b[2] * t66;
+    const real t109 = b[9] * t12;
+    const real t110 = b[6] * t5;
+    const real t111 = b[8] * t8;
+    const real t112 = t110 + t111;
+    const real t113 = t109 + t112;
+    const real t114 = t8 * t113;
+    const real t115 = b[8] * t12;
+    const real t116 = b[5] * t5;
+    const real t117 = b[7] * t8;
+    const real t118 = t116 + t117;
+    const real t119 = t115 + t118;
+    const real t120 = t12 * t119;
+    const real t121 = t114 - t120;
+    const real t122 = t108 + t121;
+    const real t123 = b[3] * t58;
+    const real t124 = t122 - t123;
+    const real t125 = t107 + t124;
+    const real t126 = t106 + t125;
+    const real t127 = t105 + t126;
+    e_B[3] = t127;
+    const real t128 = b[8] * t28;
+    const real t129 = b[7] * t25;
+    const real t130 = b[5] * t20;
+    const real t131 = b[3] * t55;
+    const real t132 = b[6] * t12;
+    const real t133 = b[4] * t5;
+    const real t134 = b[5] * t8;
+    const real t135 = t133 + t134;
+    const real t136 = t132 + t135;
+    const real t137 = t12 * t136;
+    const real t138 = t5 * t113;
+    const real t139 = t137 - t138;
+    const real t140 = b[1] * t66;
+    const real t141 = t139 - t140;
+    const real t142 = t131 + t141;
+    const real t143 = t130 + t142;
+    const real t144 = t129 + t143;
+    const real t145 = t128 + t144;
+    e_B[4] = t145;
+    const real t146 = b[9] * t28;
+    const real t147 = b[8] * t25;
+    const real t148 = b[6] * t20;
+    const real t149 = b[1] * t58;
+    const real t150 = t5 * t119;
+    const real t151 = t8 * t136;
+    const real t152 = t150 - t151;
+    const real t153 = t149 + t152;
+    const real t154 = b[2] * t55;
     const real t155 = t153 - t154;
-    const real t156 = t152 + t155;
-    const real t157 = b[2] * t58;
-    const real t158 = t156 - t157;
-    const real t159 = t151 + t158;
-    const real t160 = t150 + t159;
-    const real t161 = t149 + t160;
-    e_B[5] = t161;
+    const real t156 = t148 + t155;
+    const real t157 = t147 + t156;
+    const real t158 = t146 + t157;
+    e_B[5] = t158;
     qdot[0] = u[0];
     return 0;
 }
@@ -229,11 +255,12 @@ int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict
 static int mstmm_sweep_link_pin_forward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_link_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_link_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_link_pin_forward_inputs[] = {
     {"link", 5, "", 0, 0},
+    {"turn", 2, "", 0, 0},
     {"b", 10, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
@@ -242,7 +269,6 @@ static const mstmm_port mstmm_sweep_link_pin_forward_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_link_pin_forward_outputs[] = {
-    {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
     {"motion", 9, "", 0, 0},
     {"e_B", 6, "N, N*m", 0, 0},
@@ -680,14 +706,26 @@ static const mstmm_port mstmm_sweep_link_pin_recover_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_link_pin_kernels[] = {
     {
+        .name = "angle",
+        .function = (void (*)(void))mstmm_sweep_link_pin_angle,
+        .call = mstmm_sweep_link_pin_angle_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_link_pin_angle_inputs,
+        .outputs = mstmm_sweep_link_pin_angle_outputs,
+        .ir_hash = "3db7388c77c5246e0224729908900aa7cd4e93e665d852c75ed565cfeb06bbc8",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward",
         .function = (void (*)(void))mstmm_sweep_link_pin_forward,
         .call = mstmm_sweep_link_pin_forward_call,
-        .n_inputs = 6,
-        .n_outputs = 5,
+        .n_inputs = 7,
+        .n_outputs = 4,
         .inputs = mstmm_sweep_link_pin_forward_inputs,
         .outputs = mstmm_sweep_link_pin_forward_outputs,
-        .ir_hash = "1ca285bca8f186db455d5a1f4d8b6425eb7fa1490be67f29b1cfd266c06c959f",
+        .ir_hash = "8e0b18e70f3948d73c0703ad655c6533d031b44e30da6299f4a031a5acc149a5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -721,7 +759,7 @@ const mstmm_element mstmm_sweep_link_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_pin",
-    .hash = "658ac1d834a196c29d303b301999f0a4ce3c9a1739443432259155949c1a4adf",
+    .hash = "ac7be98214f79a7afa3a80415b2f0836a73592b37da2b289017449a7142a5d9c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -731,6 +769,6 @@ const mstmm_element mstmm_sweep_link_pin = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_link_pin_kernels,
 };

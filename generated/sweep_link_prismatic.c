@@ -8,10 +8,12 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_link_prismatic;
-int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_prismatic_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_prismatic_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -21,208 +23,232 @@ int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *re
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+/* angle of the prismatic hinge
+ * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  q[1] coordinates: displacement [m]
+ * out theta[1] (rad) angle about z
+ */
+int mstmm_sweep_link_prismatic_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta)
+{
+    (void)q;
+    theta[0] = link[3];
+    return 0;
+}
+
+static int mstmm_sweep_link_prismatic_angle_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_link_prismatic_angle(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_link_prismatic_angle_inputs[] = {
+    {"link", 5, "", 0, 0},
+    {"q", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_link_prismatic_angle_outputs[] = {
+    {"theta", 1, "rad", 0, 0},
+};
+
 /* bias motion of a rigid body behind the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  turn[2] cosine and sine of the angle about z
  * in  b[10] parameters of the rigid body, body axes
  * in  p[0] parameters
  * in  q[1] coordinates: displacement [m]
  * in  u[1] speeds: displacement_rate [m/s]
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
- * out turn[2] cosine and sine of the angle about z
  * out d[1] (m) shift along z
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e_B[6] (N, N*m) load that the bias motion of the body needs
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot)
+int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot)
 {
     (void)p;
-    const real t0 = cos(link[3]);
-    turn[0] = t0;
-    const real t1 = sin(link[3]);
-    turn[1] = t1;
-    const real t2 = link[4] + q[0];
-    d[0] = t2;
-    const real t3 = motion_I[0] * t0;
-    const real t4 = link[0] * motion_I[1];
-    const real t5 = link[1] * motion_I[2];
-    const real t6 = t4 + t5;
-    const real t7 = t6 * t1;
-    const real t8 = t3 + t7;
-    motion[0] = t8;
-    const real t9 = t6 * t0;
-    const real t10 = motion_I[0] * t1;
-    const real t11 = t9 - t10;
-    motion[1] = t11;
-    const real t12 = link[0] * motion_I[2];
-    const real t13 = link[1] * motion_I[1];
-    const real t14 = t12 - t13;
-    motion[2] = t14;
-    const real t15 = motion_I[3] * t0;
-    const real t16 = link[0] * motion_I[4];
-    const real t17 = link[1] * motion_I[5];
-    const real t18 = t16 + t17;
-    const real t19 = t18 * t1;
-    const real t20 = t15 + t19;
-    motion[3] = t20;
-    const real t21 = t18 * t0;
-    const real t22 = motion_I[3] * t1;
-    const real t23 = t21 - t22;
-    motion[4] = t23;
-    const real t24 = link[0] * motion_I[5];
-    const real t25 = link[1] * motion_I[4];
-    const real t26 = t24 - t25;
-    motion[5] = t26;
-    const real t27 = motion_I[1] * motion_I[1];
-    const real t28 = motion_I[2] * motion_I[2];
-    const real t29 = t27 + t28;
-    const real t30 = link[2] * t29;
-    const real t31 = motion_I[6] - t30;
-    const real t32 = motion_I[0] * t14;
-    const real t33 = t18 + t32;
-    const real t34 = t2 * t33;
-    const real t35 = t31 + t34;
-    const real t36 = t0 * t35;
-    const real t37 = motion_I[0] * motion_I[1];
-    const real t38 = motion_I[5] + t37;
-    const real t39 = link[2] * t38;
-    const real t40 = motion_I[7] + t39;
-    const real t41 = link[0] * t40;
-    const real t42 = motion_I[0] * motion_I[2];
-    const real t43 = t42 - motion_I[4];
-    const real t44 = link[2] * t43;
-    const real t45 = motion_I[8] + t44;
-    const real t46 = link[1] * t45;
-    const real t47 = t41 + t46;
-    const real t48 = t6 * t14;
-    const real t49 = t48 - motion_I[3];
-    const real t50 = t2 * t49;
-    const real t51 = t47 + t50;
-    const real t52 = t1 * t51;
-    const real t53 = t36 + t52;
-    const real t54 = u[0] * t11;
-    const real t55 = 2.0 * t54;
-    const real t56 = t53 + t55;
-    motion[6] = t56;
-    const real t57 = t0 * t51;
-    const real t58 = t1 * t35;
-    const real t59 = t57 - t58;
-    const real t60 = u[0] * t8;
-    const real t61 = 2.0 * t60;
-    const real t62 = t59 - t61;
-    motion[7] = t62;
-    const real t63 = link[0] * t45;
-    const real t64 = link[1] * t40;
-    const real t65 = t63 - t64;
-    const real t66 = motion_I[0] * motion_I[0];
-    const real t67 = t6 * t6;
-    const real t68 = t66 + t67;
-    const real t69 = t2 * t68;
-    const real t70 = t65 - t69;
-    motion[8] = t70;
-    const real t71 = b[0] * t56;
-    const real t72 = t25 - t24;
-    const real t73 = t8 * t11;
-    const real t74 = t72 + t73;
-    const real t75 = b[2] * t74;
-    const real t76 = t14 * t8;
-    const real t77 = t23 + t76;
-    const real t78 = b[3] * t77;
-    const real t79 = t75 + t78;
-    const real t80 = t14 * t14;
-    const real t81 = t11 * t11;
-    const real t82 = t80 + t81;
-    const real t83 = b[1] * t82;
-    const real t84 = t79 - t83;
-    const real t85 = t71 + t84;
-    e_B[0] = t85;
-    const real t86 = b[0] * t62;
-    const real t87 = t26 + t73;
-    const real t88 = b[1] * t87;
-    const real t89 = t14 * t11;
-    const real t90 = t89 - t20;
-    const real t91 = b[3] * t90;
-    const real t92 = t88 + t91;
-    const real t93 = t8 * t8;
-    const real t94 = t80 + t93;
-    const real t95 = b[2] * t94;
-    const real t96 = t92 - t95;
-    const real t97 = t86 + t96;
-    e_B[1] = t97;
-    const real t98 = b[0] * t70;
-    const real t99 = t22 - t21;
-    const real t100 = t76 + t99;
-    const real t101 = b[1] * t100;
-    const real t102 = t20 + t89;
-    const real t103 = b[2] * t102;
-    const real t104 = t101 + t103;
-    const real t105 = t81 + t93;
-    const real t106 = b[3] * t105;
-    const real t107 = t104 - t106;
-    const real t108 = t98 + t107;
-    e_B[2] = t108;
-    const real t109 = b[6] * t26;
-    const real t110 = b[5] * t23;
-    const real t111 = b[4] * t20;
-    const real t112 = b[2] * t70;
-    const real t113 = b[9] * t14;
-    const real t114 = b[6] * t8;
-    const real t115 = b[8] * t11;
-    const real t116 = t114 + t115;
-    const real t117 = t113 + t116;
-    const real t118 = t11 * t117;
-    const real t119 = b[8] * t14;
-    const real t120 = b[5] * t8;
-    const real t121 = b[7] * t11;
-    const real t122 = t120 + t121;
-    const real t123 = t119 + t122;
-    const real t124 = t14 * t123;
-    const real t125 = t118 - t124;
-    const real t126 = t112 + t125;
-    const real t127 = b[3] * t62;
-    const real t128 = t126 - t127;
-    const real t129 = t111 + t128;
-    const real t130 = t110 + t129;
-    const real t131 = t109 + t130;
-    e_B[3] = t131;
-    const real t132 = b[8] * t26;
-    const real t133 = b[7] * t23;
-    const real t134 = b[5] * t20;
-    const real t135 = b[3] * t56;
-    const real t136 = b[6] * t14;
-    const real t137 = b[4] * t8;
-    const real t138 = b[5] * t11;
-    const real t139 = t137 + t138;
-    const real t140 = t136 + t139;
-    const real t141 = t14 * t140;
-    const real t142 = t8 * t117;
+    const real t0 = link[4] + q[0];
+    d[0] = t0;
+    const real t1 = turn[0] * motion_I[0];
+    const real t2 = link[0] * motion_I[1];
+    const real t3 = link[1] * motion_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = turn[1] * t4;
+    const real t6 = t1 + t5;
+    motion[0] = t6;
+    const real t7 = turn[0] * t4;
+    const real t8 = turn[1] * motion_I[0];
+    const real t9 = t7 - t8;
+    motion[1] = t9;
+    const real t10 = link[0] * motion_I[2];
+    const real t11 = link[1] * motion_I[1];
+    const real t12 = t10 - t11;
+    motion[2] = t12;
+    const real t13 = turn[0] * motion_I[3];
+    const real t14 = link[0] * motion_I[4];
+    const real t15 = link[1] * motion_I[5];
+    const real t16 = t14 + t15;
+    const real t17 = turn[1] * t16;
+    const real t18 = t13 + t17;
+    motion[3] = t18;
+    const real t19 = turn[0] * t16;
+    const real t20 = turn[1] * motion_I[3];
+    const real t21 = t19 - t20;
+    motion[4] = t21;
+    const real t22 = link[0] * motion_I[5];
+    const real t23 = link[1] * motion_I[4];
+    const real t24 = t22 - t23;
+    motion[5] = t24;
+    const real t25 = motion_I[1] * motion_I[1];
+    const real t26 = motion_I[2] * motion_I[2];
+    const real t27 = t25 + t26;
+    const real t28 = link[2] * t27;
+    const real t29 = motion_I[6] - t28;
+    const real t30 = motion_I[0] * t12;
+    const real t31 = t16 + t30;
+    const real t32 = t0 * t31;
+    const real t33 = t29 + t32;
+    const real t34 = turn[0] * t33;
+    const real t35 = motion_I[0] * motion_I[1];
+    const real t36 = motion_I[5] + t35;
+    const real t37 = link[2] * t36;
+    const real t38 = motion_I[7] + t37;
+    const real t39 = link[0] * t38;
+    const real t40 = motion_I[0] * motion_I[2];
+    const real t41 = t40 - motion_I[4];
+    const real t42 = link[2] * t41;
+    const real t43 = motion_I[8] + t42;
+    const real t44 = link[1] * t43;
+    const real t45 = t39 + t44;
+    const real t46 = t4 * t12;
+    const real t47 = t46 - motion_I[3];
+    const real t48 = t0 * t47;
+    const real t49 = t45 + t48;
+    const real t50 = turn[1] * t49;
+    const real t51 = t34 + t50;
+    const real t52 = u[0] * t9;
+    const real t53 = 2.0 * t52;
+    const real t54 = t51 + t53;
+    motion[6] = t54;
+    const real t55 = turn[0] * t49;
+    const real t56 = turn[1] * t33;
+    const real t57 = t55 - t56;
+    const real t58 = u[0] * t6;
+    const real t59 = 2.0 * t58;
+    const real t60 = t57 - t59;
+    motion[7] = t60;
+    const real t61 = link[0] * t43;
+    const real t62 = link[1] * t38;
+    const real t63 = t61 - t62;
+    const real t64 = motion_I[0] * motion_I[0];
+    const real t65 = t4 * t4;
+    const real t66 = t64 + t65;
+    const real t67 = t0 * t66;
+    const real t68 = t63 - t67;
+    motion[8] = t68;
+    const real t69 = b[0] * t54;
+    const real t70 = t23 - t22;
+    const real t71 = t6 * t9;
+    const real t72 = t70 + t71;
+    const real t73 = b[2] * t72;
+    const real t74 = t12 * t6;
+    const real t75 = t21 + t74;
+    const real t76 = b[3] * t75;
+    const real t77 = t73 + t76;
+    const real t78 = t12 * t12;
+    const real t79 = t9 * t9;
+    const real t80 = t78 + t79;
+    const real t81 = b[1] * t80;
+    const real t82 = t77 - t81;
+    const real t83 = t69 + t82;
+    e_B[0] = t83;
+    const real t84 = b[0] * t60;
+    const real t85 = t24 + t71;
+    const real t86 = b[1] * t85;
+    const real t87 = t12 * t9;
+    const real t88 = t87 - t18;
+    const real t89 = b[3] * t88;
+    const real t90 = t86 + t89;
+    const real t91 = t6 * t6;
+    const real t92 = t78 + t91;
+    const real t93 = b[2] * t92;
+    const real t94 = t90 - t93;
+    const real t95 = t84 + t94;
+    e_B[1] = t95;
+    const real t96 = b[0] * t68;
+    const real t97 = t20 - t19;
+    const real t98 = t74 + t97;
+    const real t99 = b[1] * t98;
+    const real t100 = t18 + t87;
+    const real t101 = b[2] * t100;
+    const real t102 = t99 + t101;
+    const real t103 = t79 + t91;
+    const real t104 = b[3] * t103;
+    const real t105 = t102 - t104;
+    const real t106 = t96 + t105;
+    e_B[2] = t106;
+    const real t107 = b[6] * t24;
+    const real t108 = b[5] * t21;
+    const real t109 = b[4] * t18;
+    const real t110 = b[2] * t68;
+    const real t111 = b[9] * t12;
+    const real t112 = b[6] * t6;
+    const real t113 = b[8] * t9;
+    const real t114 = t112 + t113;
+    const real t115 = t111 + t114;
+    const real t116 = t9 * t115;
+    const real t117 = b[8] * t12;
+    const real t118 = b[5] * t6;
+    const real t119 = b[7] * t9;
+    const real t120 = t118 + t119;
+    const real t121 = t117 + t120;
+    const real t122 = t12 * t121;
+    const real t123 = t116 - t122;
+    const real t124 = t110 + t123;
+    const real t125 = b[3] * t60;
+    const real t126 = t124 - t125;
+    const real t127 = t109 + t126;
+    const real t128 = t108 + t127;
+    const real t129 = t107 + t128;
+    e_B[3] = t129;
+    const real t130 = b[8] * t24;
+    const real t131 = b[7] * t21;
+    const real t132 = b[5] * t18;
+    const real t133 = b[3] * t54;
+    const real t134 = b[6] * t12;
+    const real t135 = b[4] * t6;
+    const real t136 = b[5] * t9;
+    const real t137 = t135 + t136;
+    const real t138 = t134 + t137;
+    const real t139 = t12 * t138;
+    const real t140 = t6 * t115;
+    const real t141 = t139 - t140;
+    const real t142 = b[1] * t68;
     const real t143 = t141 - t142;
-    const real t144 = b[1] * t70;
-    const real t145 = t143 - t144;
-    const real t146 = t135 + t145;
-    const real t147 = t134 + t146;
-    const real t148 = t133 + t147;
-    const real t149 = t132 + t148;
-    e_B[4] = t149;
-    const real t150 = b[9] * t26;
-    const real t151 = b[8] * t23;
-    const real t152 = b[6] * t20;
-    const real t153 = b[1] * t62;
-    const real t154 = t8 * t123;
-    const real t155 = t11 * t140;
-    const real t156 = t154 - t155;
-    const real t157 = t153 + t156;
-    const real t158 = b[2] * t56;
-    const real t159 = t157 - t158;
-    const real t160 = t152 + t159;
-    const real t161 = t151 + t160;
-    const real t162 = t150 + t161;
-    e_B[5] = t162;
+    const real t144 = t133 + t143;
+    const real t145 = t132 + t144;
+    const real t146 = t131 + t145;
+    const real t147 = t130 + t146;
+    e_B[4] = t147;
+    const real t148 = b[9] * t24;
+    const real t149 = b[8] * t21;
+    const real t150 = b[6] * t18;
+    const real t151 = b[1] * t60;
+    const real t152 = t6 * t121;
+    const real t153 = t9 * t138;
+    const real t154 = t152 - t153;
+    const real t155 = t151 + t154;
+    const real t156 = b[2] * t54;
+    const real t157 = t155 - t156;
+    const real t158 = t150 + t157;
+    const real t159 = t149 + t158;
+    const real t160 = t148 + t159;
+    e_B[5] = t160;
     qdot[0] = u[0];
     return 0;
 }
@@ -230,11 +256,12 @@ int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *re
 static int mstmm_sweep_link_prismatic_forward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_link_prismatic_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_link_prismatic_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_link_prismatic_forward_inputs[] = {
     {"link", 5, "", 0, 0},
+    {"turn", 2, "", 0, 0},
     {"b", 10, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
@@ -243,7 +270,6 @@ static const mstmm_port mstmm_sweep_link_prismatic_forward_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_link_prismatic_forward_outputs[] = {
-    {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
     {"motion", 9, "", 0, 0},
     {"e_B", 6, "N, N*m", 0, 0},
@@ -681,14 +707,26 @@ static const mstmm_port mstmm_sweep_link_prismatic_recover_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_link_prismatic_kernels[] = {
     {
+        .name = "angle",
+        .function = (void (*)(void))mstmm_sweep_link_prismatic_angle,
+        .call = mstmm_sweep_link_prismatic_angle_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_link_prismatic_angle_inputs,
+        .outputs = mstmm_sweep_link_prismatic_angle_outputs,
+        .ir_hash = "ca963c806b34225ce1e8e22c01d21519c5c4af56814fdb8f774e8de303a9b1d5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward",
         .function = (void (*)(void))mstmm_sweep_link_prismatic_forward,
         .call = mstmm_sweep_link_prismatic_forward_call,
-        .n_inputs = 6,
-        .n_outputs = 5,
+        .n_inputs = 7,
+        .n_outputs = 4,
         .inputs = mstmm_sweep_link_prismatic_forward_inputs,
         .outputs = mstmm_sweep_link_prismatic_forward_outputs,
-        .ir_hash = "4b474125ed15854b2e5aa540efbe2bf9f0a8eed1296a5b4db7f50b5f4a5d3a02",
+        .ir_hash = "ab35a779c59b9aa06beeeb9bc0d3be1730dfcea56eeeedb6f61a947fb3a29f53",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -722,7 +760,7 @@ const mstmm_element mstmm_sweep_link_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_prismatic",
-    .hash = "141ede5efe33f71638d53d81763725905da080e8fbbe5acfd2bb85fd0db58042",
+    .hash = "fbf8598546c00a22a6d885f26faf1e886ffc04110d821a7e79fb9d4e8fe9a6c3",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -732,6 +770,6 @@ const mstmm_element mstmm_sweep_link_prismatic = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_link_prismatic_kernels,
 };

@@ -8,10 +8,12 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_link_screw;
-int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot);
+int mstmm_sweep_link_screw_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
 int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict b, const real *restrict p,
     const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
@@ -21,220 +23,243 @@ int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restri
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+/* angle of the screw hinge
+ * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  q[1] coordinates: angle [rad]
+ * out theta[1] (rad) angle about z
+ */
+int mstmm_sweep_link_screw_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta)
+{
+    const real t0 = link[3] + q[0];
+    theta[0] = t0;
+    return 0;
+}
+
+static int mstmm_sweep_link_screw_angle_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_link_screw_angle(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_link_screw_angle_inputs[] = {
+    {"link", 5, "", 0, 0},
+    {"q", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_link_screw_angle_outputs[] = {
+    {"theta", 1, "rad", 0, 0},
+};
+
 /* bias motion of a rigid body behind the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
+ * in  turn[2] cosine and sine of the angle about z
  * in  b[10] parameters of the rigid body, body axes
  * in  p[1] parameters: lead [m]
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
  * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
- * out turn[2] cosine and sine of the angle about z
  * out d[1] (m) shift along z
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e_B[6] (N, N*m) load that the bias motion of the body needs
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict b,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict turn, real *restrict d, real *restrict motion,
-    real *restrict e_B, real *restrict qdot)
+int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot)
 {
-    const real t0 = link[3] + q[0];
-    const real t1 = cos(t0);
-    turn[0] = t1;
-    const real t2 = sin(t0);
-    turn[1] = t2;
-    const real t3 = p[0] * q[0];
-    const real t4 = 2.0 * MSTMM_PI;
-    const real t5 = 1.0 / t4;
-    const real t6 = t3 * t5;
-    const real t7 = link[4] + t6;
-    d[0] = t7;
-    const real t8 = motion_I[0] * t1;
-    const real t9 = link[0] * motion_I[1];
-    const real t10 = link[1] * motion_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = t11 * t2;
-    const real t13 = t8 + t12;
-    motion[0] = t13;
-    const real t14 = t11 * t1;
-    const real t15 = motion_I[0] * t2;
+    const real t0 = p[0] * q[0];
+    const real t1 = 2.0 * MSTMM_PI;
+    const real t2 = 1.0 / t1;
+    const real t3 = t0 * t2;
+    const real t4 = link[4] + t3;
+    d[0] = t4;
+    const real t5 = turn[0] * motion_I[0];
+    const real t6 = link[0] * motion_I[1];
+    const real t7 = link[1] * motion_I[2];
+    const real t8 = t6 + t7;
+    const real t9 = turn[1] * t8;
+    const real t10 = t5 + t9;
+    motion[0] = t10;
+    const real t11 = turn[0] * t8;
+    const real t12 = turn[1] * motion_I[0];
+    const real t13 = t11 - t12;
+    motion[1] = t13;
+    const real t14 = link[0] * motion_I[2];
+    const real t15 = link[1] * motion_I[1];
     const real t16 = t14 - t15;
-    motion[1] = t16;
-    const real t17 = link[0] * motion_I[2];
-    const real t18 = link[1] * motion_I[1];
-    const real t19 = t17 - t18;
-    const real t20 = u[0] + t19;
-    motion[2] = t20;
-    const real t21 = motion_I[3] * t1;
-    const real t22 = link[0] * motion_I[4];
-    const real t23 = link[1] * motion_I[5];
-    const real t24 = t22 + t23;
-    const real t25 = t24 * t2;
-    const real t26 = t21 + t25;
-    const real t27 = u[0] * t16;
-    const real t28 = t26 + t27;
-    motion[3] = t28;
-    const real t29 = t24 * t1;
-    const real t30 = motion_I[3] * t2;
-    const real t31 = t29 - t30;
-    const real t32 = u[0] * t13;
+    const real t17 = u[0] + t16;
+    motion[2] = t17;
+    const real t18 = turn[0] * motion_I[3];
+    const real t19 = link[0] * motion_I[4];
+    const real t20 = link[1] * motion_I[5];
+    const real t21 = t19 + t20;
+    const real t22 = turn[1] * t21;
+    const real t23 = t18 + t22;
+    const real t24 = u[0] * t13;
+    const real t25 = t23 + t24;
+    motion[3] = t25;
+    const real t26 = turn[0] * t21;
+    const real t27 = turn[1] * motion_I[3];
+    const real t28 = t26 - t27;
+    const real t29 = u[0] * t10;
+    const real t30 = t28 - t29;
+    motion[4] = t30;
+    const real t31 = link[0] * motion_I[5];
+    const real t32 = link[1] * motion_I[4];
     const real t33 = t31 - t32;
-    motion[4] = t33;
-    const real t34 = link[0] * motion_I[5];
-    const real t35 = link[1] * motion_I[4];
-    const real t36 = t34 - t35;
-    motion[5] = t36;
-    const real t37 = motion_I[1] * motion_I[1];
-    const real t38 = motion_I[2] * motion_I[2];
-    const real t39 = t37 + t38;
-    const real t40 = link[2] * t39;
-    const real t41 = motion_I[6] - t40;
-    const real t42 = motion_I[0] * t19;
-    const real t43 = t24 + t42;
-    const real t44 = t7 * t43;
-    const real t45 = t41 + t44;
-    const real t46 = t1 * t45;
-    const real t47 = motion_I[0] * motion_I[1];
-    const real t48 = motion_I[5] + t47;
-    const real t49 = link[2] * t48;
-    const real t50 = motion_I[7] + t49;
-    const real t51 = link[0] * t50;
-    const real t52 = motion_I[0] * motion_I[2];
-    const real t53 = t52 - motion_I[4];
-    const real t54 = link[2] * t53;
-    const real t55 = motion_I[8] + t54;
-    const real t56 = link[1] * t55;
-    const real t57 = t51 + t56;
-    const real t58 = t11 * t19;
-    const real t59 = t58 - motion_I[3];
-    const real t60 = t7 * t59;
-    const real t61 = t57 + t60;
-    const real t62 = t2 * t61;
-    const real t63 = t46 + t62;
-    const real t64 = p[0] * t16;
-    const real t65 = u[0] * t64;
-    const real t66 = 1.0 / MSTMM_PI;
-    const real t67 = t65 * t66;
-    const real t68 = t63 + t67;
-    motion[6] = t68;
-    const real t69 = t1 * t61;
-    const real t70 = t2 * t45;
-    const real t71 = t69 - t70;
-    const real t72 = p[0] * t13;
-    const real t73 = u[0] * t72;
-    const real t74 = t66 * t73;
-    const real t75 = t71 - t74;
-    motion[7] = t75;
-    const real t76 = link[0] * t55;
-    const real t77 = link[1] * t50;
-    const real t78 = t76 - t77;
-    const real t79 = motion_I[0] * motion_I[0];
-    const real t80 = t11 * t11;
-    const real t81 = t79 + t80;
-    const real t82 = t7 * t81;
-    const real t83 = t78 - t82;
-    motion[8] = t83;
-    const real t84 = b[0] * t68;
-    const real t85 = t35 - t34;
-    const real t86 = t13 * t16;
-    const real t87 = t85 + t86;
-    const real t88 = b[2] * t87;
-    const real t89 = t13 * t20;
-    const real t90 = t33 + t89;
-    const real t91 = b[3] * t90;
-    const real t92 = t88 + t91;
-    const real t93 = t16 * t16;
-    const real t94 = t20 * t20;
-    const real t95 = t93 + t94;
-    const real t96 = b[1] * t95;
-    const real t97 = t92 - t96;
-    const real t98 = t84 + t97;
-    e_B[0] = t98;
-    const real t99 = b[0] * t75;
-    const real t100 = t36 + t86;
-    const real t101 = b[1] * t100;
-    const real t102 = t16 * t20;
-    const real t103 = t102 - t28;
-    const real t104 = b[3] * t103;
-    const real t105 = t101 + t104;
-    const real t106 = t13 * t13;
-    const real t107 = t94 + t106;
-    const real t108 = b[2] * t107;
-    const real t109 = t105 - t108;
-    const real t110 = t99 + t109;
-    e_B[1] = t110;
-    const real t111 = b[0] * t83;
-    const real t112 = t32 - t31;
-    const real t113 = t89 + t112;
-    const real t114 = b[1] * t113;
-    const real t115 = t28 + t102;
-    const real t116 = b[2] * t115;
-    const real t117 = t114 + t116;
-    const real t118 = t93 + t106;
-    const real t119 = b[3] * t118;
-    const real t120 = t117 - t119;
-    const real t121 = t111 + t120;
-    e_B[2] = t121;
-    const real t122 = b[6] * t36;
-    const real t123 = b[5] * t33;
-    const real t124 = b[4] * t28;
-    const real t125 = b[2] * t83;
-    const real t126 = b[9] * t20;
-    const real t127 = b[6] * t13;
-    const real t128 = b[8] * t16;
-    const real t129 = t127 + t128;
-    const real t130 = t126 + t129;
-    const real t131 = t16 * t130;
-    const real t132 = b[8] * t20;
-    const real t133 = b[5] * t13;
-    const real t134 = b[7] * t16;
-    const real t135 = t133 + t134;
-    const real t136 = t132 + t135;
-    const real t137 = t20 * t136;
-    const real t138 = t131 - t137;
-    const real t139 = t125 + t138;
-    const real t140 = b[3] * t75;
-    const real t141 = t139 - t140;
-    const real t142 = t124 + t141;
-    const real t143 = t123 + t142;
-    const real t144 = t122 + t143;
-    e_B[3] = t144;
-    const real t145 = b[8] * t36;
-    const real t146 = b[7] * t33;
-    const real t147 = b[5] * t28;
-    const real t148 = b[3] * t68;
-    const real t149 = b[6] * t20;
-    const real t150 = b[4] * t13;
-    const real t151 = b[5] * t16;
-    const real t152 = t150 + t151;
-    const real t153 = t149 + t152;
-    const real t154 = t20 * t153;
-    const real t155 = t13 * t130;
-    const real t156 = t154 - t155;
-    const real t157 = b[1] * t83;
-    const real t158 = t156 - t157;
-    const real t159 = t148 + t158;
-    const real t160 = t147 + t159;
-    const real t161 = t146 + t160;
-    const real t162 = t145 + t161;
-    e_B[4] = t162;
-    const real t163 = b[9] * t36;
-    const real t164 = b[8] * t33;
-    const real t165 = b[6] * t28;
-    const real t166 = b[1] * t75;
-    const real t167 = t13 * t136;
-    const real t168 = t16 * t153;
+    motion[5] = t33;
+    const real t34 = motion_I[1] * motion_I[1];
+    const real t35 = motion_I[2] * motion_I[2];
+    const real t36 = t34 + t35;
+    const real t37 = link[2] * t36;
+    const real t38 = motion_I[6] - t37;
+    const real t39 = motion_I[0] * t16;
+    const real t40 = t21 + t39;
+    const real t41 = t4 * t40;
+    const real t42 = t38 + t41;
+    const real t43 = turn[0] * t42;
+    const real t44 = motion_I[0] * motion_I[1];
+    const real t45 = motion_I[5] + t44;
+    const real t46 = link[2] * t45;
+    const real t47 = motion_I[7] + t46;
+    const real t48 = link[0] * t47;
+    const real t49 = motion_I[0] * motion_I[2];
+    const real t50 = t49 - motion_I[4];
+    const real t51 = link[2] * t50;
+    const real t52 = motion_I[8] + t51;
+    const real t53 = link[1] * t52;
+    const real t54 = t48 + t53;
+    const real t55 = t8 * t16;
+    const real t56 = t55 - motion_I[3];
+    const real t57 = t4 * t56;
+    const real t58 = t54 + t57;
+    const real t59 = turn[1] * t58;
+    const real t60 = t43 + t59;
+    const real t61 = p[0] * t13;
+    const real t62 = u[0] * t61;
+    const real t63 = 1.0 / MSTMM_PI;
+    const real t64 = t62 * t63;
+    const real t65 = t60 + t64;
+    motion[6] = t65;
+    const real t66 = turn[0] * t58;
+    const real t67 = turn[1] * t42;
+    const real t68 = t66 - t67;
+    const real t69 = p[0] * t10;
+    const real t70 = u[0] * t69;
+    const real t71 = t63 * t70;
+    const real t72 = t68 - t71;
+    motion[7] = t72;
+    const real t73 = link[0] * t52;
+    const real t74 = link[1] * t47;
+    const real t75 = t73 - t74;
+    const real t76 = motion_I[0] * motion_I[0];
+    const real t77 = t8 * t8;
+    const real t78 = t76 + t77;
+    const real t79 = t4 * t78;
+    const real t80 = t75 - t79;
+    motion[8] = t80;
+    const real t81 = b[0] * t65;
+    const real t82 = t32 - t31;
+    const real t83 = t10 * t13;
+    const real t84 = t82 + t83;
+    const real t85 = b[2] * t84;
+    const real t86 = t10 * t17;
+    const real t87 = t30 + t86;
+    const real t88 = b[3] * t87;
+    const real t89 = t85 + t88;
+    const real t90 = t13 * t13;
+    const real t91 = t17 * t17;
+    const real t92 = t90 + t91;
+    const real t93 = b[1] * t92;
+    const real t94 = t89 - t93;
+    const real t95 = t81 + t94;
+    e_B[0] = t95;
+    const real t96 = b[0] * t72;
+    const real t97 = t33 + t83;
+    const real t98 = b[1] * t97;
+    const real t99 = t13 * t17;
+    const real t100 = t99 - t25;
+    const real t101 = b[3] * t100;
+    const real t102 = t98 + t101;
+    const real t103 = t10 * t10;
+    const real t104 = t91 + t103;
+    const real t105 = b[2] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = t96 + t106;
+    e_B[1] = t107;
+    const real t108 = b[0] * t80;
+    const real t109 = t29 - t28;
+    const real t110 = t86 + t109;
+    const real t111 = b[1] * t110;
+    const real t112 = t25 + t99;
+    const real t113 = b[2] * t112;
+    const real t114 = t111 + t113;
+    const real t115 = t90 + t103;
+    const real t116 = b[3] * t115;
+    const real t117 = t114 - t116;
+    const real t118 = t108 + t117;
+    e_B[2] = t118;
+    const real t119 = b[6] * t33;
+    const real t120 = b[5] * t30;
+    const real t121 = b[4] * t25;
+    const real t122 = b[2] * t80;
+    const real t123 = b[9] * t17;
+    const real t124 = b[6] * t10;
+    const real t125 = b[8] * t13;
+    const real t126 = t124 + t125;
+    const real t127 = t123 + t126;
+    const real t128 = t13 * t127;
+    const real t129 = b[8] * t17;
+    const real t130 = b[5] * t10;
+    const real t131 = b[7] * t13;
+    const real t132 = t130 + t131;
+    const real t133 = t129 + t132;
+    const real t134 = t17 * t133;
+    const real t135 = t128 - t134;
+    const real t136 = t122 + t135;
+    const real t137 = b[3] * t72;
+    const real t138 = t136 - t137;
+    const real t139 = t121 + t138;
+    const real t140 = t120 + t139;
+    const real t141 = t119 + t140;
+    e_B[3] = t141;
+    const real t142 = b[8] * t33;
+    const real t143 = b[7] * t30;
+    const real t144 = b[5] * t25;
+    const real t145 = b[3] * t65;
+    const real t146 = b[6] * t17;
+    const real t147 = b[4] * t10;
+    const real t148 = b[5] * t13;
+    const real t149 = t147 + t148;
+    const real t150 = t146 + t149;
+    const real t151 = t17 * t150;
+    const real t152 = t10 * t127;
+    const real t153 = t151 - t152;
+    const real t154 = b[1] * t80;
+    const real t155 = t153 - t154;
+    const real t156 = t145 + t155;
+    const real t157 = t144 + t156;
+    const real t158 = t143 + t157;
+    const real t159 = t142 + t158;
+    e_B[4] = t159;
+    const real t160 = b[9] * t33;
+    const real t161 = b[8] * t30;
+    const real t162 = b[6] * t25;
+    const real t163 = b[1] * t72;
+    const real t164 = t10 * t133;
+    const real t165 = t13 * t150;
+    const real t166 = t164 - t165;
+    const real t167 = t163 + t166;
+    const real t168 = b[2] * t65;
     const real t169 = t167 - t168;
-    const real t170 = t166 + t169;
-    const real t171 = b[2] * t68;
-    const real t172 = t170 - t171;
-    const real t173 = t165 + t172;
-    const real t174 = t164 + t173;
-    const real t175 = t163 + t174;
-    e_B[5] = t175;
+    const real t170 = t162 + t169;
+    const real t171 = t161 + t170;
+    const real t172 = t160 + t171;
+    e_B[5] = t172;
     qdot[0] = u[0];
     return 0;
 }
@@ -242,11 +267,12 @@ int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restri
 static int mstmm_sweep_link_screw_forward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_link_screw_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_link_screw_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_link_screw_forward_inputs[] = {
     {"link", 5, "", 0, 0},
+    {"turn", 2, "", 0, 0},
     {"b", 10, "", 0, 0},
     {"p", 1, "", 0, 0},
     {"q", 1, "", 0, 0},
@@ -255,7 +281,6 @@ static const mstmm_port mstmm_sweep_link_screw_forward_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_link_screw_forward_outputs[] = {
-    {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
     {"motion", 9, "", 0, 0},
     {"e_B", 6, "N, N*m", 0, 0},
@@ -778,14 +803,26 @@ static const mstmm_port mstmm_sweep_link_screw_recover_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_link_screw_kernels[] = {
     {
+        .name = "angle",
+        .function = (void (*)(void))mstmm_sweep_link_screw_angle,
+        .call = mstmm_sweep_link_screw_angle_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_link_screw_angle_inputs,
+        .outputs = mstmm_sweep_link_screw_angle_outputs,
+        .ir_hash = "f272662e6e0d956a3e9bdc2de2f15695cfde327e36f65c54ba5037a4059357ef",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward",
         .function = (void (*)(void))mstmm_sweep_link_screw_forward,
         .call = mstmm_sweep_link_screw_forward_call,
-        .n_inputs = 6,
-        .n_outputs = 5,
+        .n_inputs = 7,
+        .n_outputs = 4,
         .inputs = mstmm_sweep_link_screw_forward_inputs,
         .outputs = mstmm_sweep_link_screw_forward_outputs,
-        .ir_hash = "41e072e0b0fd01f3a05f9522c5893d9edd0bb62a3696cf0b5e1390d062da321f",
+        .ir_hash = "6f1af483160793e9c0f15cb2e86e076c74638e8a8f4c5faed096adff7c5af6d1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -819,7 +856,7 @@ const mstmm_element mstmm_sweep_link_screw = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_screw",
-    .hash = "c9e1aae56c4797683783f240c12eca6e645ba6b688625af2d6add7ae62118464",
+    .hash = "e9962d22be57b8dc25b5a3825459c56ca83bbb28feebef53e257911eae4823e2",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -829,6 +866,6 @@ const mstmm_element mstmm_sweep_link_screw = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_link_screw_kernels,
 };

@@ -219,7 +219,9 @@ class BodyRecords:
         if link is None:
             return
         kernel = prebuilt.elements()["sweep", f"link_{hinge.type}"]
-        record.link = self.reals((*link, *rigid, *placement.alignment(hinge)[2]))
+        rigid = rigid_parameters(body, own) if body.type == "rigid" else ()
+        lead = placement.alignment(hinge)[2] or (0.0,)
+        record.link = self.reals((*link, *rigid, *lead))
         if rigid and not record.generic:
             for name, function in kernel.functions.items():
                 setattr(record, f"link_{name}", function)

@@ -81,8 +81,8 @@ def pack(
     """Engine arrays of a scene; `known` are elements beyond the prebuilt ones.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
-    may deviate from the Riccati sweep by that much.  Without `align` every internal frame is that of
-    the body's own hinge, whatever hangs on the body: its numbers are smooth functions of the scene's.
+    may deviate from the Riccati sweep by that much.  Without `align` internal frames are those of
+    the bodies' own hinges, whatever hangs on them: smooth functions of the scene's numbers.
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
