@@ -18,10 +18,15 @@ import mstmm
 COUNT = 8
 
 
-def errors(masses: Sequence[float], kind: str, rng: np.random.Generator) -> tuple[float, float]:
+ENGINES = pytest.mark.parametrize("engine", ["looped", "fused"])
+
+
+def errors(
+    masses: Sequence[float], kind: str, engine: str, rng: np.random.Generator
+) -> tuple[float, float]:
     """Middle and worst one of five states."""
     scene = chain([kind] * len(masses), 0.6, masses)
-    model, found = mstmm.compile(mstmm.Scene(**scene)), list[float]()
+    model, found = mstmm.compile(mstmm.Scene(**scene), engine=engine), list[float]()
     for _ in range(5):
         q, u = drawn_state(scene, rng)
         found.append(worst(model.accelerations(q, u), precise_accelerations(scene, q, u)))
@@ -30,22 +35,25 @@ def errors(masses: Sequence[float], kind: str, rng: np.random.Generator) -> tupl
 
 @pytest.mark.parametrize("power", range(0, 9, 2))
 @pytest.mark.parametrize("kind", ["pin", "ball"])
-def test_heavy_tip(kind: str, power: int, rng: np.random.Generator) -> None:
+@ENGINES
+def test_heavy_tip(engine: str, kind: str, power: int, rng: np.random.Generator) -> None:
     masses = [1.0] * (COUNT - 1) + [10.0**power]
-    middle, largest = errors(masses, kind, rng)
+    middle, largest = errors(masses, kind, engine, rng)
     assert middle < 1e-14 + 1e-15 * 10**power
     assert largest < 1e-14 + 5e-15 * 10**power
 
 
 @pytest.mark.parametrize("kind", ["pin", "ball"])
-def test_heavy_root(kind: str, rng: np.random.Generator) -> None:
-    assert max(errors([1e8] + [1.0] * (COUNT - 1), kind, rng)) < 2e-14
+@ENGINES
+def test_heavy_root(engine: str, kind: str, rng: np.random.Generator) -> None:
+    assert max(errors([1e8] + [1.0] * (COUNT - 1), kind, engine, rng)) < 2e-14
 
 
 @pytest.mark.parametrize(("ratio", "bound"), [(0.1, 2e-14), (0.01, 2e-14), (10.0, 1e-10)])
-def test_ratio_chains(ratio: float, bound: float, rng: np.random.Generator) -> None:
+@ENGINES
+def test_ratio_chains(engine: str, ratio: float, bound: float, rng: np.random.Generator) -> None:
     """Every body `ratio` times as heavy as the one before."""
-    assert max(errors([ratio**k for k in range(10)], "pin", rng)) < bound
+    assert max(errors([ratio**k for k in range(COUNT)], "pin", engine, rng)) < bound
 
 
 def test_product_fails_for_light_tips_where_the_sweep_does_not(rng: np.random.Generator) -> None:
