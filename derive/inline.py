@@ -42,9 +42,9 @@ class Inliner:
         call = self.graph.call
 
         def value(operand: Operand) -> Node:
-            if type(operand) is Temporary:
+            if isinstance(operand, Temporary):
                 return known[operand.number]
-            if type(operand) is Constant:
+            if isinstance(operand, Constant):
                 return self._constant(operand)
             return names[operand.port][ports[operand.port].offset(operand.index)]
 

@@ -147,7 +147,7 @@ def test_derivative_is_the_slope(tree: Tree, point: list[float]) -> None:
         graph = Graph()
         leaves = graph.vector("x", 3)
         seeds = dict(zip(leaves, (1, -2, 0.5), strict=True))
-        found = derivative(build(graph, tree, leaves), seeds)  # type: ignore[arg-type]
+        found = derivative(build(graph, tree, leaves), seeds)
         kernel = graph.kernel("slope", [Port("x", (3,))], [Port("y")], {"y": found})
         got = evaluate(kernel, {"x": point}, 2 * DIGITS)["y"][0]
         assert abs(got - slope) < 1e-20
