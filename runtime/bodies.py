@@ -219,8 +219,7 @@ class BodyRecords:
         if link is None:
             return
         kernel = prebuilt.elements()["sweep", f"link_{hinge.type}"]
-        rigid = rigid_parameters(body, own) if body.type == "rigid" else ()
-        lead = placement.alignment(hinge)[2] or (0.0,)
+        lead = placement.alignment(hinge)[2] or (0.0,)  # every link has room for it
         record.link = self.reals((*link, *rigid, *lead))
         if rigid and not record.generic:
             for name, function in kernel.functions.items():
