@@ -22,7 +22,7 @@ LIMITS = {
 }  # fmt: skip
 #: Contender -> family whose best member counts.
 FAMILIES = {
-    "mstmm fused": "mstmm fused", "mstmm looped": "mstmm looped", "casadi baked": "CasADi C, baked",
+    "mstmm fused": "mstmm fused", "mstmm baked": "mstmm fused, baked", "mstmm looped": "mstmm looped", "casadi baked": "CasADi C, baked",
     "casadi libmvec": "CasADi C + libmvec", "casadi": "CasADi C", "pinocchio": "Pinocchio",
     "mujoco": "MuJoCo", "drake": "Drake", "exudyn": "Exudyn",
 }  # fmt: skip
@@ -65,6 +65,9 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
     if bodies <= LIMITS["mstmm fused"]:
         fused = mstmm.compile(mstmm.Scene(**scene), engine="fused")
         found.subjects["mstmm fused"] = mstmm_engines.fused(fused, q, u)
+    if bodies <= 25:
+        baked = mstmm.compile(mstmm.Scene(**scene), engine="fused", bake=True)
+        found.subjects["mstmm baked"] = mstmm_engines.fused(baked, q, u)
     if bodies <= LIMITS["casadi"]:
         _add_casadi(found, q, u)
     if bodies <= LIMITS["pinocchio"]:

@@ -15,6 +15,7 @@ from pydrake.all import (
     SpatialInertia,
     UnitInertia,
 )
+from scipy.spatial.transform import Rotation
 
 from .links import Tree
 
@@ -50,17 +51,35 @@ def plant_of(tree: Tree) -> MultibodyPlant:
     return plant
 
 
-class DrakeRun:
-    """Fixed steps of Runge and Kutta of third order from one state: three evaluations a step."""
+def inboard_speeds(angles: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Drake's speeds of a chain of balls: angular velocities in the axes of the inboard frame."""
+    turns = Rotation.from_euler("ZYX", angles.reshape(-1, 3)[:, ::-1])
+    return turns.apply(u.reshape(-1, 3)).ravel()
 
-    def __init__(self, tree: Tree, q: np.ndarray, u: np.ndarray, step: float = 1e-5) -> None:
+
+class DrakeRun:
+    """One of its Runge-Kutta integrators from one state: fixed steps, or error control."""
+
+    def __init__(
+        self,
+        tree: Tree,
+        q: np.ndarray,
+        u: np.ndarray,
+        step: float = 1e-5,
+        scheme: str = "runge_kutta3",
+        tolerance: float = 0.0,
+    ) -> None:
         self.plant, self.step = plant_of(tree), step
         self.simulator = Simulator(self.plant)
         self.context = self.simulator.get_mutable_context()
         self.state = np.concatenate([q, u])
         self.plant.SetPositionsAndVelocities(self.context, self.state)
-        integrator = ResetIntegratorFromFlags(self.simulator, "runge_kutta3", step)
-        integrator.set_fixed_step_mode(True)
+        integrator = ResetIntegratorFromFlags(self.simulator, scheme, step)
+        integrator.set_fixed_step_mode(tolerance == 0)
+        if tolerance:
+            integrator.set_target_accuracy(tolerance)
+            integrator.set_requested_minimum_step_size(1e-5)
+            integrator.set_throw_on_minimum_step_size_violation(True)
         self.simulator.Initialize()
 
     def accelerations(self, q: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -69,7 +88,7 @@ class DrakeRun:
         return self.plant.get_generalized_acceleration_output_port().Eval(self.context)
 
     def run(self, steps: int) -> None:
-        """That many steps from the first state."""
+        """That many times `step` from the first state."""
         self.context.SetTime(0.0)
         self.plant.SetPositionsAndVelocities(self.context, self.state)
         self.simulator.Initialize()

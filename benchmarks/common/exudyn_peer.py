@@ -19,7 +19,7 @@ PINS = (exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.Revolute
 SLIDES = (exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ)
 EVALUATIONS = {
     exu.DynamicSolverType.ExplicitEuler: 1, exu.DynamicSolverType.RK44: 4,
-    exu.DynamicSolverType.DOPRI5: 6, exu.DynamicSolverType.DVERK6: 8,
+    exu.DynamicSolverType.DOPRI5: 6, exu.DynamicSolverType.RK67: 9,
 }  # fmt: skip
 
 
@@ -62,6 +62,20 @@ def state(tree: Tree, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndar
         linear = Rotation.from_quat(np.roll(here[-4:], -1)).apply(speed[:3]) if nu == 6 else []
         own_u.append(np.concatenate([linear, rates(turn, speed[-3:])]))
     return np.concatenate(own_q), np.concatenate(own_u)
+
+
+def coordinates(tree: Tree, own: np.ndarray) -> np.ndarray:
+    """q of a chain of pins and balls from its angles (z, y, x in turn)."""
+    parts, at = [], 0
+    for link in tree.links:
+        if link.kind == "pin":
+            parts.append(own[at : at + 1])
+            at += 1
+            continue
+        turn = Rotation.from_euler("ZYX", own[at : at + 3])
+        parts.append(np.roll(turn.as_quat(), 1))
+        at += 3
+    return np.concatenate(parts)
 
 
 class ExudynRun:
@@ -110,12 +124,22 @@ class ExudynRun:
             linkMasses=lists["m"],
         )  # fmt: skip
 
-    def run(self, t_end: float, steps: int, method: Any = exu.DynamicSolverType.RK44) -> None:
-        """From the start to t_end in equal steps, nothing written."""
+    def run(
+        self,
+        t_end: float,
+        steps: int,
+        method: Any = exu.DynamicSolverType.RK44,
+        tolerance: float = 0.0,
+    ) -> None:
+        """From the start to t_end in equal steps, or with error control; nothing written."""
         settings = exu.SimulationSettings()
         settings.timeIntegration.numberOfSteps = steps
         settings.timeIntegration.endTime = t_end
-        settings.timeIntegration.automaticStepSize = False
+        settings.timeIntegration.automaticStepSize = tolerance > 0
+        if tolerance > 0:
+            settings.timeIntegration.absoluteTolerance = tolerance
+            settings.timeIntegration.relativeTolerance = tolerance
+            settings.timeIntegration.initialStepSize = 1e-3
         settings.timeIntegration.verboseMode = 0
         settings.solutionSettings.writeSolutionToFile = False
         settings.parallel.numberOfThreads = 1

@@ -31,3 +31,16 @@ static int evaluate(const double *context, const double *t, const double *q, con
 }
 
 const accelerations mujoco_accelerations = evaluate;
+
+/* Steps of the model's integrator from a state; q and u are overwritten with the end. */
+void mujoco_run(const place *at, long steps, double *q, double *u)
+{
+    const mjModel *m = at->model;
+    mjData *d = at->data;
+    mj_resetData(m, d);
+    memcpy(d->qpos, q, sizeof(double) * m->nq);
+    memcpy(d->qvel, u, sizeof(double) * m->nv);
+    for (long k = 0; k < steps; k++) mj_step(m, d);
+    memcpy(q, d->qpos, sizeof(double) * m->nq);
+    memcpy(u, d->qvel, sizeof(double) * m->nv);
+}

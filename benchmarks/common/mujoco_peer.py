@@ -120,3 +120,30 @@ def accelerations(found: native.Subject, tree: Tree, q: np.ndarray, u: np.ndarra
     if tree.links[0].kind == "free":
         out[:, :3] -= np.cross(u[:, 3:6], u[:, :3])
     return out
+
+
+class MujocoRun:
+    """Fixed steps of MuJoCo's own Runge-Kutta integrator of fourth order, in C."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.model = model_of(tree)
+        option = self.model.opt
+        option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        flags = mujoco.mjtDisableBit
+        option.disableflags = int(
+            flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT | flags.mjDSBL_SENSOR
+            | flags.mjDSBL_ACTUATION | flags.mjDSBL_EQUALITY | flags.mjDSBL_LIMIT
+        )  # fmt: skip
+        self.data = mujoco.MjData(self.model)
+        self.pair = (ctypes.c_void_p * 2)(self.model._address, self.data._address)
+        self.library = ctypes.CDLL(str(library()))
+
+    def run(self, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
+        """q at t_end (chains of pins and balls)."""
+        self.model.opt.timestep = t_end / steps
+        q, u = q.copy(), u.copy()
+        self.library.mujoco_run(
+            self.pair, ctypes.c_long(steps), ctypes.c_void_p(q.ctypes.data),
+            ctypes.c_void_p(u.ctypes.data),
+        )  # fmt: skip
+        return q

@@ -49,6 +49,28 @@ int evaluate(const double *context, const double *, const double *q, const doubl
   return 0;
 }
 
+// The same with coordinate rates, which an integrator needs.
+template <pinocchio::Convention convention>
+int evaluate_with_rates(const double *context, const double *t, const double *q, const double *u,
+                        const double *memory, const double *efforts, double *qdot, double *udot) {
+  const auto &model = reinterpret_cast<const Tree *>(context)->model;
+  for (pinocchio::JointIndex i = 1; i < model.joints.size(); ++i) {
+    const auto &joint = model.joints[i];
+    const double *x = q + joint.idx_q(), *w = u + joint.idx_v();
+    double *rate = qdot + joint.idx_q();
+    if (joint.nq() == 1) {
+      rate[0] = w[0];
+      continue;
+    }
+    const double a = 0.5 * w[0], b = 0.5 * w[1], c = 0.5 * w[2];  // x, y, z, w
+    rate[0] = x[3] * a + x[1] * c - x[2] * b;
+    rate[1] = x[3] * b + x[2] * a - x[0] * c;
+    rate[2] = x[3] * c + x[0] * b - x[1] * a;
+    rate[3] = -(x[0] * a + x[1] * b + x[2] * c);
+  }
+  return evaluate<convention>(context, t, q, u, memory, efforts, qdot, udot);
+}
+
 }  // namespace
 
 extern "C" {
@@ -92,5 +114,7 @@ Tree *tree_copy(const Tree *tree) {
 }
 
 extern const accelerations local_aba = evaluate<pinocchio::Convention::LOCAL>;
+extern const accelerations local_aba_rates = evaluate_with_rates<pinocchio::Convention::LOCAL>;
+extern const accelerations world_aba_rates = evaluate_with_rates<pinocchio::Convention::WORLD>;
 extern const accelerations world_aba = evaluate<pinocchio::Convention::WORLD>;
 }

@@ -70,15 +70,38 @@ def coordinates(tree: Tree, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def subjects(tree: Tree, q: np.ndarray, u: np.ndarray) -> dict[str, native.Subject]:
-    """Level and convention -> function and states."""
+def back(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """Our q of a chain from Pinocchio's: quaternions as w, x, y, z."""
+    out, at = q.copy(), 0
+    for link in tree.links:
+        end = at + COORDINATES[link.kind][0]
+        if link.kind != "pin":
+            out[end - 4 : end] = np.roll(q[end - 4 : end], 1)
+        at = end
+    return out
+
+
+def subjects(
+    tree: Tree, q: np.ndarray, u: np.ndarray, rates: bool = False
+) -> dict[str, native.Subject]:
+    """Level and convention -> function and states; with coordinate rates for an integrator."""
     found: dict[str, native.Subject] = {}
     for level in LEVELS:
         library = opened(level)
         for convention in ("local", "world"):
             model = built(library, tree)
-            f: Any = ctypes.c_void_p.in_dll(library, f"{convention}_aba").value
+            f: Any = ctypes.c_void_p.in_dll(
+                library, f"{convention}_aba{'_rates' if rates else ''}"
+            ).value
             found[f"{level} {convention}"] = native.Subject(
                 f, model, coordinates(tree, q), u, keep=library
             )
     return found
+
+
+def local(
+    library: ctypes.CDLL, model: int, tree: Tree, q: np.ndarray, u: np.ndarray
+) -> native.Subject:
+    """Function and states in the local convention, on a model that is there already."""
+    f: Any = ctypes.c_void_p.in_dll(library, "local_aba").value
+    return native.Subject(f, model, coordinates(tree, q), u, keep=library)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -61,6 +62,39 @@ def example(name: str) -> Scene:
 def puma(n: int = 6) -> Scene:
     """The Puma 560 of examples/."""
     return example("puma560")
+
+
+def long_chain(kind: str, n: int) -> Scene:
+    """`pins` or `balls` with any n, written as one chain."""
+    body = {key: value for key, value in rod("").items() if key != "name"}
+    kinds: dict[str, Any] = {
+        "pins": [{"type": "pin", "axis": axis} for axis in AXES], "balls": {"type": "ball"},
+    }  # fmt: skip
+    chained = {"name": "rods", "count": n, "inboard": "ground", "body": body, "hinge": kinds[kind]}
+    return {"schema_version": 1, "gravity": [0.0, 0.0, -9.81], "chain": [chained]}
+
+
+def hanging(scene: Scene, q: list[list[float]], u: list[list[float]]) -> Scene:
+    """The chain hanging along x, started from there."""
+    scene["gravity"] = [9.81, 0.0, 0.0]
+    for hinge, angle, speed in zip(scene["hinge"], q, u, strict=True):
+        hinge["initial"] = {"q": angle, "u": speed}
+    return scene
+
+
+def swinging_arm() -> Scene:
+    """Three rods on pins (x, y, z), let go bent by up to 40 degrees: not chaotic within 10 s."""
+    return hanging(pins(3), [[0.35], [0.7], [0.56]], [[1.4], [0.0], [0.0]])
+
+
+def swinging_balls() -> Scene:
+    """Three rods on balls, turned by up to 40 degrees and spinning."""
+    turns = ((0.0, 0.7, 0.0), (0.0, 0.35, 0.35), (0.0, 0.0, 0.49))
+    starts = []
+    for turn in turns:
+        angle = math.hypot(*turn)
+        starts.append([math.cos(angle / 2), *(math.sin(angle / 2) * x / angle for x in turn)])
+    return hanging(balls(3), starts, [[0.35, 0.0, 0.7], [0.0, -0.35, 0.0], [0.0, 0.0, 0.7]])
 
 
 #: name, carried by, place on it (m), axis, mass (kg), mass centre (m), inertia (kg m2).

@@ -60,18 +60,19 @@ def best(result: dict[str, Any], mode: str = "chained") -> dict[str, float]:
 
 def table(results: list[dict[str, Any]]) -> str:
     """Markdown: best of each family, latency-chained, and fused against CasADi."""
-    families = ["mstmm fused", "mstmm looped", "CasADi C", "CasADi C, baked", "CasADi C + libmvec",
+    families = ["mstmm fused", "mstmm fused, baked", "mstmm looped", "CasADi C", "CasADi C, baked", "CasADi C + libmvec",
                 "Pinocchio", "MuJoCo", "Drake", "Exudyn"]  # fmt: skip
-    lines = [f"| scene | bodies | {' | '.join(families)} | fused/CasADi | fused/Pinocchio |"]
-    lines.append("|---" * (len(families) + 4) + "|")
+    lines = [
+        f"| scene | bodies | {' | '.join(families)} | fused/CasADi | baked/baked | fused/Pinocchio |"
+    ]
+    lines.append("|---" * (len(families) + 5) + "|")
     ratios = []
     for result in results:
         found = best(result)
         cells = [f"{found[name]:.3g}" if name in found else "" for name in families]
-        ratio = ["", ""]
-        for i, peer in enumerate(("CasADi C", "Pinocchio")):
-            if {"mstmm fused", peer} <= found.keys():
-                ratio[i] = f"{found['mstmm fused'] / found[peer]:.2f}"
+        pairs = [("mstmm fused", "CasADi C"), ("mstmm fused, baked", "CasADi C, baked"),
+                 ("mstmm fused", "Pinocchio")]  # fmt: skip
+        ratio = [f"{found[a] / found[b]:.2f}" if {a, b} <= found.keys() else "" for a, b in pairs]
         if ratio[0]:
             ratios.append(found["mstmm fused"] / found["CasADi C"])
         lines.append(f"| {result['kind']} | {result['bodies']} | {' | '.join(cells + ratio)} |")

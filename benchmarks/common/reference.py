@@ -1,0 +1,63 @@
+"""End state of a run to more digits than double has: CasADi's equations in long double, RK4."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from . import native
+from .aba import articulated_body
+from .links import Tree
+
+TEXT = """
+#include <tgmath.h>
+#define CASADI_SYMBOL_EXPORT static
+%s
+static void rates(const long double *y, long double *k)
+{
+    static const long double efforts[%d];
+    const long double *arg[] = {0, y, y + %d, efforts};
+    long double *res[] = {k, k + %d};
+    aba(arg, res, 0, 0, 0);
+}
+
+void run(double t_end, long steps, double *state)
+{
+    enum { n = %d };
+    const long double h = (long double)t_end / steps;
+    long double y[n], x[n], k[4][n];
+    for (int i = 0; i < n; i++) y[i] = state[i];
+    for (long step = 0; step < steps; step++) {
+        rates(y, k[0]);
+        for (int i = 0; i < n; i++) x[i] = y[i] + h / 2 * k[0][i];
+        rates(x, k[1]);
+        for (int i = 0; i < n; i++) x[i] = y[i] + h / 2 * k[1][i];
+        rates(x, k[2]);
+        for (int i = 0; i < n; i++) x[i] = y[i] + h * k[2][i];
+        rates(x, k[3]);
+        for (int i = 0; i < n; i++)
+            y[i] += h / 6 * (k[0][i] + 2 * (k[1][i] + k[2][i]) + k[3][i]);
+    }
+    for (int i = 0; i < n; i++) state[i] = y[i];
+}
+"""
+
+
+def end_state(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
+    """[q, u] at t_end."""
+    function, _ = articulated_body(tree, baked=True)
+    with tempfile.TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("aba.c", {"casadi_real": "long double", "include_math": False})
+        generator.add(function)
+        generator.generate(folder + "/")
+        body = (Path(folder) / "aba.c").read_text()
+    text = TEXT % (body, tree.nu, tree.nq, tree.nq, tree.nq + tree.nu)
+    library = ctypes.CDLL(str(native.library("reference", text, ["-O2", "-std=gnu17", "-w"])))
+    library.run.argtypes = [ctypes.c_double, ctypes.c_long, ctypes.c_void_p]
+    state = np.concatenate([q, u]).astype(float)
+    library.run(t_end, steps, state.ctypes.data)
+    return state
