@@ -61,9 +61,9 @@ void mstmm_propose(mstmm_run *run, double error) {
   run->real.error_previous = fmax(error, 1e-4);
 }
 
-int mstmm_reject(mstmm_run *run, int failed, double error, int64_t worst) {
+int mstmm_reject(mstmm_run *run, int failed, double error) {
   const double factor = failed ? AFTER_FAILURE : fmax(SMALLEST_FACTOR, factor_from(run, error));
-  if (!failed) mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, worst, run->real.t);
+  if (!failed) mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, -1, run->real.t);
   run->count.rejected++;
   run->count.rejected_last++;
   run->real.h_next = run->real.h * fmin(factor, 0.95);
@@ -142,7 +142,8 @@ int mstmm_try_step(const mstmm_work *work) {
   for (;;) {
     const int failed = attempt(work, &error, &absolute) != 0;
     if (!failed && (fixed || error < 1.0)) break;
-    status = mstmm_reject(run, failed, error, failed ? -1 : mstmm_worst_component(work));
+    status = mstmm_reject(run, failed, error);
+    if (status && !failed) run->count.component = mstmm_worst_component(work);
     if (status) return status;
   }
   if (!fixed) mstmm_propose(run, error);

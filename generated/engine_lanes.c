@@ -20,6 +20,7 @@ typedef struct cut_group {
   int lanes;
   int64_t n, row;
   double *y, *k, *y_new, *y_stage, *dense; /* k: s + 1 + n_extra rows; dense: n_dense rows */
+  double *atol;                            /* a row: infinite where there is no error to control */
   double *one;                             /* n_state: a single state */
 } cut_group;
 
@@ -39,7 +40,7 @@ static int64_t row_of(const mstmm_system *system) {
 int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tableau) {
   const int sound = system->lanes > 0 && system->n_state > 0 && !system->n_events &&
                     !system->n_memory && mstmm_workspace_size(system, tableau) > 0;
-  const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 3;
+  const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
   return sound ? rows * row_of(system) + system->n_state + WIDE : 0;
 }
 
@@ -55,7 +56,8 @@ static cut_group cut(mstmm_group *group) {
   c.y_new = c.k + (tableau->n_stages + 1 + tableau->n_extra) * c.row;
   c.y_stage = c.y_new + c.row;
   c.dense = c.y_stage + c.row;
-  c.one = c.dense + tableau->n_dense * c.row;
+  c.atol = c.dense + tableau->n_dense * c.row;
+  c.one = c.atol + c.row;
   return c;
 }
 
@@ -310,16 +312,14 @@ MSTMM_WIDE static void errors(const cut_group *c, attempt *a) {
   wide high = {0.0}, low = {0.0};
   if (!tableau->n_errors || !problem->atol) return;
   for (int64_t i = 0; i < (int64_t)n * c->lanes; i += WIDE) {
-    wide e, e_low = {0.0}, old, new, atol;
+    wide e, e_low = {0.0}, old, new;
     mstmm_add_terms(&first, c->k + i, c->row, &e);
     if (both) mstmm_add_terms(&second, c->k + i, c->row, &e_low);
     mstmm_size(c->y + i, &old);
     mstmm_size(c->y_new + i, &new);
     const wide_mask older = old > new;
     mstmm_choose(&older, &old, &new, &new);
-    for (int j = 0; j < WIDE; j++)
-      atol[j] = i + j < (int64_t)n * c->lanes ? problem->atol[(i + j) / c->lanes] : INFINITY;
-    const wide scale = 1.0 / (atol + problem->rtol * new);
+    const wide scale = 1.0 / (*(const wide *)(c->atol + i) + problem->rtol * new);
     high += (e * scale) * (e * scale);
     low += (e_low * scale) * (e_low * scale);
   }
@@ -463,8 +463,8 @@ static void judge(const cut_group *c, attempt *a) {
       continue;
     }
     const int failed = a->failed[lane] != 0;
-    const int status = mstmm_reject(&group->runs[lane], failed, a->error[lane],
-                                    failed ? -1 : worst_component(c, lane));
+    const int status = mstmm_reject(&group->runs[lane], failed, a->error[lane]);
+    if (status && !failed) group->runs[lane].count.component = worst_component(c, lane);
     group->retries[lane]++;
     if (status) finish(c, lane, status);
   }
@@ -486,6 +486,12 @@ int mstmm_group_start(mstmm_group *group) {
   memset(group->workspace, 0, (size_t)size * sizeof(double));
   memset(group->runs, 0, sizeof group->runs);
   for (int lane = 0; lane < WIDE; lane++) group->trajectory[lane] = -1;
+  const cut_group c = cut(group);
+  for (int64_t i = 0; i < c.row; i++) {
+    const int64_t component = i / c.lanes;
+    const int counts = problem->atol && component < c.system->n_error;
+    c.atol[i] = counts ? problem->atol[component] : INFINITY;
+  }
   return 0;
 }
 

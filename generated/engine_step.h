@@ -103,7 +103,7 @@ double mstmm_initial_step(const mstmm_work *work, double interval);
 int mstmm_aim(mstmm_run *run);
 double mstmm_interval(const mstmm_run *run);
 int mstmm_output_inside(const mstmm_run *run);
-int mstmm_reject(mstmm_run *run, int failed, double error, int64_t worst);
+int mstmm_reject(mstmm_run *run, int failed, double error);
 void mstmm_propose(mstmm_run *run, double error);
 void mstmm_count_step(mstmm_run *run, double error, double absolute);
 /* First step: a guess from y and k, and the step from the slope f1 at y + guess k.  Components lie
