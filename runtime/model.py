@@ -223,7 +223,10 @@ class Model:
         return named_parameters.read(self.scene)
 
     def with_parameters(self, changes: Mapping[str, float]) -> Model:
-        """The same scene with other numbers; nothing is compiled again.
+        """The same scene with other numbers.
+
+        Nothing is compiled again, but where the model is fused and a number that was exactly zero
+        (or an axis along a coordinate axis) changes; then other code is compiled or found.
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
         """
@@ -255,8 +258,9 @@ class Model:
         """Integrate to `t_end` (s).
 
         Args:
-            method: rk4 (with `step`), dopri5, dop853, or scipy-DOP853, scipy-RK45, scipy-Radau,
-                scipy-BDF, scipy-LSODA: SciPy's integrators on the same kernels.
+            method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
+                code), or scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA: SciPy's
+                integrators on the same kernels.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
