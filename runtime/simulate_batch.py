@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import MstmmError, SceneError
 
-from .integrate import Failure, Status, failure_text
+from .integrate import Failure, Run, Status, failure_text
 from .lanes_run import Lanes, run_lanes
 from .simulate import Compiled, SceneSystem, Settings, advance, make_run, settled, trajectory
 from .steppers import get
@@ -175,15 +176,29 @@ def _one_by_one(
     which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
     compiled = {id(m): _scalar(m) for m in models}
+    stop = threading.Event()
+
+    def look(_: Run) -> None:
+        if stop.is_set():
+            raise _Stopped
 
     def run(i: int) -> None:
         try:
-            _alone(models[i], compiled[id(models[i])], settings, q[i], u[i], i, rows)
+            _alone(models[i], compiled[id(models[i])], settings, q[i], u[i], i, rows, look)
         except MstmmError as error:  # this trajectory's own affair
             rows.messages[i] = str(error)
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(run, which.tolist()))
+        try:
+            list(pool.map(run, which.tolist()))
+        except BaseException:  # Ctrl-C: the others end within a slice
+            stop.set()
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+class _Stopped(Exception):
+    """Another thread has ended the batch."""
 
 
 def _scalar(model: Model) -> Compiled | None:
@@ -193,11 +208,11 @@ def _scalar(model: Model) -> Compiled | None:
 
 def _alone(
     model: Model, compiled: Compiled | None, settings: Settings, q: Array, u: Array,
-    i: int, rows: _Rows,
+    i: int, rows: _Rows, look: Callable[[Run], None],
 ) -> None:  # fmt: skip
     system = SceneSystem(model._engine, compiled, with_power=False)
     run = make_run(system, settings, q, u)
-    status = advance(run)
+    status = advance(run, look)
     found = trajectory(system, run, settings, status)
     places = np.searchsorted(np.asarray(settings.output_times), found.t)
     rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)

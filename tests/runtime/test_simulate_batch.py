@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import threading
 from functools import cache
 from typing import Any
 
@@ -176,3 +181,33 @@ def test_what_makes_no_sense_is_refused(pins: Model) -> None:
     ):
         with pytest.raises(SceneError, match=message):
             pins.simulate_batch(initial, **RUN | more)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_ctrl_c_ends_a_batch(engine: str) -> None:
+    model = compiled("pins", engine)
+    q, u = states(model, 40)
+    before = signal.getsignal(signal.SIGINT)
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        model.simulate_batch((q, u), t_end=1e5, threads=2)
+    timer.join()
+    assert signal.getsignal(signal.SIGINT) is before
+    assert model.simulate_batch((q[:3], u[:3]), **RUN).success.all()
+
+
+def test_a_run_needs_no_scipy() -> None:
+    """Neither for coefficients nor for anything else that a first result waits for."""
+    program = """
+import sys
+import mstmm
+body = {"name": "rod", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.09, 0.08]}
+pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
+scene = mstmm.Scene(gravity=[0, -9.81, 0], body=[body], hinge=[pin])
+run = mstmm.compile(scene, engine="looped").simulate(1.0)
+assert run.success and run.position("rod").shape == (len(run.t), 3)
+print([name for name in ("scipy", "sympy", "jinja2", "mstmm.derive") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
