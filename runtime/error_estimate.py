@@ -111,22 +111,24 @@ def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str
 
 
 def _differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
-    for hinge in layout.hinges.values():
-        first = hinge.q if kind == "q" else hinge.u
-        units = hinge.q_units if kind == "q" else hinge.u_units
-        turn = hinge.quaternion if kind == "q" else None
-        for k, unit in enumerate(units):
-            if turn is not None and turn <= k < turn + 4:
-                continue
-            yield unit, np.abs(a[:, first + k] - b[:, first + k])
-        if turn is not None:
-            place = slice(first + turn, first + turn + 4)
-            yield "rad", rotation_between(a[:, place], b[:, place])
+    """(unit, largest difference (n,)) of one coordinate of a hinge, or of all that repeat it."""
+    for group in layout.groups:
+        places = group.q_places() if kind == "q" else group.u_places()
+        for j, hinge in enumerate(group.hinges[: group.count]):
+            first = places[j :: len(group.hinges)]
+            units = hinge.q_units if kind == "q" else hinge.u_units
+            turn = hinge.quaternion if kind == "q" else None
+            for k, unit in enumerate(units):
+                if turn is None or not turn <= k < turn + 4:
+                    yield unit, np.abs(a[:, first + k] - b[:, first + k]).max(axis=1)
+            if turn is not None:
+                entries = first[:, None] + turn + np.arange(4)
+                yield "rad", rotation_between(a[:, entries], b[:, entries]).max(axis=1)
 
 
 def rotation_between(a: Array, b: Array) -> Array:
-    """Angle (n,) in rad between orientations given by unit quaternions (n, 4)."""
-    chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    """Angle (...) in rad between orientations given by unit quaternions (..., 4)."""
+    chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
     return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
 
 

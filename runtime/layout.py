@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence, ValuesView
+from dataclasses import dataclass
 from functools import cached_property
 from typing import overload
 
@@ -127,10 +127,11 @@ class Layout:
         if group.count == 1:
             return group.hinges[0]
         repeats, which = divmod(k, len(group.hinges))
-        slots = group.hinges[which]
-        return replace(
-            slots, name=self._numbers.name(hinge),
-            q=slots.q + repeats * group.nq, u=slots.u + repeats * group.nu,
+        one = group.hinges[which]
+        return HingeSlots(
+            self._numbers.name(hinge), one.type, one.q + repeats * group.nq,
+            one.u + repeats * group.nu, one.q_names, one.q_units, one.u_names, one.u_units,
+            one.quaternion,
         )  # fmt: skip
 
     @cached_property
@@ -222,3 +223,18 @@ class _ByName(Mapping[str, HingeSlots]):
 
     def __len__(self) -> int:
         return len(self.layout)
+
+    def values(self) -> ValuesView[HingeSlots]:
+        """All slots; faster than by their names."""
+        return _Values(self)
+
+
+class _Values(ValuesView[HingeSlots]):
+    """Slots in the order of the hinges."""
+
+    def __init__(self, slots: _ByName) -> None:
+        super().__init__(slots)
+        self.layout = slots.layout
+
+    def __iter__(self) -> Iterator[HingeSlots]:
+        return map(self.layout.slots, range(len(self.layout)))
