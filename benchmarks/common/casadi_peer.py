@@ -64,6 +64,13 @@ vector VECTOR_SIN(vector), VECTOR_COS(vector);
 #: Flags tried; the best of them counts.  Nothing here changes results beyond contraction.
 FLAGS = {
     "O2": ("-O2", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
+    "O2 scalar": (
+        "-O2",
+        "-march=native",
+        "-fno-math-errno",
+        "-fno-trapping-math",
+        "-fno-tree-slp-vectorize",
+    ),
     "O3": ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
 }
 

@@ -22,10 +22,14 @@ LIMITS = {
 }  # fmt: skip
 #: Contender -> family whose best member counts.
 FAMILIES = {
-    "mstmm fused": "mstmm fused", "mstmm baked": "mstmm fused, baked", "mstmm looped": "mstmm looped", "casadi baked": "CasADi C, baked",
-    "casadi libmvec": "CasADi C + libmvec", "casadi": "CasADi C", "pinocchio": "Pinocchio",
-    "mujoco": "MuJoCo", "drake": "Drake", "exudyn": "Exudyn",
-}  # fmt: skip
+    "mstmm fused": "mstmm fused",
+    "mstmm baked": "mstmm fused, baked",
+    "mstmm looped": "mstmm looped",
+    "pinocchio": "Pinocchio",
+    "mujoco": "MuJoCo",
+    "drake": "Drake",
+    "exudyn": "Exudyn",
+}
 WRONG = 1e-6
 
 

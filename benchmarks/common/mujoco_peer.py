@@ -1,23 +1,17 @@
-"""MuJoCo's C functions that lead to accelerations, on a model written as MJCF."""
+"""MuJoCo's C functions that lead to accelerations, on a model made with its builder."""
 
 from __future__ import annotations
 
 import ctypes
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from . import native
-from .links import COORDINATES, Link, Tree
-
-
-def text(values: Any) -> str:
-    """Numbers as an attribute, without loss."""
-    return " ".join(repr(float(v)) for v in np.ravel(values))
+from .links import COORDINATES, Tree
 
 
 def quaternion(matrix: np.ndarray) -> np.ndarray:
@@ -25,29 +19,23 @@ def quaternion(matrix: np.ndarray) -> np.ndarray:
     return np.roll(Rotation.from_matrix(matrix).as_quat(), 1)
 
 
-def element(carrier: ElementTree.Element, link: Link) -> ElementTree.Element:
-    """The body of one link inside the body that carries it."""
-    node = ElementTree.SubElement(
-        carrier, "body", name=link.name, pos=text(link.place), quat=text(quaternion(link.turn))
-    )
-    ElementTree.SubElement(node, "inertial", pos=text(link.center), mass="1", diaginertia="1 1 1")
-    kind = {"pin": "hinge"}.get(link.kind, link.kind)
-    joint = ElementTree.SubElement(node, "joint", type=kind)
-    if kind == "hinge":
-        joint.set("axis", text(link.axis))
-        joint.set("armature", text(link.armature))
-    return node
-
-
 def model_of(tree: Tree) -> mujoco.MjModel:
-    """MuJoCo's model of the tree."""
-    root = ElementTree.Element("mujoco")
-    ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    ElementTree.SubElement(root, "option", gravity=text(tree.gravity))
-    nodes = {-1: ElementTree.SubElement(root, "worldbody")}
+    """MuJoCo's model of the tree, through its own builder (its reader of XML refuses deep trees)."""
+    spec = mujoco.MjSpec()
+    spec.option.gravity = tree.gravity
+    kinds = {
+        "pin": mujoco.mjtJoint.mjJNT_HINGE, "ball": mujoco.mjtJoint.mjJNT_BALL,
+        "free": mujoco.mjtJoint.mjJNT_FREE,
+    }  # fmt: skip
+    nodes = {-1: spec.worldbody}
     for number, link in enumerate(tree.links):
-        nodes[number] = element(nodes[link.parent], link)
-    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
+        nodes[number] = nodes[link.parent].add_body(
+            name=link.name, pos=link.place, quat=quaternion(link.turn), mass=1.0,
+            ipos=link.center, inertia=[1.0, 1.0, 1.0], explicitinertial=True,
+        )  # fmt: skip
+        joint = nodes[number].add_joint(type=kinds[link.kind], axis=link.axis)
+        joint.armature = link.armature
+    model = spec.compile()
     for link in tree.links:
         # Written here, because the reader refuses massless links and tabulated inertias.
         number = model.body(link.name).id

@@ -124,7 +124,7 @@ def exudyn_tree(kind: str, n: int) -> dict[str, float]:
 
 
 def exudyn_sparse(kind: str, n: int) -> dict[str, float]:
-    """Exudyn's bodies with joints: redundant coordinates, sparse matrices, implicit steps of 1 ms."""
+    """Exudyn's bodies with joints: redundant coordinates, sparse, implicit steps of 1 ms."""
     from common import exudyn_sparse
 
     tree = links_of(scenes.KINDS[kind](n))
