@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,39 @@ def test_a_chain_is_the_scene_written_out_to_the_last_bit(
         assert np.array_equal(found, plain.accelerations(plain_q, plain_u, 0.7)[places_u])
         needed = plain.inverse_dynamics(plain_q, plain_u, np.zeros(plain.nu), 0.7)[places_u]
         assert np.array_equal(model.inverse_dynamics(q, u, np.zeros(model.nu), 0.7), needed)
+
+
+def drawn(rng: np.random.Generator) -> Data:
+    """Chains on chains: patterns, lengths (also shorter than a period) and places by chance."""
+    own = [{key: x for key, x in hinge.items() if key != "law"} for hinge in HINGES]
+    chains: list[Data] = []
+    for number in range(int(rng.integers(1, 5))):
+        count = int(rng.integers(1, 12))
+        inboard = "ground"
+        if chains and rng.random() < 0.8:
+            other = chains[int(rng.integers(len(chains)))]
+            inboard = f"{other['name']}[{rng.integers(other['count'])}].tip"
+        tables = [own[k] for k in rng.integers(len(own), size=rng.integers(1, count + 1))]
+        for hinge in tables:
+            hinge["orientation"] = rng.choice([0.0, np.pi / 2, 0.3], size=3).tolist()
+        bodies = [ROD, BENT] if count > 1 and rng.random() < 0.5 else ROD
+        chains.append(chain(f"c{number}x", count, inboard, body=bodies, hinge=tables))
+    return {"gravity": [0.3, 1.0, -9.81], "chain": chains}
+
+
+@pytest.mark.parametrize("draw", range(8))
+def test_drawn_chains_are_the_scenes_written_out(draw: int, rng: np.random.Generator) -> None:
+    data = drawn(np.random.default_rng([draw, int(rng.integers(2**31))]))
+    model, plain = compiled(data), compiled(written_out(data))
+    q, u = model.initial_state()
+    assert model.layout.q_names == [*map(member_name, plain.layout.q_names)]
+    q, u = q + 0.3 * rng.standard_normal(model.nq), u + rng.standard_normal(model.nu)
+    assert np.array_equal(model.accelerations(q, u, 0.4), plain.accelerations(q, u, 0.4)), data
+
+
+def member_name(name: str) -> str:
+    """c0x[3].hinge.angle of c0x_3_hinge.angle."""
+    return re.sub(r"(c\dx)_(\d+)_hinge", r"\1[\2].hinge", name)
 
 
 def test_names_and_places_of_the_layout() -> None:
