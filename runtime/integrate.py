@@ -11,7 +11,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 from .steppers import Tableau
+from .tableau_in_c import c_tableau
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -120,35 +120,6 @@ class Statistics:
     largest_stiffness_index: float
     stability_limited: bool
     stability_limited_steps: int
-
-
-@cache
-def c_tableau(ffi: Any, tableau: Tableau) -> Any:
-    """`mstmm_tableau *` of a method; it and what it points to live as long as the program."""
-    t, kept = ffi.new("mstmm_tableau *"), list[Any]()
-
-    def doubles(array: Array) -> Any:
-        kept.append(np.array(array, dtype=np.float64, order="C"))
-        return ffi.from_buffer("double[]", kept[-1])
-
-    def integers(values: Sequence[int]) -> Any:
-        kept.append(ffi.new("int[]", values or 1))
-        return kept[-1]
-
-    t.n_stages, t.n_extra, t.n_dense = tableau.n_stages, tableau.n_extra, tableau.n_dense
-    t.n_errors = (tableau.E is not None) + (tableau.E_low is not None)
-    t.error_order, t.beta = tableau.error_order, tableau.beta
-    starts, columns, weights = tableau.rows
-    t.starts, t.columns, t.weights = integers(starts), integers(columns), doubles(weights)
-    t.c, t.c_extra = doubles(tableau.C), doubles(tableau.C_extra)
-    t.stability_limit = tableau.real_stability_limit
-    t.n_nodes, t.n_iterations = tableau.iterated or (0, 0)
-    t.mix, t.is_read = doubles(tableau.mix), integers(tableau.read_blocks)
-    _tableaus_kept.append(kept)
-    return t
-
-
-_tableaus_kept: list[list[Any]] = []
 
 
 class Run:

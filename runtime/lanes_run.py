@@ -14,9 +14,10 @@ from mstmm.errors import SceneError
 
 from .engine import Engine
 from .fused import FusedLibrary
-from .integrate import Status, c_tableau
+from .integrate import Status
 from .simulate import SLICE, SceneSystem, Settings, interruptible
 from .steppers import get
+from .tableau_in_c import c_tableau
 
 Array = NDArray[np.float64]
 
