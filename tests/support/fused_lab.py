@@ -27,9 +27,14 @@ COMPILERS = tuple(
         name for name in (os.environ.get("CC"), "gcc", "clang") if name and shutil.which(name)
     )
 )
-#: Widths of lanes by the flags that give them: the machine's own, and on x86 every narrower one.
+#: Widths of lanes by the flags that give them: the machine's own; on x86 every narrower one, and
+#: the text for processors that it knows nothing about.
 WIDTHS: dict[str, tuple[str, ...]] = {"native": ()} | (
-    {"avx2": ("-mno-avx512f",), "sse2": ("-march=x86-64",)}
+    {
+        "avx2": ("-mno-avx512f",),
+        "sse2": ("-march=x86-64",),
+        "plain": ("-march=x86-64", "-U__SSE2__"),
+    }
     if platform.machine() == "x86_64"
     else {}
 )
