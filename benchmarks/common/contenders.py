@@ -11,6 +11,7 @@ import numpy as np
 import mstmm
 
 from . import aba, casadi_peer, mstmm_engines, native, pinocchio_peer
+from . import reference as exact
 from .links import Tree, links_of, states
 from .measure import disagreement
 from .scenes import KINDS
@@ -45,6 +46,8 @@ class Field:
     disagreement: dict[str, float] = field(default_factory=dict)
     operations: dict[str, int] = field(default_factory=dict)
     absent: dict[str, str] = field(default_factory=dict)
+    exact: np.ndarray | None = None
+    error: dict[str, float] = field(default_factory=dict)
 
 
 def family(name: str) -> str:
@@ -66,6 +69,8 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
     looped = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     reference = looped.accelerations(q, u)
     found.subjects["mstmm looped"] = mstmm_engines.looped(looped, q, u)
+    if bodies <= LIMITS["casadi"]:
+        found.exact = exact.accelerations(tree, q, u)
     if bodies <= LIMITS["mstmm fused"]:
         fused = mstmm.compile(mstmm.Scene(**scene), engine="fused")
         found.subjects["mstmm fused"] = mstmm_engines.fused(fused, q, u)
@@ -78,7 +83,10 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
         for name, subject in pinocchio_peer.subjects(tree, q, u).items():
             found.subjects[f"pinocchio {name}"] = subject
     for name, subject in found.subjects.items():
-        found.disagreement[name] = disagreement(subject.accelerations(), reference)
+        udot = subject.accelerations()
+        found.disagreement[name] = disagreement(udot, reference)
+        if found.exact is not None:
+            found.error[name] = disagreement(udot, found.exact)
     if bodies <= LIMITS["mujoco"]:
         _add_mujoco(found, q, u, reference)
     if engines and bodies <= LIMITS["drake"]:

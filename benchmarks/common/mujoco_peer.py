@@ -20,7 +20,7 @@ def quaternion(matrix: np.ndarray) -> np.ndarray:
 
 
 def model_of(tree: Tree) -> mujoco.MjModel:
-    """MuJoCo's model of the tree, through its own builder (its reader of XML refuses deep trees)."""
+    """MuJoCo's model of the tree; through its builder, since deep XML is refused."""
     spec = mujoco.MjSpec()
     spec.option.gravity = tree.gravity
     kinds = {

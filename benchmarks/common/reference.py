@@ -1,4 +1,4 @@
-"""End state of a run to more digits than double has: CasADi's equations in long double, RK4."""
+"""More digits than double has: CasADi's equations in long double; accelerations and runs (RK4)."""
 
 from __future__ import annotations
 
@@ -25,6 +25,18 @@ static void rates(const long double *y, long double *k)
     aba(arg, res, 0, 0, 0);
 }
 
+void accelerations(long n_states, const double *q, const double *u, double *udot)
+{
+    enum { n = %d, nq = %d };
+    for (long s = 0; s < n_states; s++) {
+        long double y[n], k[n];
+        for (int i = 0; i < nq; i++) y[i] = q[s * nq + i];
+        for (int i = nq; i < n; i++) y[i] = u[s * (n - nq) + i - nq];
+        rates(y, k);
+        for (int i = nq; i < n; i++) udot[s * (n - nq) + i - nq] = k[i];
+    }
+}
+
 void run(double t_end, long steps, double *state)
 {
     enum { n = %d };
@@ -47,17 +59,33 @@ void run(double t_end, long steps, double *state)
 """
 
 
-def end_state(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
-    """[q, u] at t_end."""
+def _library(tree: Tree, level: str) -> ctypes.CDLL:
     function, _ = articulated_body(tree, baked=True)
     with tempfile.TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator("aba.c", {"casadi_real": "long double", "include_math": False})
+        options = {"casadi_real": "long double", "include_math": False}
+        generator = ca.CodeGenerator("aba.c", options)
         generator.add(function)
         generator.generate(folder + "/")
         body = (Path(folder) / "aba.c").read_text()
-    text = TEXT % (body, tree.nu, tree.nq, tree.nq, tree.nq + tree.nu)
-    library = ctypes.CDLL(str(native.library("reference", text, ["-O2", "-std=gnu17", "-w"])))
+    size = tree.nq + tree.nu
+    text = TEXT % (body, tree.nu, tree.nq, tree.nq, size, tree.nq, size)
+    return ctypes.CDLL(str(native.library("reference", text, [level, "-std=gnu17", "-w"])))
+
+
+def end_state(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
+    """[q, u] at t_end."""
+    library = _library(tree, "-O2")
     library.run.argtypes = [ctypes.c_double, ctypes.c_long, ctypes.c_void_p]
     state = np.concatenate([q, u]).astype(float)
     library.run(t_end, steps, state.ctypes.data)
     return state
+
+
+def accelerations(tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """udot (n, nu) of states q (n, nq), u (n, nu)."""
+    library, out = _library(tree, "-O0"), np.zeros_like(u)
+    q, u = np.ascontiguousarray(q), np.ascontiguousarray(u)
+    pointer = ctypes.c_void_p
+    library.accelerations.argtypes = [ctypes.c_long, pointer, pointer, pointer]
+    library.accelerations(len(q), q.ctypes.data, u.ctypes.data, out.ctypes.data)
+    return out

@@ -101,6 +101,7 @@ def main() -> None:
                 results.append(
                     {"kind": kind, "bodies": bodies, "freedoms": found.tree.nu,
                      "casadi_operations": found.operations, "disagreement": found.disagreement,
+                     "error": found.error,
                      "absent": found.absent, **timed}
                 )  # fmt: skip
                 print(kind, bodies, {k: round(v, 1) for k, v in best(results[-1]).items()})

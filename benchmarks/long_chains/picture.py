@@ -24,7 +24,7 @@ PANELS = (
 def draw(record: dict[str, Any], path: Path) -> None:
     """Two rows (pins, balls), three columns."""
     figure, panels = plt.subplots(2, 3, figsize=(10, 6.6), sharex=True)
-    figure.subplots_adjust(left=0.07, right=0.985, top=0.94, bottom=0.12, hspace=0.2, wspace=0.22)
+    figure.subplots_adjust(left=0.07, right=0.985, top=0.94, bottom=0.15, hspace=0.2, wspace=0.22)
     for row, kind in zip(panels, ("pins", "balls"), strict=True):
         for axes, (column, title, unit) in zip(row, PANELS, strict=True):
             for tool, looks in LOOKS.items():
@@ -40,7 +40,7 @@ def draw(record: dict[str, Any], path: Path) -> None:
     shown = dict(zip(labels + extra[1], handles + extra[0], strict=True))
     figure.legend(
         shown.values(), shown.keys(), fontsize=8, ncol=6, loc="lower center",
-        bbox_to_anchor=(0.5, 0.03),
+        bbox_to_anchor=(0.5, 0.035),
     )  # fmt: skip
     style.footer(
         figure, record, "x: gives up at the next size tried (8 GiB and 60 s allowed; table.)"

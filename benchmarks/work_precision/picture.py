@@ -22,12 +22,7 @@ def draw(record: dict[str, Any], cheapest: Callable[..., Any], path: Path) -> No
     figure.subplots_adjust(left=0.07, right=0.985, top=0.92, bottom=0.185, wspace=0.06)
     for axes, result in zip(panels, record["results"], strict=True):
         for name, curve in result["curves"].items():
-            points = sorted(
-                (p["error_rad"], min(p["cpu_ms"]))
-                for p in curve.values()
-                if p.get("cpu_ms") and 1e-13 < p["error_rad"] < 1e-2
-            )
-            front = frontier(points)
+            front = frontier(points_of(curve))
             if front:
                 looks = {**LOOKS.get(name, style.LOOKS.get(name, {})), "label": name}
                 axes.plot(*zip(*front, strict=True), **looks)
@@ -44,6 +39,15 @@ def draw(record: dict[str, Any], cheapest: Callable[..., Any], path: Path) -> No
         "Minimum CPU time of warm runs; each in its cheapest settings for the error achieved.",
     )  # fmt: skip
     style.save(figure, path)
+
+
+def points_of(curve: dict[str, Any]) -> list[tuple[float, float]]:
+    """Error and CPU time of the runs worth showing."""
+    return sorted(
+        (p["error_rad"], min(p["cpu_ms"]))
+        for p in curve.values()
+        if p.get("cpu_ms") and 1e-13 < p["error_rad"] < 1e-2
+    )
 
 
 def frontier(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
