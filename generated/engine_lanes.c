@@ -9,29 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "engine_lanes.h"
-#include "engine_step.h"
-
-/* The workspace cut into rows of n_state x lanes numbers, rounded up to whole vectors. */
-typedef struct cut_group {
-  mstmm_group *group;
-  const mstmm_system *system;
-  const mstmm_tableau *tableau;
-  int lanes;
-  int64_t n, row;
-  double *y, *k, *y_new, *y_stage, *dense; /* k: s + 1 + n_extra rows; dense: n_dense rows */
-  double *atol;                            /* a row: infinite where there is no error to control */
-  double *one;                             /* n_state: a single state */
-} cut_group;
-
-/* What is known of the attempt that all lanes make. */
-typedef struct attempt {
-  wide h;                                        /* of each place of a vector */
-  wide start, end, t;                            /* of the lanes: of the step, and of a stage */
-  int meets_break;                               /* a lane's step starts or ends at a break */
-  int active[WIDE], failed[WIDE], wants_dense[WIDE];
-  double error[WIDE];
-} attempt;
+#include "engine_lanes_step.h"
 
 static int64_t row_of(const mstmm_system *system) {
   return ((int64_t)system->n_state * system->lanes + WIDE - 1) / WIDE * WIDE;
@@ -44,12 +22,12 @@ int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tablea
   return sound ? rows * row_of(system) + system->n_state + WIDE : 0;
 }
 
-static cut_group cut(mstmm_group *group) {
+static mstmm_cut_group cut(mstmm_group *group) {
   const mstmm_system *system = group->system;
   const mstmm_tableau *tableau = group->many->problem.tableau;
   const uintptr_t rest = (uintptr_t)group->workspace % 64;
   double *at = group->workspace + (rest ? (64 - rest) / sizeof(double) : 0);
-  cut_group c = {.group = group, .system = system, .tableau = tableau, .lanes = system->lanes,
+  mstmm_cut_group c = {.group = group, .system = system, .tableau = tableau, .lanes = system->lanes,
                  .n = system->n_state, .row = row_of(system)};
   c.y = at;
   c.k = c.y + c.row;
@@ -63,22 +41,15 @@ static cut_group cut(mstmm_group *group) {
 
 /* ---- one lane ---- */
 
-static void gather(const cut_group *c, const double *from, int lane, double *to) {
+static void gather(const mstmm_cut_group *c, const double *from, int lane, double *to) {
   for (int64_t i = 0; i < c->n; i++) to[i] = from[i * c->lanes + lane];
 }
 
-static void scatter(const cut_group *c, const double *from, int lane, double *to) {
+static void scatter(const mstmm_cut_group *c, const double *from, int lane, double *to) {
   for (int64_t i = 0; i < c->n; i++) to[i * c->lanes + lane] = from[i];
 }
 
-/* First component of a lane that is not finite, -1 if all are */
-static int64_t not_finite(const cut_group *c, const double *x, int lane) {
-  for (int64_t i = 0; i < c->n; i++)
-    if (!isfinite(x[i * c->lanes + lane])) return i;
-  return -1;
-}
-
-static void finish(const cut_group *c, int lane, int status) {
+static void finish(const mstmm_cut_group *c, int lane, int status) {
   mstmm_group *group = c->group;
   const mstmm_run *run = &group->runs[lane];
   const int64_t trajectory = group->trajectory[lane];
@@ -91,13 +62,13 @@ static void finish(const cut_group *c, int lane, int status) {
   group->trajectory[lane] = -1;
 }
 
-static double *sample(const cut_group *c, int lane) {
+static double *sample(const mstmm_cut_group *c, int lane) {
   const mstmm_many *many = c->group->many;
   const int64_t first = c->group->trajectory[lane] * many->problem.n_outputs;
   return many->samples + (first + c->group->runs[lane].count.output_index) * c->n;
 }
 
-static void sample_current(const cut_group *c, int lane) {
+static void sample_current(const mstmm_cut_group *c, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   int64_t *i = &run->count.output_index;
   for (; *i < run->n_outputs && run->outputs[*i] <= run->real.t; (*i)++)
@@ -105,7 +76,7 @@ static void sample_current(const cut_group *c, int lane) {
 }
 
 /* Puts the lane at the start of the next trajectory; 0 if there is none. */
-static int take_up(const cut_group *c, int lane) {
+static int take_up(const mstmm_cut_group *c, int lane) {
   mstmm_group *group = c->group;
   mstmm_many *many = group->many;
   mstmm_run *run = &group->runs[lane];
@@ -122,14 +93,14 @@ static int take_up(const cut_group *c, int lane) {
   group->retries[lane] = 0;
   scatter(c, many->y0 + next * c->n, lane, c->y);
   if (group->enter) group->enter(c->system->context, lane, next);
-  const int64_t bad = not_finite(c, c->y, lane);
+  const int64_t bad = mstmm_lane_not_finite(c, c->y, lane);
   if (bad >= 0) finish(c, lane, mstmm_note(run, MSTMM_NOT_FINITE, 0, bad, run->t_start));
   else sample_current(c, lane);
   return 1;
 }
 
 /* Idle lanes that never had a trajectory compute what the first one computes. */
-static int refill(const cut_group *c) {
+static int refill(const mstmm_cut_group *c) {
   mstmm_group *group = c->group;
   const int64_t before = __atomic_load_n(&group->many->next, __ATOMIC_RELAXED);
   int active = -1;
@@ -148,53 +119,7 @@ static int refill(const cut_group *c) {
   return active >= 0;
 }
 
-/* ---- all lanes ---- */
-
-/* out = y + h sum_j w_j k_j */
-MSTMM_INLINE void combine(const cut_group *c, mstmm_terms terms, const wide *h, double *out) {
-  for (int64_t i = 0; i < c->row; i += WIDE) {
-    wide sum;
-    mstmm_add_terms(&terms, c->k + i, c->row, &sum);
-    *(wide *)(out + i) = *(const wide *)(c->y + i) + *h * sum;
-  }
-}
-
-/* The right-hand side of all lanes.  A failure ends the attempt of its own lane only. */
-static void evaluate(const cut_group *c, attempt *a, const double *y, double *dy) {
-  int codes[WIDE] = {0};
-  const double *t = (const double *)&a->t;
-  const int any = c->system->rhs_lanes(c->system->context, t, y, dy, codes);
-  for (int lane = 0; lane < c->lanes; lane++) {
-    mstmm_run *run = &c->group->runs[lane];
-    if (!a->active[lane] || a->failed[lane]) continue;
-    run->count.evaluations++;
-    if (any && codes[lane])
-      a->failed[lane] = mstmm_note(run, MSTMM_RHS_FAILED, codes[lane], -1, t[lane]);
-  }
-}
-
-/* Fails the lanes in which something is not finite; cheap where everything is. */
-static void check_finite(const cut_group *c, attempt *a, const double *x) {
-  if (mstmm_all_finite(c->row, x)) return;
-  for (int lane = 0; lane < c->lanes; lane++) {
-    const int64_t bad = not_finite(c, x, lane);
-    if (bad >= 0 && a->active[lane] && !a->failed[lane])
-      a->failed[lane] =
-          mstmm_note(&c->group->runs[lane], MSTMM_NOT_FINITE, 0, bad, a->t[lane]);
-  }
-}
-
-MSTMM_INLINE void stage_times(const cut_group *c, attempt *a, double node) {
-  if (!a->meets_break) {
-    if (node == 1.0) a->t = a->end;
-    else a->t = a->start + node * a->h;
-    return;
-  }
-  for (int lane = 0; lane < c->lanes; lane++)
-    a->t[lane] = mstmm_time_in(&c->group->runs[lane], node);
-}
-
-static mstmm_slopes slopes(const cut_group *c, int lane) {
+static mstmm_slopes slopes(const mstmm_cut_group *c, int lane) {
   const mstmm_run *run = &c->group->runs[lane];
   return (mstmm_slopes){.n = c->system->n_error, .stride = c->lanes, .y = c->y + lane,
                         .k = c->k + lane, .atol = run->atol, .rtol = run->rtol,
@@ -202,9 +127,9 @@ static mstmm_slopes slopes(const cut_group *c, int lane) {
 }
 
 /* First step of the lanes in `fresh`, from an explicit Euler step. */
-static void choose_first_steps(const cut_group *c, const int *fresh) {
+static void choose_first_steps(const mstmm_cut_group *c, const int *fresh) {
   double *f1 = c->k + c->row;
-  attempt a = {.h = {0.0}};
+  mstmm_attempt a = {.h = {0.0}};
   double guess[WIDE] = {0.0};
   for (int lane = 0; lane < c->lanes; lane++) {
     const mstmm_run *run = &c->group->runs[lane];
@@ -217,8 +142,8 @@ static void choose_first_steps(const cut_group *c, const int *fresh) {
   }
   for (int64_t i = 0; i < c->n * c->lanes; i++)
     c->y_stage[i] = c->y[i] + guess[i % c->lanes] * c->k[i];
-  evaluate(c, &a, c->y_stage, f1);
-  check_finite(c, &a, f1);
+  mstmm_lanes_evaluate(c, &a, c->y_stage, f1);
+  mstmm_lanes_check(c, &a, f1);
   for (int lane = 0; lane < c->lanes; lane++) {
     if (!fresh[lane]) continue;
     const mstmm_slopes at = slopes(c, lane);
@@ -229,10 +154,10 @@ static void choose_first_steps(const cut_group *c, const int *fresh) {
 }
 
 /* First stages that are not known yet; lanes where there is none end. */
-static void first_stages(const cut_group *c) {
+static void first_stages(const mstmm_cut_group *c) {
   mstmm_group *group = c->group;
   int missing[WIDE] = {0}, fresh[WIDE] = {0}, any = 0, any_fresh = 0;
-  attempt a = {.h = {0.0}};
+  mstmm_attempt a = {.h = {0.0}};
   for (int lane = 0; lane < c->lanes; lane++) {
     const mstmm_run *run = &group->runs[lane];
     missing[lane] = group->trajectory[lane] >= 0 && !run->count.first_stage_valid;
@@ -242,8 +167,8 @@ static void first_stages(const cut_group *c) {
   }
   if (!any) return;
   double *slope = c->k + c->row;
-  evaluate(c, &a, c->y, slope);
-  check_finite(c, &a, slope);
+  mstmm_lanes_evaluate(c, &a, c->y, slope);
+  mstmm_lanes_check(c, &a, slope);
   for (int lane = 0; lane < c->lanes; lane++) {
     mstmm_run *run = &group->runs[lane];
     if (!missing[lane]) continue;
@@ -262,7 +187,7 @@ static void first_stages(const cut_group *c) {
 }
 
 /* Where every lane's trial step ends; lanes that may not make one end. */
-static int aim(const cut_group *c, attempt *a) {
+static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
   mstmm_group *group = c->group;
   int any = 0;
   for (int lane = 0; lane < c->lanes; lane++) {
@@ -288,100 +213,14 @@ static int aim(const cut_group *c, attempt *a) {
   return any;
 }
 
-MSTMM_WIDE static void stages(const cut_group *c, attempt *a) {
-  const mstmm_tableau *tableau = c->tableau;
-  double *last = c->k + tableau->n_stages * c->row;
-  for (int i = 1; i < tableau->n_stages; i++) {
-    combine(c, mstmm_stage_terms(tableau, i), &a->h, c->y_stage);
-    stage_times(c, a, tableau->c[i]);
-    evaluate(c, a, c->y_stage, c->k + i * c->row);
-  }
-  combine(c, mstmm_step_terms(tableau), &a->h, c->y_new);
-  stage_times(c, a, 1.0);
-  check_finite(c, a, c->y_new);
-  evaluate(c, a, c->y_new, last);
-  check_finite(c, a, last);
-}
-
-/* Scaled error of every lane. */
-MSTMM_WIDE static void errors(const cut_group *c, attempt *a) {
-  const mstmm_tableau *tableau = c->tableau;
-  const mstmm_run *problem = &c->group->many->problem;
-  const int both = tableau->n_errors > 1, n = c->system->n_error;
-  const mstmm_terms first = mstmm_error_terms(tableau, 0), second = mstmm_error_terms(tableau, 1);
-  wide high = {0.0}, low = {0.0};
-  if (!tableau->n_errors || !problem->atol) return;
-  for (int64_t i = 0; i < (int64_t)n * c->lanes; i += WIDE) {
-    wide e, e_low = {0.0}, old, new;
-    mstmm_add_terms(&first, c->k + i, c->row, &e);
-    if (both) mstmm_add_terms(&second, c->k + i, c->row, &e_low);
-    mstmm_size(c->y + i, &old);
-    mstmm_size(c->y_new + i, &new);
-    const wide_mask older = old > new;
-    mstmm_choose(&older, &old, &new, &new);
-    const wide scale = 1.0 / (*(const wide *)(c->atol + i) + problem->rtol * new);
-    high += (e * scale) * (e * scale);
-    low += (e_low * scale) * (e_low * scale);
-  }
-  for (int lane = 0; lane < c->lanes; lane++) {
-    double sum = 0.0, sum_low = 0.0;
-    for (int j = lane; j < WIDE; j += c->lanes) {
-      sum += high[j];
-      sum_low += low[j];
-    }
-    a->error[lane] = mstmm_combined_error(c->group->runs[lane].real.h, sum, sum_low, n, both);
-  }
-}
-
-static int64_t worst_component(const cut_group *c, int lane) {
-  const mstmm_terms terms = mstmm_error_terms(c->tableau, 0);
-  const mstmm_run *run = &c->group->runs[lane];
-  int64_t worst = -1;
-  double largest = -1.0;
-  for (int64_t i = 0; i < c->system->n_error; i++) {
-    const int64_t at = i * c->lanes + lane;
-    double e = 0.0;
-    for (int j = 0; j < terms.count; j++) e += terms.weights[j] * c->k[terms.columns[j] * c->row + at];
-    e = fabs(e) / (run->atol[i] + run->rtol * fmax(fabs(c->y[at]), fabs(c->y_new[at])));
-    if (e > largest || e != e) {
-      largest = e == e ? e : INFINITY;
-      worst = i;
-    }
-  }
-  return worst;
-}
-
 /* Is the error of an active lane small enough? */
-static int good(const cut_group *c, const attempt *a, int lane) {
+static int good(const mstmm_cut_group *c, const mstmm_attempt *a, int lane) {
   return a->active[lane] && !a->failed[lane] &&
          (c->group->runs[lane].fixed_step > 0.0 || a->error[lane] < 1.0);
 }
 
-MSTMM_WIDE static void build_dense(const cut_group *c, attempt *a) {
-  const mstmm_tableau *tableau = c->tableau;
-  attempt extra = *a;
-  memcpy(extra.active, a->wants_dense, sizeof extra.active);
-  for (int i = 0; i < tableau->n_extra; i++) {
-    double *k = c->k + (tableau->n_stages + 1 + i) * c->row;
-    combine(c, mstmm_extra_terms(tableau, i), &a->h, c->y_stage);
-    stage_times(c, &extra, tableau->c_extra[i]);
-    evaluate(c, &extra, c->y_stage, k);
-    check_finite(c, &extra, k);
-  }
-  for (int lane = 0; lane < c->lanes; lane++)
-    if (a->wants_dense[lane]) a->failed[lane] = extra.failed[lane];
-  for (int j = 0; j < tableau->n_dense; j++) {
-    const mstmm_terms terms = mstmm_dense_terms(tableau, j);
-    for (int64_t i = 0; i < c->row; i += WIDE) {
-      wide sum;
-      mstmm_add_terms(&terms, c->k + i, c->row, &sum);
-      *(wide *)(c->dense + j * c->row + i) = a->h * sum;
-    }
-  }
-}
-
 /* Samples between the ends of an accepted step. */
-static void sample_inside(const cut_group *c, int lane) {
+static void sample_inside(const mstmm_cut_group *c, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   while (mstmm_output_inside(run)) {
     const double theta = (run->outputs[run->count.output_index] - run->real.t) / run->real.h;
@@ -397,8 +236,8 @@ static void sample_inside(const cut_group *c, int lane) {
   }
 }
 
-/* Calls accept on the lane's new state; 1 if the first stage is to be forgotten, a failure, or 0. */
-static int settle(const cut_group *c, int lane) {
+/* Calls accept on the lane's new state.  1 if the first stage is to be forgotten, a failure, 0. */
+static int settle(const mstmm_cut_group *c, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   if (!c->system->accept) return 0;
   gather(c, c->y_new, lane, c->one);
@@ -409,7 +248,7 @@ static int settle(const cut_group *c, int lane) {
 }
 
 /* The lane's state becomes the end of the step.  Returns 1 if the last stage serves the next. */
-static int accept(const cut_group *c, attempt *a, int lane) {
+static int accept(const mstmm_cut_group *c, mstmm_attempt *a, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   if (run->fixed_step == 0.0) mstmm_propose(run, a->error[lane]);
   mstmm_count_step(run, a->error[lane], 0.0);
@@ -428,33 +267,19 @@ static int accept(const cut_group *c, attempt *a, int lane) {
   return (int)run->count.first_stage_valid;
 }
 
-MSTMM_WIDE static void move(const cut_group *c, const int *moved, const int *kept_stage) {
-  const double *last = c->k + c->tableau->n_stages * c->row;
-  wide_mask to_new, to_last;
-  for (int i = 0; i < WIDE; i++) {
-    to_new[i] = moved[i % c->lanes] ? -1 : 0;
-    to_last[i] = kept_stage[i % c->lanes] ? -1 : 0;
-  }
-  for (int64_t i = 0; i < c->row; i += WIDE) {
-    mstmm_choose(&to_new, (const wide *)(c->y_new + i), (const wide *)(c->y + i),
-                 (wide *)(c->y + i));
-    mstmm_choose(&to_last, (const wide *)(last + i), (const wide *)(c->k + i), (wide *)(c->k + i));
-  }
-}
-
 /* Accepts or rejects the attempt of each lane. */
-static void judge(const cut_group *c, attempt *a) {
+static void judge(const mstmm_cut_group *c, mstmm_attempt *a) {
   mstmm_group *group = c->group;
   int moved[WIDE] = {0}, kept_stage[WIDE] = {0}, any_dense = 0;
   for (int lane = 0; lane < c->lanes; lane++) {
     mstmm_run *run = &group->runs[lane];
     if (a->active[lane] && !a->failed[lane] && !isfinite(a->error[lane]))
-      a->failed[lane] = mstmm_note(run, MSTMM_NOT_FINITE, 0, worst_component(c, lane),
+      a->failed[lane] = mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_lanes_worst(c, lane),
                                    run->real.t_new);
     a->wants_dense[lane] = good(c, a, lane) && mstmm_output_inside(run);
     any_dense |= a->wants_dense[lane];
   }
-  if (any_dense) build_dense(c, a);
+  if (any_dense) mstmm_lanes_dense(c, a);
   for (int lane = 0; lane < c->lanes; lane++) {
     if (!a->active[lane]) continue;
     if (good(c, a, lane)) {
@@ -464,11 +289,11 @@ static void judge(const cut_group *c, attempt *a) {
     }
     const int failed = a->failed[lane] != 0;
     const int status = mstmm_reject(&group->runs[lane], failed, a->error[lane]);
-    if (status && !failed) group->runs[lane].count.component = worst_component(c, lane);
+    if (status && !failed) group->runs[lane].count.component = mstmm_lanes_worst(c, lane);
     group->retries[lane]++;
     if (status) finish(c, lane, status);
   }
-  move(c, moved, kept_stage);
+  mstmm_lanes_move(c, moved, kept_stage);
   for (int lane = 0; lane < c->lanes; lane++) {
     if (!moved[lane]) continue;
     sample_current(c, lane);
@@ -486,7 +311,7 @@ int mstmm_group_start(mstmm_group *group) {
   memset(group->workspace, 0, (size_t)size * sizeof(double));
   memset(group->runs, 0, sizeof group->runs);
   for (int lane = 0; lane < WIDE; lane++) group->trajectory[lane] = -1;
-  const cut_group c = cut(group);
+  const mstmm_cut_group c = cut(group);
   for (int64_t i = 0; i < c.row; i++) {
     const int64_t component = i / c.lanes;
     const int counts = problem->atol && component < c.system->n_error;
@@ -502,14 +327,14 @@ static double seconds(void) {
 }
 
 int mstmm_group_advance(mstmm_group *group, double wall_seconds) {
-  const cut_group c = cut(group);
+  const mstmm_cut_group c = cut(group);
   const double deadline = seconds() + wall_seconds;
   for (int turn = 1; refill(&c); turn++) {
-    attempt a = {.h = {0.0}};
+    mstmm_attempt a = {.h = {0.0}};
     first_stages(&c);
     if (aim(&c, &a)) {
-      stages(&c, &a);
-      errors(&c, &a);
+      mstmm_lanes_stages(&c, &a);
+      mstmm_lanes_errors(&c, &a);
       judge(&c, &a);
     }
     if (turn % 64 == 0 && seconds() >= deadline) return MSTMM_RUNNING;

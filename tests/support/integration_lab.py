@@ -22,8 +22,11 @@ from .c_library import compile_library
 SOURCES = (
     "engine_integrate", "engine_run", "engine_control", "engine_step", "engine_norm",
     "engine_iterate", "engine_event", "engine_lanes",
+    "engine_lanes_step",
 )  # fmt: skip
-HEADERS = ("engine_integrate", "engine_step", "engine_wide", "engine_lanes")
+HEADERS = (
+    "engine_integrate", "engine_step", "engine_wide", "engine_lanes", "engine_lanes_step",
+)  # fmt: skip
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
 TEST_DECLARATIONS = """
 typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
