@@ -10,7 +10,7 @@ P. J. van der Houwen, B. P. Sommeijer, Parallel iteration of high-order Runge-Ku
 stepsize control, Journal of Computational and Applied Mathematics 29 (1990) 111-127.  Nodes: M.
 Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), table 25.4.  The weights follow
 from the nodes in exact arithmetic.  Dense output is the polynomial of degree 10 whose slope agrees
-with the eight last stages and both ends; the stages are of order 8 each, so it is of order 9.  (More
+with the eight last stages and both ends; the stages are of order 8 each, so it is of order 9. (More
 points and stages evaluated again were tried: no better at the steps that tolerances ask for.)
 """
 
