@@ -17,7 +17,7 @@ from mstmm.ir import Assign, Guard, Store, Temporary
 
 from .straight_c import operands
 
-_Line = Assign | Store | Guard
+Line = Assign | Store | Guard
 
 #: Cycles until a result can be used, on current processors, and of everything that is not named.
 _LATENCY = {
@@ -30,10 +30,10 @@ _USUAL_LATENCY = 20
 _WIDTH, _WINDOW = 4, 8
 
 
-def merged(statements: Sequence[_Line]) -> list[_Line]:
+def merged(statements: Sequence[Line]) -> list[Line]:
     """The same statements; each behind what it reads, the parts side by side."""
-    units = _units(statements)
-    before = _before(units)
+    units = units_of(statements)
+    before = reads_of(units)
     order = _started(_parts(units, before), before, [_latency(unit) for unit in units])
     return [statement for k in order for statement in units[k]]
 
@@ -66,7 +66,7 @@ def _started(
     return order
 
 
-def _units(statements: Sequence[_Line]) -> list[list[_Line]]:
+def units_of(statements: Sequence[Line]) -> list[list[Line]]:
     """Statements one by one, but a product beside the sum that alone reads it: one instruction."""
     readers: dict[int, int] = {}
     for statement in statements:
@@ -91,11 +91,11 @@ def _units(statements: Sequence[_Line]) -> list[list[_Line]]:
     ]
 
 
-def _reads(statement: _Line) -> list[int]:
+def _reads(statement: Line) -> list[int]:
     return [a.number for a in operands(statement) if isinstance(a, Temporary)]
 
 
-def _before(units: Sequence[Sequence[_Line]]) -> list[set[int]]:
+def reads_of(units: Sequence[Sequence[Line]]) -> list[set[int]]:
     """The units that each unit waits for."""
     makers = {s.number: k for k, unit in enumerate(units) for s in unit if isinstance(s, Assign)}
     return [
@@ -104,7 +104,7 @@ def _before(units: Sequence[Sequence[_Line]]) -> list[set[int]]:
     ]
 
 
-def _parts(units: Sequence[Sequence[_Line]], before: Sequence[set[int]]) -> list[list[int]]:
+def _parts(units: Sequence[Sequence[Line]], before: Sequence[set[int]]) -> list[list[int]]:
     """What guards judge; what waits for none of that; the rest.  Each in its old order."""
     judged: set[int] = set()
     stack = [k for k, unit in enumerate(units) if isinstance(unit[-1], Guard)]
@@ -125,6 +125,6 @@ def _parts(units: Sequence[Sequence[_Line]], before: Sequence[set[int]]) -> list
     ]
 
 
-def _latency(unit: Sequence[_Line]) -> int:
+def _latency(unit: Sequence[Line]) -> int:
     last = unit[-1]
     return _LATENCY.get(last.op, _USUAL_LATENCY) if isinstance(last, Assign) else 0

@@ -46,7 +46,8 @@ PRINTERS = {
     ),
     "mstmm.derive": (
         "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fused_c.py", "fused_loads.py",
-        "fused_sincos.py", "inline.py", "straight_c.py", "streams.py", "transport.py",
+        "fused_sincos.py", "inline.py", "straight_c.py", "streams.py", "thrift.py",
+        "transport.py",
     ),
 }  # fmt: skip
 
