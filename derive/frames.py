@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from .derivation import Derivation, Equation, Quantity, tilde, vector
-from .sweep import MOTION, SHIFT, E, R, _column, _stack, _symbol
+from .sweep import FLOOR, MOTION, SHIFT, E, R, _column, _stack, _symbol, floor_of
 
 A_PARENT = Quantity(_symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
 X_PARENT = Quantity(_symbol("x_I", 3), "m", "P of the parent, inertial axes")
@@ -177,6 +177,18 @@ def gravity_energy() -> Derivation:
                 -(gravity.symbol.T * (matrix[0, 0] * X.symbol + A.symbol * moment)),
             ),
         ),
+    )
+
+
+def pivot_floor() -> Derivation:
+    """What a pivot of the sweep must exceed, from the mass matrix of the body that it moves."""
+    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    return Derivation(
+        "frames",
+        "least inertia that is not rounding",
+        (mass_matrix,),
+        (FLOOR,),
+        (Equation("share of the mean inertia", FLOOR.symbol, floor_of(mass_matrix.symbol)),),
     )
 
 

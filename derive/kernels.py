@@ -28,7 +28,7 @@ Guards = tuple[tuple[sp.Basic, int, str], ...]
 FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
-    frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
+    frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.length, frames.turned, frames.classical_body, frames.state_deviation,
 )  # fmt: skip
 
@@ -148,7 +148,9 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
         Kernel("angle", link.angle(motion)),
         Kernel("forward", link.forward(motion, RigidBody())),
         Kernel(
-            "condense", link.condense(motion, RigidBody()), sweep.pivot_guards(motion.nu, subspace)
+            "condense",
+            link.condense(motion, RigidBody()),
+            sweep.pivot_guards(motion.nu, subspace, link.floor(RigidBody())),
         ),
         Kernel("recover", link.recover(motion)),
     )

@@ -34,6 +34,7 @@ from .sweep import (
     _part,
     _stack,
     _symbol,
+    floor_of,
     unit_directions,
 )
 
@@ -154,6 +155,11 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
         ),
         sources=SOURCES,
     )
+
+
+def floor(body: Body) -> sp.ImmutableDenseMatrix:
+    """What a pivot must exceed, from the body's own inertia."""
+    return floor_of(_of_body(body_kernels.inertia(body), "S"))
 
 
 def recover(motion: HingeMotion) -> Derivation:

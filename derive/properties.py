@@ -259,7 +259,7 @@ class Balance:
     def sweep(self, call: Call, extra: dict[str, Any]) -> dict[str, list[Any]]:
         """condense, then recover with a given acceleration of the parent."""
         place = {"Rc": self.rotation, "r": self.shift}
-        outboard = {"S": self.inertia, "e": self.load, "tau": self.efforts}
+        outboard = {"floor": [0, 0], "S": self.inertia, "e": self.load, "tau": self.efforts}
         across = call("condense", {**place, **extra, **outboard})
         gains = {"G": across["G"], "g": across["g"], "delta_I": self.parent}
         return across | call("recover", {**place, **extra, **gains})

@@ -117,8 +117,10 @@ def _environment() -> jinja2.Environment:
 
 
 def _render(name: str, **values: Any) -> str:
-    return _environment().get_template(name).render(
-        abi=abi, fused_abi=fused_abi, tape=_tape_view(), **values
+    return (
+        _environment()
+        .get_template(name)
+        .render(abi=abi, fused_abi=fused_abi, tape=_tape_view(), **values)
     )
 
 

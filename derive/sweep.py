@@ -22,7 +22,7 @@ from .hinge import HingeMotion
 
 THREE = (3, 3)
 
-#: A pivot must exceed this share of the mean inertia its direction sees.
+#: A pivot must exceed this share of the mean inertia of the body that it moves.
 PIVOT_FLOOR = sp.Rational(1, 10**14)
 
 SOURCES = (
@@ -68,6 +68,11 @@ PARENT_S = Quantity(
 PARENT_E = Quantity(_symbol("e_I", 6), "N, N*m", "contribution to the parent's e", accumulate=True)
 PARENT_DELTA = Quantity(_symbol("delta_I", 6), "", "deviation of the parent's acceleration")
 DELTA = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration, at P")
+
+
+FLOOR = Quantity(
+    _symbol("floor", 2), "kg, kg*m2", "least inertia along and about an axis that is not rounding"
+)
 
 
 def _gain(nu: int) -> tuple[Quantity, Quantity]:
@@ -274,7 +279,7 @@ def condense(
     return Derivation(
         name or f"generic{nu}",
         f"S and e carried across a hinge with {_count(nu)}",
-        (R, SHIFT, *given, S, E, tau),
+        (R, SHIFT, *given, FLOOR, S, E, tau),
         (gain, offset, PARENT_S, PARENT_E),
         tuple(equations),
         sources=SOURCES,
@@ -290,21 +295,30 @@ def _replace_rows(
 
 
 def pivot_guards(
-    nu: int, subspace: sp.MatrixBase | None = None
+    nu: int, subspace: sp.MatrixBase | None = None, floor: sp.Basic = FLOOR.symbol
 ) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """Each diagonal entry of D against the mean inertia of the outboard part in its direction."""
+    """Each diagonal entry of D against what the body's own inertia lets pass for rounding.
+
+    Not against the inertia of all that hangs on it: across the plane of a long planar chain that
+    grows with the cube of its length, while the pivots in the plane stay what they are.
+    """
     pivot = _symbol("D", nu, nu)
     h = _symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
-    mass = (S.symbol[0, 0] + S.symbol[1, 1] + S.symbol[2, 2]) / 3
-    inertia = (S.symbol[3, 3] + S.symbol[4, 4] + S.symbol[5, 5]) / 3
     guards = []
     for i in range(nu):
         along = sum(h[k, i] ** 2 for k in range(3))
         about = sum(h[k, i] ** 2 for k in range(3, 6))
-        floor = PIVOT_FLOOR * (along * mass + about * inertia)
+        least = along * floor[0, 0] + about * floor[1, 0]
         text = f"speed {i + 1} of {nu} moves no inertia: its acceleration is undetermined"
-        guards.append((pivot[i, i] > floor, 1, text))
+        guards.append((pivot[i, i] > least, 1, text))
     return tuple(guards)
+
+
+def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
+    """Share of the mean mass and mean moment of inertia of a mass matrix (6 x 6)."""
+    return sp.ImmutableDenseMatrix(
+        [PIVOT_FLOOR * sum(mass[first + k, first + k] for k in range(3)) / 3 for first in (0, 3)]
+    )
 
 
 def recover(

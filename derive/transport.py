@@ -69,7 +69,16 @@ class Stage:
             )  # fmt: skip
             return found["S_I"], found["e_I"]
         found = f.sweep(
-            0, "condense", Rc=self.rotation, r=self.position, H=(), J=(), S=inertia, e=load, tau=()
+            0,
+            "condense",
+            Rc=self.rotation,
+            r=self.position,
+            H=(),
+            J=(),
+            floor=f.zeros(2),
+            S=inertia,
+            e=load,
+            tau=(),
         )
         return found["S_I"], found["e_I"]
 

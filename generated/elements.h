@@ -65,9 +65,9 @@ int mstmm_hinge_ball_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -84,9 +84,9 @@ int mstmm_hinge_cylindrical_forward(const real *restrict Rt, const real *restric
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -103,9 +103,9 @@ int mstmm_hinge_fixed_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -119,9 +119,9 @@ int mstmm_hinge_free_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -138,9 +138,9 @@ int mstmm_hinge_gimbal_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -159,9 +159,9 @@ int mstmm_hinge_pin_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -178,9 +178,9 @@ int mstmm_hinge_planar_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -197,9 +197,9 @@ int mstmm_hinge_prismatic_forward(const real *restrict Rt, const real *restrict 
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -216,9 +216,9 @@ int mstmm_hinge_screw_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -235,9 +235,9 @@ int mstmm_hinge_universal_forward(const real *restrict Rt, const real *restrict 
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -269,6 +269,7 @@ int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
     real *restrict K);
 int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict gravity, real *restrict V);
+int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_);
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
@@ -294,9 +295,9 @@ int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -311,9 +312,9 @@ int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic1_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic1_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -331,9 +332,9 @@ int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic2_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic2_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -351,9 +352,9 @@ int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic3_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic3_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -371,9 +372,9 @@ int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic4_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic4_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -391,9 +392,9 @@ int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic5_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic5_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -411,9 +412,9 @@ int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic6_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic6_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);

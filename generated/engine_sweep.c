@@ -11,9 +11,9 @@ typedef int (*forward_kernel)(const real *rt, const real *ro, const real *p, con
                               const real *u, const real *s, const real *parent, real *rotation,
                               real *shift, real *motion, real *qdot);
 typedef int (*condense_kernel)(const real *rotation, const real *shift, const real *p,
-                               const real *q, const real *inertia, const real *load,
-                               const real *tau, real *gain, real *offset, real *parent_inertia,
-                               real *parent_load);
+                               const real *q, const real *floor, const real *inertia,
+                               const real *load, const real *tau, real *gain, real *offset,
+                               real *parent_inertia, real *parent_load);
 typedef int (*recover_kernel)(const real *rotation, const real *shift, const real *p,
                               const real *q, const real *gain, const real *offset,
                               const real *parent, real *udot, real *deviation);
@@ -27,9 +27,9 @@ typedef int (*generic_forward_kernel)(const real *rt, const real *ro, const real
                                       real *shift, real *motion);
 typedef int (*generic_condense_kernel)(const real *rotation, const real *shift,
                                        const real *subspace, const real *rotor,
-                                       const real *inertia, const real *load, const real *tau,
-                                       real *gain, real *offset, real *parent_inertia,
-                                       real *parent_load);
+                                       const real *floor, const real *inertia,
+                                       const real *load, const real *tau, real *gain,
+                                       real *offset, real *parent_inertia, real *parent_load);
 typedef int (*generic_recover_kernel)(const real *rotation, const real *shift,
                                       const real *subspace, const real *gain, const real *offset,
                                       const real *parent, real *udot, real *deviation);
@@ -221,6 +221,7 @@ int mstmm_forward_body(mstmm_state *state, int i, const real *parent_motion, rea
     }
     if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, i, code);
     ((inertia_kernel)body->inertia)(body->body_p, block + MSTMM_BLOCK_S);
+    mstmm_sweep_frames_pivot_floor(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_FLOOR);
     ((bias_load_kernel)body->bias_load)(body->body_p, motion, block + MSTMM_BLOCK_E);
     return 0;
 }
@@ -268,13 +269,13 @@ int mstmm_condense_body(mstmm_state *state, int i)
         real tau[6], rotor[6];
         int n = pack_free(state, body, block, tau, rotor);
         code = generic_condense[n](block, block + MSTMM_BLOCK_SHIFT, mstmm_h_free(block, body->nu),
-                                   rotor, block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E, tau, gain,
-                                   offset, parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
+                                   rotor, block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_S,
+                                   block + MSTMM_BLOCK_E, tau, gain, offset, parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
     } else {
         code = ((condense_kernel)body->condense)(
             block, block + MSTMM_BLOCK_SHIFT, body->hinge_p, state->q + body->q,
-            block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E, mstmm_tau(block, body->nu), gain, offset,
-            parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
+            block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E,
+            mstmm_tau(block, body->nu), gain, offset, parent + MSTMM_BLOCK_S, parent + MSTMM_BLOCK_E);
     }
     return code ? mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, i, code) : 0;
 }

@@ -25,7 +25,8 @@
 #define MSTMM_BLOCK_HINGE_V 81
 #define MSTMM_BLOCK_HINGE_W 84
 #define MSTMM_BLOCK_HINGE_C 87
-#define MSTMM_BLOCK_FIXED 93
+#define MSTMM_BLOCK_FLOOR 93
+#define MSTMM_BLOCK_FIXED 95
 /* behind them, per speed: s, tau, g, udot of the free speeds, G (6), H (6), H of the free speeds (6) */
 #define MSTMM_BLOCK_PER_SPEED 22
 

@@ -16,9 +16,9 @@ int mstmm_hinge_fixed_forward(const real *restrict Rt, const real *restrict ro,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
     real *restrict qdot);
 int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -250,6 +250,7 @@ static const mstmm_port mstmm_hinge_fixed_forward_outputs[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  p[0] parameters
  * in  q[0] coordinates
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[0] (N, N*m) efforts on the free coordinates
@@ -259,12 +260,13 @@ static const mstmm_port mstmm_hinge_fixed_forward_outputs[] = {
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+    const real *restrict p, const real *restrict q, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I)
 {
     (void)p;
     (void)q;
+    (void)floor_;
     (void)tau;
     (void)G;
     (void)g;
@@ -697,7 +699,7 @@ int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
 static int mstmm_hinge_fixed_condense_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_fixed_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
+    return mstmm_hinge_fixed_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_hinge_fixed_condense_inputs[] = {
@@ -705,6 +707,7 @@ static const mstmm_port mstmm_hinge_fixed_condense_inputs[] = {
     {"r", 3, "m", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 0, "", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
     {"S", 21, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 0, "N, N*m", 0, 0},
@@ -840,11 +843,11 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .name = "condense",
         .function = (void (*)(void))mstmm_hinge_fixed_condense,
         .call = mstmm_hinge_fixed_condense_call,
-        .n_inputs = 7,
+        .n_inputs = 8,
         .n_outputs = 4,
         .inputs = mstmm_hinge_fixed_condense_inputs,
         .outputs = mstmm_hinge_fixed_condense_outputs,
-        .ir_hash = "3790c717d40a4ec7c2557b905666603947cc1405855239a0799c5961f505763a",
+        .ir_hash = "129c5987ba9240a1baf9dcdb2c664378e97b6b9f51e56ce61b89984acf8e0b06",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -866,7 +869,7 @@ const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "39c9b69055e955df047000a81ac641dfc8a9a852d2664c0ff5f6f29a65ff2434",
+    .hash = "a462e955833f6b268b56a30a2098caee1da312609d1b296429d01f2d2ed29077",
     .nq = 0,
     .nu = 0,
     .np = 0,

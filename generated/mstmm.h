@@ -7,7 +7,7 @@
 #ifndef MSTMM_H
 #define MSTMM_H
 
-#define MSTMM_ABI 1
+#define MSTMM_ABI 2
 #define MSTMM_PI ((real)3.14159265358979323846264338327950288)
 
 /* cdef begin */

@@ -31,6 +31,7 @@ int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
     real *restrict K);
 int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict gravity, real *restrict V);
+int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_);
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
@@ -1029,6 +1030,37 @@ static const mstmm_port mstmm_sweep_frames_gravity_energy_outputs[] = {
     {"V", 1, "J", 0, 0},
 };
 
+/* least inertia that is not rounding
+ * in  S[21] mass matrix at P
+ * out floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
+ */
+int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_)
+{
+    const real t0 = S[0] + S[6];
+    const real t1 = S[11] + t0;
+    const real t2 = ((real)1 / (real)300000000000000) * t1;
+    floor_[0] = t2;
+    const real t3 = S[15] + S[18];
+    const real t4 = S[20] + t3;
+    const real t5 = ((real)1 / (real)300000000000000) * t4;
+    floor_[1] = t5;
+    return 0;
+}
+
+static int mstmm_sweep_frames_pivot_floor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_pivot_floor(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_pivot_floor_inputs[] = {
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_pivot_floor_outputs[] = {
+    {"floor", 2, "kg, kg*m2", 0, 0},
+};
+
 /* load of the inboard on the outboard side at P
  * in  S[21] f = S a + e of everything outboard
  * in  e[6] (N, N*m) force part of f = S a + e, at P
@@ -1868,6 +1900,18 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "pivot_floor",
+        .function = (void (*)(void))mstmm_sweep_frames_pivot_floor,
+        .call = mstmm_sweep_frames_pivot_floor_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_pivot_floor_inputs,
+        .outputs = mstmm_sweep_frames_pivot_floor_outputs,
+        .ir_hash = "b88e01906d33320ac040aadabee66b29adf3af6439475e571ca4c124eed2d27b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "reaction",
         .function = (void (*)(void))mstmm_sweep_frames_reaction,
         .call = mstmm_sweep_frames_reaction_call,
@@ -1969,7 +2013,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "ddd4cd75285f0af9a062608156f95b34479ff991226dd5f8ec73dc318767b3a3",
+    .hash = "96a8a80bba97d4bb0e5f69442fc56261cbbd1499a05515e1f165b8ac806aa697",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1979,6 +2023,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 18,
+    .n_kernels = 19,
     .kernels = mstmm_sweep_frames_kernels,
 };

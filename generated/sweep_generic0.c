@@ -15,9 +15,9 @@ int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict r
     const real *restrict w, const real *restrict c, const real *restrict s,
     const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
 int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
@@ -286,6 +286,7 @@ static const mstmm_port mstmm_sweep_generic0_forward_outputs[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
  * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[0] (N, N*m) efforts on the free coordinates
@@ -295,12 +296,13 @@ static const mstmm_port mstmm_sweep_generic0_forward_outputs[] = {
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict S, const real *restrict e,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+    const real *restrict H, const real *restrict J, const real *restrict floor_,
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
+    real *restrict g, real *restrict S_I, real *restrict e_I)
 {
     (void)H;
     (void)J;
+    (void)floor_;
     (void)tau;
     (void)G;
     (void)g;
@@ -733,7 +735,7 @@ int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict 
 static int mstmm_sweep_generic0_condense_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic0_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_generic0_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_generic0_condense_inputs[] = {
@@ -741,6 +743,7 @@ static const mstmm_port mstmm_sweep_generic0_condense_inputs[] = {
     {"r", 3, "m", 0, 0},
     {"H", 0, "", 0, 0},
     {"J", 0, "kg*m2 or kg", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
     {"S", 21, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 0, "N, N*m", 0, 0},
@@ -928,11 +931,11 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .name = "condense",
         .function = (void (*)(void))mstmm_sweep_generic0_condense,
         .call = mstmm_sweep_generic0_condense_call,
-        .n_inputs = 7,
+        .n_inputs = 8,
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic0_condense_inputs,
         .outputs = mstmm_sweep_generic0_condense_outputs,
-        .ir_hash = "499d98d157a21aa3a8269ac86e0b8f3a0949be5ac378540a2f2ca2a8b1acec5a",
+        .ir_hash = "a66ee296ff72ac5919f7b8d66567cc810287efd92a808ce63aa0ff62fc1e6650",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -978,7 +981,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "7f45ce493ba086fde29501fda07680fac6585d3786451ead4b9e59465d73560d",
+    .hash = "2d02f2152addccc1eef46663111c99d1767ce4970245c0ca69de78b8c0964fc9",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -12,7 +12,7 @@ import textwrap
 from .ir import KernelIR, Port, Solve
 
 #: Number of the layout below; changed with every change of it, and checked when a module opens.
-ABI = 1
+ABI = 2
 
 #: Scalar type of every array.
 REAL = "double"

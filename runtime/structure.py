@@ -34,6 +34,7 @@ from mstmm.structure import (
 )
 
 from . import prebuilt
+from .bodies import kernel_type
 from .pack import Known, Packed
 from .prebuilt import Element
 
@@ -62,6 +63,13 @@ class _Reader:
     def owner(self, kernel: str, function: Any) -> Key:
         """Element to which a kernel function belongs."""
         return self._owners[kernel, self._address(function)]
+
+    def hinge(self, index: int, record: Any) -> Key:
+        """Element of a body's hinge; one that is interpreted has no function to be known by."""
+        if record.hinge != self.ffi.NULL:
+            return self.owner("hinge", record.hinge)
+        link = self.packed.topology.links[index]
+        return "hinge", kernel_type(self.packed.scene.hinges[link.hinge], self.packed.releases)
 
     def law_kernel(self, function: Any) -> str:
         """Name of a kernel of the laws."""
@@ -147,7 +155,7 @@ def _hash(reader: _Reader, element: Element) -> str:
 
 def _body(reader: _Reader, index: int) -> BodyStructure:
     record = reader.packed.model.bodies[index]
-    hinge, body = reader.owner("hinge", record.hinge), reader.owner("inertia", record.inertia)
+    hinge, body = reader.hinge(index, record), reader.owner("inertia", record.inertia)
     link = _link(reader, record, hinge)
     connection = [] if link else reader.unpack(record.connection, 12)
     count = reader.elements[body].descriptor.np
