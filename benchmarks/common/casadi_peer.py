@@ -112,7 +112,7 @@ def subjects(
     """Flags' name -> function and states."""
     found = {}
     pins = any(link.kind == "pin" for link in tree.links)
-    for ahead in sines if pins else ("",):
+    for ahead in (s for s in sines if pins or not s):
         text, numbers = text_of(tree, baked, ahead)
         for name, chosen in flags.items():
             options = [*chosen, "-std=gnu17", "-fvisibility=hidden", "-w"]

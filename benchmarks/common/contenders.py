@@ -14,11 +14,11 @@ from . import aba, casadi_peer, mstmm_engines, native, pinocchio_peer
 from . import reference as exact
 from .links import Tree, links_of, states
 from .measure import disagreement
-from .scenes import KINDS
+from .scenes import KINDS, long_chain
 
 #: Largest number of bodies that each is asked for (compile time, memory or patience beyond).
 LIMITS = {
-    "mstmm fused": 50, "mstmm looped": 10**6, "casadi": 100, "pinocchio": 10_000, "mujoco": 1000,
+    "mstmm fused": 50, "mstmm looped": 10**6, "casadi": 100, "pinocchio": 1000, "mujoco": 1000,
     "drake": 100, "exudyn": 100,
 }  # fmt: skip
 #: Contender -> family whose best member counts.
@@ -63,13 +63,15 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
     """Contenders on one scene, compared before anybody is timed."""
     scene = KINDS[kind](bodies)
     tree = links_of(scene)
+    if bodies > 1000:
+        scene = long_chain(kind, bodies)
     count = max(1, min(32, 20_000 // bodies))
     q, u = states(tree, count)
     found = Field(kind, bodies, tree)
     looped = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     reference = looped.accelerations(q, u)
     found.subjects["mstmm looped"] = mstmm_engines.looped(looped, q, u)
-    if bodies <= LIMITS["casadi"]:
+    if tree.nu <= LIMITS["casadi"]:
         found.exact = exact.accelerations(tree, q, u)
     if bodies <= LIMITS["mstmm fused"]:
         fused = mstmm.compile(mstmm.Scene(**scene), engine="fused")
@@ -77,7 +79,7 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
     if bodies <= 25:
         baked = mstmm.compile(mstmm.Scene(**scene), engine="fused", bake=True)
         found.subjects["mstmm baked"] = mstmm_engines.fused(baked, q, u)
-    if bodies <= LIMITS["casadi"]:
+    if tree.nu <= LIMITS["casadi"]:
         _add_casadi(found, q, u)
     if bodies <= LIMITS["pinocchio"]:
         for name, subject in pinocchio_peer.subjects(tree, q, u).items():
@@ -87,7 +89,7 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
         found.disagreement[name] = disagreement(udot, reference)
         if found.exact is not None:
             found.error[name] = disagreement(udot, found.exact)
-    if bodies <= LIMITS["mujoco"]:
+    if tree.nu <= LIMITS["mujoco"]:
         _add_mujoco(found, q, u, reference)
     if engines and bodies <= LIMITS["drake"]:
         _add_drake(found, q, u, reference)
@@ -97,10 +99,14 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
 
 
 def _add_casadi(found: Field, q: np.ndarray, u: np.ndarray) -> None:
-    small, tree = found.bodies <= 25, found.tree
-    flags = casadi_peer.FLAGS if small else {"O2": casadi_peer.FLAGS["O2"]}
-    sines = ("", "libm", "libmvec8") if small else ("", "libm")
-    for baked in (False, True) if small else (False,):
+    every, tree = casadi_peer.FLAGS, found.tree
+    some = {name: every[name] for name in ("O2 scalar", "O3")}
+    one = {"O2 scalar": every["O2 scalar"]}
+    # Numbers in the text?, flags, where sines and cosines are computed.
+    forms = [(False, every, ("", "libm")), (False, one, ("libmvec8",)), (True, some, ("", "libm"))]
+    if found.bodies > 25:
+        forms = [(False, one, ("", "libm"))]
+    for baked, flags, sines in forms:
         for name, subject in casadi_peer.subjects(tree, q, u, baked, flags, sines).items():
             found.subjects[f"casadi {name}{' baked' if baked else ''}"] = subject
     function, _ = aba.articulated_body(tree)

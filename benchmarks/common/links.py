@@ -48,6 +48,8 @@ class Tree:
 
 def rotation(vector: Any) -> np.ndarray:
     """Rotation matrix of a rotation vector; quarter turns without rounding."""
+    if not any(vector):
+        return np.eye(3)
     matrix = Rotation.from_rotvec(vector).as_matrix()
     whole = np.round(matrix)
     return whole if np.abs(matrix - whole).max() < 1e-12 else matrix

@@ -105,13 +105,7 @@ void tree_add(Tree *tree, int parent, int kind, const double *place, const doubl
 
 void tree_ready(Tree *tree) { reserve(tree->model, tree->data); }
 
-// Every thread needs a workspace of its own.
-Tree *tree_copy(const Tree *tree) {
-  auto *copy = new Tree;
-  copy->model = tree->model;
-  reserve(copy->model, copy->data);
-  return copy;
-}
+void tree_free(Tree *tree) { delete tree; }
 
 extern const accelerations local_aba = evaluate<pinocchio::Convention::LOCAL>;
 extern const accelerations local_aba_rates = evaluate_with_rates<pinocchio::Convention::LOCAL>;

@@ -32,9 +32,9 @@ def opened(level: str) -> ctypes.CDLL:
     flags += [f"-I{prefix}", f"-I{prefix / 'eigen3'}"]
     text = (native.HERE / "pinocchio.cpp").read_text()
     found = ctypes.CDLL(str(native.library("pinocchio", text, flags, "g++", ".cpp")))
-    found.tree_new.restype = found.tree_copy.restype = ctypes.c_void_p
+    found.tree_new.restype = ctypes.c_void_p
     found.tree_new.argtypes = [ctypes.c_void_p]
-    found.tree_copy.argtypes = found.tree_ready.argtypes = [ctypes.c_void_p]
+    found.tree_free.argtypes = found.tree_ready.argtypes = [ctypes.c_void_p]
     pointer, number = ctypes.c_void_p, ctypes.c_double
     found.tree_add.argtypes = [
         pointer, ctypes.c_int, ctypes.c_int, pointer, pointer, number, pointer, pointer, number,
@@ -42,8 +42,17 @@ def opened(level: str) -> ctypes.CDLL:
     return found
 
 
-def built(library: ctypes.CDLL, tree: Tree) -> int:
-    """Address of a Pinocchio model of the tree with its workspace."""
+class Built:
+    """A Pinocchio model of the tree with its workspace, freed with this object."""
+
+    def __init__(self, library: ctypes.CDLL, tree: Tree) -> None:
+        self.library, self.address = library, _model(library, tree)
+
+    def __del__(self) -> None:
+        self.library.tree_free(self.address)
+
+
+def _model(library: ctypes.CDLL, tree: Tree) -> int:
     made = library.tree_new(native.aligned(tree.gravity).ctypes.data)
     for link in tree.links:
         kind = {"ball": 3, "free": 4}.get(link.kind, int(np.argmax(np.abs(link.axis))))
@@ -88,20 +97,20 @@ def subjects(
     found: dict[str, native.Subject] = {}
     for level in LEVELS:
         library = opened(level)
+        model = Built(library, tree)
         for convention in ("local", "world"):
-            model = built(library, tree)
             f: Any = ctypes.c_void_p.in_dll(
                 library, f"{convention}_aba{'_rates' if rates else ''}"
             ).value
             found[f"{level} {convention}"] = native.Subject(
-                f, model, coordinates(tree, q), u, keep=library
+                f, model.address, coordinates(tree, q), u, keep=model
             )
     return found
 
 
 def local(
-    library: ctypes.CDLL, model: int, tree: Tree, q: np.ndarray, u: np.ndarray
+    library: ctypes.CDLL, model: Built, tree: Tree, q: np.ndarray, u: np.ndarray
 ) -> native.Subject:
     """Function and states in the local convention, on a model that is there already."""
     f: Any = ctypes.c_void_p.in_dll(library, "local_aba").value
-    return native.Subject(f, model, coordinates(tree, q), u, keep=library)
+    return native.Subject(f, model.address, coordinates(tree, q), u, keep=model)

@@ -65,13 +65,16 @@ def puma(n: int = 6) -> Scene:
 
 
 def long_chain(kind: str, n: int) -> Scene:
-    """`pins` or `balls` with any n, written as one chain."""
+    """`pins`, `balls` or `planar` with any n, written as one chain."""
     body = {key: value for key, value in rod("").items() if key != "name"}
     kinds: dict[str, Any] = {
-        "pins": [{"type": "pin", "axis": axis} for axis in AXES], "balls": {"type": "ball"},
-    }  # fmt: skip
+        "pins": [{"type": "pin", "axis": axis} for axis in AXES],
+        "balls": {"type": "ball"},
+        "planar": {"type": "pin", "axis": AXES[2]},
+    }
     chained = {"name": "rods", "count": n, "inboard": "ground", "body": body, "hinge": kinds[kind]}
-    return {"schema_version": 1, "gravity": [0.0, 0.0, -9.81], "chain": [chained]}
+    gravity = [0.0, -9.81, 0.0] if kind == "planar" else [0.0, 0.0, -9.81]
+    return {"schema_version": 1, "gravity": gravity, "chain": [chained]}
 
 
 def hanging(scene: Scene, q: list[list[float]], u: list[list[float]]) -> Scene:

@@ -104,6 +104,7 @@ def main() -> None:
                      "error": found.error,
                      "absent": found.absent, **timed}
                 )  # fmt: skip
+                del found
                 print(kind, bodies, {k: round(v, 1) for k, v in best(results[-1]).items()})
         if options.compile:
             return

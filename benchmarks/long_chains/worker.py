@@ -81,7 +81,7 @@ def pinocchio(kind: str, n: int) -> dict[str, float]:
     q, u = straight(tree)
     library = pinocchio_peer.opened("O3")
     before, begin = peak(), time.process_time()
-    model = pinocchio_peer.built(library, tree)
+    model = pinocchio_peer.Built(library, tree)
     built = time.process_time() - begin
     subject = pinocchio_peer.local(library, model, tree, q, u)
     value = evaluated(lambda: subject.time(False, 1))

@@ -124,7 +124,7 @@ def all_of(
 ) -> dict[str, Settings]:
     """Everybody."""
     one_q, one_u = q[None], u[None]
-    casadi = casadi_peer.subjects(tree, one_q, one_u, baked=True)
+    casadi = casadi_peer.subjects(tree, one_q, one_u, baked=True, sines=("", "libm"))
     pinocchio = pinocchio_peer.subjects(tree, one_q, one_u, rates=True)
     turned = native_runs(pinocchio, t_end, len(q))
     return {
