@@ -20,6 +20,14 @@ AGREEMENT = 1e-13
 TIME = 0.3
 
 
+def bound(model: mstmm.Model, q: Array) -> float:
+    """1e-13, more where the mass matrix passes rounding on more than a thousandfold."""
+    matrix = model.mass_matrix(q)
+    size = np.sqrt(np.diag(matrix))
+    condition = np.linalg.cond(matrix / np.outer(size, size)) if len(size) else 1.0
+    return float(AGREEMENT * max(1.0, condition / 1e3))
+
+
 def looped(scene: dict[str, Any], q: Array, u: Array, efforts: Array | None = None) -> Array:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     assert model.engine == "looped"
@@ -48,7 +56,8 @@ def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
 def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
     scene, q, u = fresh(rng)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    assert worst(interpreted(model, q, u)["udot"], model.accelerations(q, u, TIME)) < AGREEMENT
+    found, expected = interpreted(model, q, u)["udot"], model.accelerations(q, u, TIME)
+    assert worst(found, expected) < bound(model, q)
 
 
 @pytest.mark.parametrize("kind", [*SIZES, "all"])
@@ -59,19 +68,20 @@ def test_compiled_equals_looped(kind: str, rng: Generator) -> None:
     scene, q, u = fresh(rng, **options)
     efforts = rng.normal(size=u.shape)
     model, expected = fused(scene), looped(scene, q, u, efforts)
-    assert worst(model.accelerations(q, u, TIME, efforts), expected) < AGREEMENT
+    allowed = bound(model, q)
+    assert worst(model.accelerations(q, u, TIME, efforts), expected) < allowed
     states = 11
     many = model.accelerations(
         np.tile(q, (states, 1)), np.tile(u, (states, 1)), TIME, np.tile(efforts, (states, 1))
     )
-    assert worst(many, np.tile(expected, (states, 1))) < AGREEMENT
+    assert worst(many, np.tile(expected, (states, 1))) < allowed
 
 
 def test_baked_equals_looped(rng: Generator) -> None:
     scene, q, u = fresh(rng, most=3)
     model = fused(scene, bake=True)
     assert not len(model.fusion.numbers)
-    assert worst(model.accelerations(q, u, TIME), looped(scene, q, u)) < AGREEMENT
+    assert worst(model.accelerations(q, u, TIME), looped(scene, q, u)) < bound(model, q)
 
 
 @pytest.mark.parametrize("seed", range(3))
