@@ -35,8 +35,8 @@ MOST_BODIES = 64
 #: Seconds that a compiler takes for the scalar code, by bodies and their square, and seconds that
 #: one evaluation saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
-_SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.2, 0.04, 0.002
-_SAVED_PER_BODY = 1e-7
+_SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.1, 0.03, 0.0015
+_SAVED_PER_BODY = 6e-8
 
 #: What decides the text besides structure and kernels: the modules that print it.
 PRINTERS = {
