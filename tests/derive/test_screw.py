@@ -20,8 +20,8 @@ RIGID: dict[str, Kernel] = {kernel.name: kernel for kernel in generic_kernels(0)
 
 Values = dict[str, Any]
 
-#: Arrays of a hinge without speeds.
-NO_SPEEDS: Values = {name: [] for name in ("H", "J", "s", "tau", "G", "g")}
+#: Arrays of a hinge without speeds, and the floor of its pivots.
+NO_SPEEDS: Values = {name: [] for name in ("H", "J", "s", "tau", "G", "g")} | {"floor": [0.0] * 2}
 
 
 def drawn(seed: int) -> Values:
