@@ -162,6 +162,44 @@ def test_hinge_without_a_compiler(
     assert np.abs(interpreted.accelerations(q, u) - expected).max() < 1e-11 * np.abs(expected).max()
     ends = [model.simulate(0.25, rtol=1e-10).q[-1] for model in (library, interpreted)]
     assert np.abs(ends[0] - ends[1]).max() < 1e-10
+    slopes = [model.derivatives(q[0], u[0]).q for model in (library, interpreted)]
+    assert np.abs(slopes[0] - slopes[1]).max() < 1e-11 * np.abs(slopes[0]).max()
+
+
+def check_derivatives(model: mstmm.Model, q: Array, u: Array) -> None:
+    """Against differences of accelerations, and of models with other parameters."""
+    names = [name for name in model.parameters if ".parameters." in name]
+    found, step = model.derivatives(q, u, parameters=names), 1e-5
+    along = model._engine.accelerations
+    for k, unit in enumerate(np.eye(model.nu)):
+        increment, _ = along(0.0, q[None].copy(), unit[None].copy(), model._memory(1))
+        for column, dq, du in ((found.q, increment[0], 0 * u), (found.u, 0 * q, unit)):
+            ahead, behind = (
+                model.accelerations(q + sign * step * dq, u + sign * step * du) for sign in (1, -1)
+            )
+            wanted = (ahead - behind) / (2 * step)
+            assert np.abs(column[:, k] - wanted).max() < 1e-7 * max(1, np.abs(found.q).max())
+    for name in names:
+        value = model.parameters[name]
+        ahead, behind = (
+            model.with_parameters({name: value + s}).accelerations(q, u) for s in (step, -step)
+        )
+        wanted = (ahead - behind) / (2 * step)
+        assert np.abs(found.parameters[name] - wanted).max() < 1e-6 * max(1, np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", ["knee", "wobble", "pilot"])
+def test_derivatives_of_a_hinge_by_its_own_numbers(name: str, compiled: Make) -> None:
+    compiled(name)
+    model = mstmm.compile(started(name))
+    q, u = model.initial_state()
+    check_derivatives(model, q, u)
+    if name == "pilot":  # increments are turns in body axes: dphi' = dw - w x dphi
+        wx, wy, wz = u
+        turning = [[0, wz, -wy], [-wz, 0, wx], [wy, -wx, 0]]
+        found = model.derivatives(q, u)
+        assert np.abs(found.rate_q - turning).max() < 1e-13
+        assert np.abs(found.rate_u - np.eye(3)).max() < 1e-14
 
 
 def test_force_element_presses_as_newton_says(compiled: Make) -> None:
@@ -194,6 +232,8 @@ def test_force_element_presses_as_newton_says(compiled: Make) -> None:
     square = (x**2).sum(1)
     energy = (v**2).sum(1) + 20.0 * square + 75.0 * square**2 - 2 * solved.y[:3].T @ GRAVITY
     assert np.abs(np.diff(result.energy()) - np.diff(energy)).max() < 1e-8
+    model = mstmm.compile(mstmm.Scene(**data))
+    check_derivatives(model, *model.initial_state())
 
 
 WHEEL = {"mass": 2.0, "across": 0.02, "along": 0.03, "wheel": 0.025, "spin": 400.0}
