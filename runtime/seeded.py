@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from mstmm.dual import Dual, Marks, value_of
+from mstmm.errors import SceneError
 from mstmm.expression import Expression, number
 from mstmm.scene import Hinge, Scene
 from mstmm.structure import Structure
@@ -92,10 +93,22 @@ def _changed(scene: Scene, name: str, change: Change) -> Scene:
 
 
 def _element(element: BaseModel, parts: Sequence[str | int], change: Change) -> BaseModel:
+    if isinstance(element, Hinge) and parts[0] == "parameters":
+        _refuse_in_expression(element, str(parts[1]))
     changed = _replaced(element, parts, change)
     if isinstance(changed, Hinge) and changed.type == "planar" and parts[0] == "normal":
         return changed.model_copy(update={"axis": changed.normal})
     return changed
+
+
+def _refuse_in_expression(hinge: Hinge, parameter: str) -> None:
+    """Numbers of expressions are folded before they reach the kernel."""
+    if any(name.quantity == parameter for effort in hinge.law.effort for name in effort.names):
+        raise SceneError(
+            f'parameter "{hinge.name}.parameters.{parameter}": an effort of the hinge is written '
+            "with it, and numbers inside expressions have no derivative; take a difference of two "
+            "models (with_parameters)"
+        )
 
 
 def _replaced(target: Any, parts: Sequence[str | int], change: Change) -> Any:

@@ -172,6 +172,34 @@ def test_numbers_inside_laws_loads_and_drives() -> None:
     assert abs(found.parameters["push.force[1]"][1] - 1 / inertia) < 1e-14
 
 
+def test_numbers_of_a_chain_move_all_its_members() -> None:
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1]}
+    chain = {"name": "rope", "count": 4, "inboard": "ground", "hinge": {"type": "ball"}}
+    body = rod | {"ends": {"tip": [1, 0, 0]}}
+    model = mstmm.compile(mstmm.Scene(gravity=[0, -9.81, 0], chain=[chain | {"body": body}]))
+    rng = np.random.default_rng(2)
+    q, u = rng.normal(size=model.nq), rng.normal(size=model.nu)
+    names = ["rope.body[0].mass", "rope.body[0].inertia[3]", "rope.body[0].ends.tip.position[1]"]
+    found, step = model.derivatives(q, u, parameters=names), 1e-5
+    for name in names:
+        value = model.parameters[name]
+        ahead, behind = (
+            model.with_parameters({name: value + s}).accelerations(q, u) for s in (step, -step)
+        )
+        wanted = (ahead - behind) / (2 * step)
+        assert np.abs(wanted).max() > 1
+        assert worst(found.parameters[name], wanted) < 1e-6, name
+
+
+def test_a_number_inside_an_expression_is_refused() -> None:
+    hinge = {"name": "own", "type": "custom", "inboard": "ground", "outboard": "rod",
+             "parameters": {"gain": 2.0}, "law": {"effort": "gain*sin(t)"}}  # fmt: skip
+    rod = {"name": "rod", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
+    scene = mstmm.Scene(gravity=[0, 0, 0], body=[rod], hinge=[hinge])
+    with pytest.raises(SceneError, match="an effort of the hinge is written with it"):
+        slopes(scene, {}, ["own.parameters.gain"])
+
+
 # --- the numbers that carry slopes ----------------------------------------------------------------
 
 
