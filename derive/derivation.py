@@ -113,6 +113,61 @@ class Solve(sp.MatrixExpr):
         return (self.args[0].inv() * self.args[1])[i, j]
 
 
+class Factor(sp.MatrixExpr):
+    """A = L diag(d) L^T of a symmetric positive definite A, in one matrix: 1 / d on the diagonal.
+
+    Below the diagonal stands the unit lower triangular L; above it are zeros.  Guarded as `Solve`.
+    """
+
+    def __new__(cls, matrix: sp.Basic) -> Factor:
+        return super().__new__(cls, sp.sympify(matrix))
+
+    @property
+    def matrix(self) -> sp.Basic:
+        return self.args[0]
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return self.args[0].shape
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        lower, pivots = sp.Matrix(self.args[0]).LDLdecomposition(hermitian=False)
+        return 1 / pivots[i, i] if i == j else lower[i, j]
+
+
+class Triangular(sp.MatrixExpr):
+    """L^-1 B, or L^-T B if `transposed`: L is the strict lower triangle of `factor`, ones on top.
+
+    Lowered to unrolled substitution; the diagonal and what is above it are not read.
+    """
+
+    def __new__(cls, factor: sp.Basic, right: sp.Basic, transposed: bool = False) -> Triangular:
+        return super().__new__(
+            cls, sp.sympify(factor), sp.sympify(right), sp.sympify(bool(transposed))
+        )
+
+    @property
+    def factor(self) -> sp.Basic:
+        return self.args[0]
+
+    @property
+    def right(self) -> sp.Basic:
+        return self.args[1]
+
+    @property
+    def transposed(self) -> bool:
+        return bool(self.args[2])
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return (self.args[0].shape[0], self.args[1].shape[1])
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        n = int(self.args[0].shape[0])
+        lower = sp.Matrix(n, n, lambda r, c: self.args[0][r, c] if r > c else sp.Integer(r == c))
+        return ((lower.T if self.transposed else lower).inv() * sp.Matrix(self.args[1]))[i, j]
+
+
 def vector(name: str, length: int) -> sp.MatrixSymbol:
     """Column of `length` numbers."""
     return sp.MatrixSymbol(name, length, 1)

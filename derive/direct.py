@@ -17,7 +17,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 from sympy.matrices.expressions.matexpr import MatrixElement
 
-from .derivation import Derivation, Quantity, Solve
+from .derivation import Derivation, Factor, Quantity, Solve, Triangular
 
 Matrix = Any  # mpmath.matrix; one with no rows or columns is kept as a plain list of rows
 Number = Any
@@ -184,7 +184,12 @@ class _Values:
         if isinstance(e, sp.ZeroMatrix):
             return mpmath.zeros(height, width)
         if isinstance(e, Solve):
-            return self._solve(e)
+            return self._solve(e.matrix, e.right)
+        if isinstance(e, Factor):
+            return self._factor(self.matrix(e.matrix))
+        if isinstance(e, Triangular):
+            lower = self._unit_lower(e.factor)
+            return self._solve(lower.T if e.transposed else lower, e.right)
         raise NotImplementedError(f"no direct value of {type(e).__name__}")
 
     def _product(self, e: sp.MatMul, height: int, width: int) -> Matrix:
@@ -207,9 +212,31 @@ class _Values:
             top += int(e.blocks[i, 0].shape[0])
         return whole
 
-    def _solve(self, e: Solve) -> Matrix:
+    def _factor(self, a: Matrix) -> Matrix:
+        """L and 1 / d of L diag(d) L^T from Cholesky's factor, A = C C^T: L = C diag(C_ii)^-1."""
+        n = a.rows
+        with mpmath.workdps(self.digits + 10):
+            try:
+                root = mpmath.cholesky(a)
+            except ValueError as error:
+                raise Undefined(f"no positive definite matrix: {error}") from None
+            factor = mpmath.zeros(n, n)
+            for i in range(n):
+                factor[i, i] = 1 / root[i, i] ** 2
+                for j in range(i):
+                    factor[i, j] = root[i, j] / root[j, j]
+            return factor
+
+    def _unit_lower(self, factor: sp.Basic) -> sp.ImmutableDenseMatrix:
+        """L as an explicit matrix: ones on the diagonal, zeros above."""
+        n = int(factor.shape[0])
+        return sp.ImmutableDenseMatrix(
+            n, n, lambda i, j: factor[i, j] if i > j else sp.Integer(i == j)
+        )
+
+    def _solve(self, matrix: sp.Basic, right: sp.Basic) -> Matrix:
         """X of A X = B by LU with row exchange, at ten digits more."""
-        a, b = self.matrix(e.matrix), self.matrix(e.right)
+        a, b = self.matrix(matrix), self.matrix(right)
         if isinstance(b, _Empty):
             return b
         with mpmath.workdps(self.digits + 10):

@@ -58,8 +58,7 @@ class BodyNodes:
     load: Nodes
     own: Nodes
     tau: Nodes
-    gain: Nodes
-    offset: Nodes
+    eliminated: dict[str, Nodes]
     delta: Nodes
     udot: Nodes
 
@@ -194,9 +193,7 @@ class _Fusion:
         tau = self.efforts[body.u : body.u + body.nu]
         none: Nodes = []
         axial = stages[-1].keeps(hinge["H"])
-        return BodyNodes(
-            stages, axial, hinge, s, motion, own, load["e"], own, tau, none, none, none, none
-        )
+        return BodyNodes(stages, axial, hinge, s, motion, own, load["e"], own, tau, {}, none, none)
 
     def _hinge(self, index: int, body: BodyStructure) -> dict[str, Nodes]:
         """Outputs of the hinge kernel; behind a link the constant part of its screw included."""
@@ -280,7 +277,7 @@ class _Fusion:
             given |= {"H": self._free_subspace(index), "J": [rotor[k] for k in free]}
         found = self.inline.run(kernel, given, self._pivot_guard(index))
         self._floor(index, found["D_ii"])
-        nodes.gain, nodes.offset = found["G"], found["g"]
+        nodes.eliminated = found
         return found["S_Q"], found["e_Q"]
 
     def _own_elimination(self, body: BodyStructure) -> KernelIR | None:
@@ -321,7 +318,7 @@ class _Fusion:
             delta = stage.delta(delta)
         free = self.free(index)
         last = nodes.stages[-1]
-        known = self._free_subspace(index), nodes.gain, nodes.offset
+        known = self._free_subspace(index), nodes.eliminated
         if nodes.axial:
             rates, delta = last.still().delta_behind_hinge(delta, *known)
             nodes.delta = last.delta(delta)
@@ -356,10 +353,10 @@ class _Fusion:
         sums = [Port("power", (1,)), Port("potential", (1,))]
         values: dict[str, object] = {"qdot": qdot, "udot": udot}
         power: dict[str, object] = {"power": [self.power], "potential": [self.potential]}
-        found = [self.graph.kernel("accelerations", inputs, outputs, values)]
+        found = [self.graph.kernel("accelerations", inputs, outputs, values, as_made=True)]
         if s.laws or s.driven or s.loads or s.forces:
             wide = self.graph.kernel(
-                "accelerations_power", inputs, [*outputs, *sums], values | power
+                "accelerations_power", inputs, [*outputs, *sums], values | power, as_made=True
             )
             found.append(wide)
         return Fused(

@@ -17,7 +17,7 @@ from .classical import CLASSICAL, classical_guards
 from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
 from .elements.body_rigid import RigidBody
-from .eliminate import eliminate
+from .factored import eliminate_factored, recover_factored
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from .lower import lower
 from .registry import Element, builtin_elements, kind_of
@@ -79,7 +79,9 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
         Kernel("recover", sweep.recover(nu, subspace, inputs[:2], hinge.name)),
     ]
     if nu:
-        kernels.append(Kernel("eliminate", eliminate(nu, subspace, inputs[:2], hinge.name)))
+        kernels.append(
+            Kernel("eliminate", eliminate_factored(nu, subspace, inputs[:2], hinge.name))
+        )
     measure = hinge.singular_when(motion.q, motion.p)
     if measure is not None:
         kernels.append(Kernel("singularity", _singularity(motion, measure)))
@@ -105,7 +107,8 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("recover", sweep.recover(nu)),
         Kernel("effort", sweep.effort(nu)),
         Kernel("project", sweep.project(nu)),
-        *((Kernel("eliminate", eliminate(nu)),) if nu else ()),
+        *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
+        *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )
 
 

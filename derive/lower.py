@@ -14,13 +14,8 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR, Port
 
-from .derivation import Derivation, Equation, Quantity, Solve
-
-NodeMatrix = list[list[Node]]
-
-#: Failure code of a vanishing pivot, known to the sweep driver.
-SINGULAR = 1
-RELATIVE_PIVOT = sp.Rational(1, 10**13)
+from .derivation import Derivation, Equation, Factor, Quantity, Solve, Triangular
+from .unrolled import NodeMatrix, backward, forward, ldl, solve_by_rows, solve_symmetric
 
 FUNCTIONS: dict[type, str] = {
     sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "asin", sp.acos: "acos",
@@ -116,6 +111,8 @@ class _Lowering:
             (sp.Identity, lambda e: self._explicit(sp.eye(int(e.rows)))),
             (sp.ZeroMatrix, lambda e: self._explicit(sp.zeros(int(e.rows), int(e.cols)))),
             (Solve, self._solve),
+            (Factor, self._factor),
+            (Triangular, self._triangular),
         )
         for kind, rule in rules:
             if isinstance(expression, kind):
@@ -173,90 +170,21 @@ class _Lowering:
         matrix, right = self.matrix(expression.matrix), self.matrix(expression.right)
         if not matrix:
             return []
-        eliminate = self._ldl if expression.symmetric else self._lu
-        return eliminate(matrix, right)
+        solve = solve_symmetric if expression.symmetric else solve_by_rows
+        return solve(self.graph, matrix, right)
 
-    def _ldl(self, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
-        """A = L D L^T row by row; one reciprocal per pivot."""
-        n = len(matrix)
-        lower_rows: NodeMatrix = [[] for _ in range(n)]
-        scaled: NodeMatrix = [[] for _ in range(n)]
-        reciprocal: list[Node] = []
-        for i in range(n):
-            for j in range(i):
-                value = matrix[j][i]
-                for k in range(j):
-                    value = value - lower_rows[i][k] * scaled[j][k]
-                lower_rows[i].append(value)  # L_ij D_j until divided below
-                scaled[i].append(value * reciprocal[j])
-            pivot = matrix[i][i]
-            for k in range(i):
-                pivot = pivot - lower_rows[i][k] * scaled[i][k]
-            self._guard_pivot(pivot, matrix[i][i], i, n)
-            reciprocal.append(1 / pivot)
-        columns = [self._ldl_column(scaled, reciprocal, list(c)) for c in zip(*right, strict=True)]
-        return _transpose(columns)
+    def _factor(self, expression: Factor) -> NodeMatrix:
+        lower, reciprocal = ldl(self.graph, self.matrix(expression.matrix))
+        zero = self.graph.constant(0)
+        return [
+            [*row, entry, *[zero] * (len(reciprocal) - i - 1)]
+            for i, (row, entry) in enumerate(zip(lower, reciprocal, strict=True))
+        ]
 
-    def _ldl_column(
-        self, unit_lower: NodeMatrix, reciprocal: list[Node], column: list[Node]
-    ) -> list[Node]:
-        n = len(column)
-        for i in range(n):
-            for k in range(i):
-                column[i] = column[i] - unit_lower[i][k] * column[k]
-        column = [value * r for value, r in zip(column, reciprocal, strict=True)]
-        for i in reversed(range(n)):
-            for k in range(i + 1, n):
-                column[i] = column[i] - unit_lower[k][i] * column[k]
-        return column
-
-    def _lu(self, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
-        """Elimination with row exchange by selection; the row's own size travels with the row."""
-        n, width = len(matrix), len(matrix) + len(right[0])
-        rows = [[*m, *r, self._size(m)] for m, r in zip(matrix, right, strict=True)]
-        reciprocal: list[Node] = []
-        for i in range(n):
-            self._largest_first(rows, i)
-            self._guard_pivot(self.graph.call("abs", rows[i][i]), rows[i][width], i, n)
-            reciprocal.append(1 / rows[i][i])
-            for k in range(i + 1, n):
-                factor = rows[k][i] * reciprocal[i]
-                for j in range(i + 1, width):
-                    rows[k][j] = rows[k][j] - factor * rows[i][j]
-        for i in reversed(range(n)):
-            for j in range(n, width):
-                value = rows[i][j]
-                for k in range(i + 1, n):
-                    value = value - rows[i][k] * rows[k][j]
-                rows[i][j] = value * reciprocal[i]
-        return [row[n:width] for row in rows]
-
-    def _size(self, row: list[Node]) -> Node:
-        total = self.graph.constant(0)
-        for entry in row:
-            total = total + self.graph.call("abs", entry)
-        return total
-
-    def _largest_first(self, rows: NodeMatrix, i: int) -> None:
-        """Bring the row whose entry i is largest in magnitude to place i."""
-        graph = self.graph
-        for k in range(i + 1, len(rows)):
-            if rows[k][i].value == 0:
-                continue
-            swap = graph.call("lt", graph.call("abs", rows[i][i]), graph.call("abs", rows[k][i]))
-            upper = [graph.select(swap, b, a) for a, b in zip(rows[i], rows[k], strict=True)]
-            rows[k] = [graph.select(swap, a, b) for a, b in zip(rows[i], rows[k], strict=True)]
-            rows[i] = upper
-
-    def _guard_pivot(self, pivot: Node, diagonal: Node, i: int, n: int) -> None:
-        limit = self.graph.constant(_fraction(RELATIVE_PIVOT)) * diagonal
-        if pivot is diagonal:  # a first pivot is compared with nothing but zero
-            limit = self.graph.constant(0)
-        self.graph.guard(
-            self.graph.call("lt", limit, pivot),
-            SINGULAR,
-            f"pivot {i + 1} of {n} vanishes: a motion of the hinge is undetermined",
-        )
+    def _triangular(self, expression: Triangular) -> NodeMatrix:
+        factor, right = self.matrix(expression.factor), self.matrix(expression.right)
+        substitute = backward if expression.transposed else forward
+        return _transpose([substitute(factor, list(c)) for c in zip(*right, strict=True)])
 
     # --- scalars --------------------------------------------------------------------------
 

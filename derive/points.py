@@ -254,13 +254,15 @@ def _unit(count: int, numbers: random.Random) -> Numbers:
 
 
 def rotation(numbers: random.Random) -> Numbers:
-    """A random rotation matrix, row by row."""
-    w, x, y, z = _unit(4, numbers)
-    return [
-        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-    ]  # fmt: skip
+    """A random rotation matrix, row by row, orthogonal to 60 digits (some kernels rely on it)."""
+    with mpmath.workdps(60):
+        w, x, y, z = (mpmath.mpf(numbers.gauss(0.0, 1.0)) for _ in range(4))
+        s = 2 / (w * w + x * x + y * y + z * z)
+        return [
+            1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y),
+            s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x),
+            s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y),
+        ]  # fmt: skip
 
 
 def _definite(n: int, numbers: random.Random) -> Numbers:

@@ -21,7 +21,7 @@ t = q + r); `condense_plain` is R A R^T as it stands and does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -279,6 +279,30 @@ def turn() -> Derivation:
     )
 
 
+def turn_by_trace() -> Derivation:
+    """The same for a rotation known only at run time: A's first diagonal entry by A's trace.
+
+    That saves a row of each product, and relies on R R^T = 1 where `turn` does not.  The first,
+    because of links along x the transverse entries are wanted first (and at the root, alone).
+    """
+    plain, rotation = turn(), R_GIVEN.symbol
+    rows, m = _symbol("A_rows", 2, 3), _block(S.symbol, 0, 0)
+    entries: Scalars = {(0, j): rows[j - 1, 0] for j in (1, 2)}
+    entries |= {(i, j): rows[i - 1, j] for i in (1, 2) for j in range(i, 3)}
+    entries[0, 0] = (m[0, 0] + m[1, 1] + m[2, 2]) - rows[0, 1] - rows[1, 2]
+    lower = sp.ImmutableDenseMatrix(2, 3, lambda i, j: rotation[i + 1, j])
+    first, *others = plain.definitions
+    return replace(
+        plain,
+        title="S and e in turned axes, by the trace",
+        definitions=(
+            Equation("two rows of A, inboard axes", rows, lower * m * rotation.T),
+            replace(first, computed=_matrix(entries)),
+            *others,
+        ),
+    )
+
+
 def motion(axis: str) -> Derivation:
     """Angular velocity, angular acceleration and acceleration of the outboard origin."""
     return Derivation(
@@ -305,7 +329,7 @@ def delta(axis: str) -> Derivation:
 
 def derivations() -> dict[str, Derivation]:
     """Every step by its kernel's name."""
-    found = {"condense_turn": turn()}
+    found = {"condense_turn": turn(), "condense_turn_by_trace": turn_by_trace()}
     for axis in AXES:
         found[f"condense_{axis}"] = condense(axis)
         found[f"condense_plain_{axis}"] = condense(axis, plain=True)

@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.expressions.matexpr import MatrixElement
 
-from .derivation import Solve
+from .derivation import Factor, Solve, Triangular
 from .notation import Perp, Tilde
 from .show_names import ShownName, shown_name
 from .show_recognise import Part, recognise
@@ -228,6 +228,14 @@ class _Layout:
         inverse = Raised(self.fenced(e.matrix, _ATOM), Word("−1"))
         return Row(_spaced([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
 
+    def factor(self, e: Factor) -> tuple[Node, int]:
+        return Row((Word("LDLᵀ"), Fence("(", self.node(e.matrix), ")"))), _ATOM
+
+    def triangular(self, e: Triangular) -> tuple[Node, int]:
+        lower = Row((Word("L"), Fence("(", self.node(e.factor), ")")))
+        inverse = Raised(lower, Word("−T" if e.transposed else "−1"))
+        return Row(_spaced([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
+
     def cross(self, e: Tilde | Perp) -> tuple[Node, int]:
         accent = "tilde" if isinstance(e, Tilde) else "perp"
         inner = self.node(e.args[0])
@@ -338,6 +346,8 @@ _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
     (Part, _Layout.part),
     ((Tilde, Perp), _Layout.cross),
     (Solve, _Layout.solve),
+    (Factor, _Layout.factor),
+    (Triangular, _Layout.triangular),
     (MatrixElement, _Layout.element),
     ((sp.MatrixSymbol, sp.Symbol), _symbol),
     ((sp.Add, sp.MatAdd), _Layout.sum),

@@ -12,6 +12,7 @@ Pays while the code is short; in long code the extra spills cost more than the w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from mstmm.ir import Assign, Guard, Store, Temporary
 
@@ -96,12 +97,16 @@ def _reads(statement: Line) -> list[int]:
 
 
 def reads_of(units: Sequence[Sequence[Line]]) -> list[set[int]]:
-    """The units that each unit waits for."""
+    """The units that each unit waits for; guards keep their order."""
     makers = {s.number: k for k, unit in enumerate(units) for s in unit if isinstance(s, Assign)}
-    return [
+    before = [
         {makers[n] for s in unit for n in _reads(s) if n in makers and makers[n] != k}
         for k, unit in enumerate(units)
     ]
+    guards = [k for k, unit in enumerate(units) if isinstance(unit[-1], Guard)]
+    for earlier, later in pairwise(guards):
+        before[later].add(earlier)
+    return before
 
 
 def _parts(units: Sequence[Sequence[Line]], before: Sequence[set[int]]) -> list[list[int]]:

@@ -68,18 +68,14 @@ class Stage:
                 d=[self.position[k]], S=inertia, e=load,
             )  # fmt: skip
             return found["S_I"], found["e_I"]
+        rotation = self.rotation
+        if all(entry.value is None for entry in rotation):
+            turned = f.screw("condense_turn_by_trace", Rc=rotation, S=inertia, e=load)
+            inertia, load, rotation = turned["S_I"], turned["e_I"], f.identity()
         found = f.sweep(
-            0,
-            "condense",
-            Rc=self.rotation,
-            r=self.position,
-            H=(),
-            J=(),
-            floor=f.zeros(2),
-            S=inertia,
-            e=load,
-            tau=(),
-        )
+            0, "condense", Rc=rotation, r=self.position, H=(), J=(), floor=f.zeros(2), S=inertia,
+            e=load, tau=(),
+        )  # fmt: skip
         return found["S_I"], found["e_I"]
 
     def _screw_axis(self) -> str:
@@ -112,15 +108,21 @@ class Stage:
 
     def delta(self, delta: Nodes) -> Nodes:
         """X delta: deviation of the outboard frame, at rest in the inboard one."""
-        return self.delta_behind_hinge(delta, [], [], [])[1]
+        found = self.fusion.sweep(
+            0, "recover", Rc=self.rotation, r=self.position, H=(), G=(), g=(), delta_I=delta
+        )
+        return found["delta"]
 
     def delta_behind_hinge(
-        self, delta: Nodes, subspace: Nodes, gain: Nodes, offset: Nodes
+        self, delta: Nodes, subspace: Nodes, eliminated: dict[str, Nodes]
     ) -> tuple[Nodes, Nodes]:
-        """(udot, deviation of the body behind the hinge)."""
+        """(udot, deviation of the body behind the hinge) from what its elimination left."""
+        if not subspace:
+            return [], self.delta(delta)
+        arrays = {name: eliminated[name] for name in ("F", "Z", "z", "W")}
         found = self.fusion.sweep(
-            len(offset), "recover", Rc=self.rotation, r=self.position, H=subspace, G=gain,
-            g=offset, delta_I=delta,
+            len(subspace) // 6, "recover_factored", Rc=self.rotation, r=self.position, H=subspace,
+            delta_I=delta, **arrays,
         )  # fmt: skip
         return found["udot"], found["delta"]
 

@@ -72,8 +72,9 @@ int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_cylindrical;
 int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
@@ -91,8 +92,9 @@ int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restric
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_fixed;
 int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -126,8 +128,9 @@ int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_gimbal;
 int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -145,8 +148,9 @@ int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_gimbal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
 
@@ -166,8 +170,9 @@ int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, con
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_planar;
 int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -185,8 +190,9 @@ int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_planar_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_prismatic;
 int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
@@ -204,8 +210,9 @@ int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict 
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_screw;
 int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -223,8 +230,9 @@ int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_universal;
 int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
@@ -242,8 +250,9 @@ int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict 
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
@@ -323,8 +332,12 @@ int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic1_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -343,8 +356,12 @@ int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic2_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -363,8 +380,12 @@ int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic3_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -383,8 +404,12 @@ int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic4_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic4_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -403,8 +428,12 @@ int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic5_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic5_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -423,8 +452,12 @@ int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic6_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic6_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -505,6 +538,8 @@ int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restri
 
 extern const mstmm_element mstmm_sweep_screw;
 int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,
+    const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_condense_turn_by_trace(const real *restrict Rc, const real *restrict S,
     const real *restrict e, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_screw_condense_x(const real *restrict turn, const real *restrict d,
     const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);

@@ -24,8 +24,9 @@ int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1076,15 +1077,18 @@ static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
- * out G[3][6] udot = g - G a_Q
- * out g[3] udot = g - G a_Q
+ * out F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[3][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[3] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[3][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[3] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)p;
     (void)q;
@@ -1109,142 +1113,142 @@ int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
     const real t16 = t10 - t15;
     const real t17 = t7 < t16;
     if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t18 = S[3] * t2;
-    const real t19 = S[3] * t3;
-    const real t20 = S[4] - t19;
-    const real t21 = t13 * t20;
-    const real t22 = 1.0 / t16;
-    const real t23 = S[3] * t8;
-    const real t24 = S[5] - t23;
-    const real t25 = t14 * t20;
-    const real t26 = t24 - t25;
-    const real t27 = t22 * t26;
-    const real t28 = t14 * t27;
-    const real t29 = t21 - t28;
-    const real t30 = t3 * t29;
-    const real t31 = t18 - t30;
-    const real t32 = t8 * t27;
-    const real t33 = t31 - t32;
-    G[0] = t33;
-    const real t34 = S[8] * t2;
-    const real t35 = S[8] * t3;
-    const real t36 = S[9] - t35;
-    const real t37 = t13 * t36;
-    const real t38 = S[8] * t8;
-    const real t39 = S[10] - t38;
-    const real t40 = t14 * t36;
-    const real t41 = t39 - t40;
-    const real t42 = t22 * t41;
-    const real t43 = t14 * t42;
-    const real t44 = t37 - t43;
-    const real t45 = t3 * t44;
-    const real t46 = t34 - t45;
-    const real t47 = t8 * t42;
-    const real t48 = t46 - t47;
-    G[1] = t48;
-    const real t49 = S[12] * t2;
-    const real t50 = S[12] * t3;
-    const real t51 = S[13] - t50;
-    const real t52 = t13 * t51;
-    const real t53 = S[12] * t8;
-    const real t54 = S[14] - t53;
-    const real t55 = t14 * t51;
+    F[0] = t2;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = t3;
+    F[4] = t13;
+    F[5] = 0.0;
+    F[6] = t8;
+    F[7] = t14;
+    const real t18 = 1.0 / t16;
+    F[8] = t18;
+    const real t19 = S[3] * t2;
+    Z[0] = t19;
+    const real t20 = S[8] * t2;
+    Z[1] = t20;
+    const real t21 = S[12] * t2;
+    Z[2] = t21;
+    Z[3] = 0.0;
+    Z[4] = 0.0;
+    Z[5] = 0.0;
+    const real t22 = S[3] * t3;
+    const real t23 = S[4] - t22;
+    const real t24 = t13 * t23;
+    Z[6] = t24;
+    const real t25 = S[8] * t3;
+    const real t26 = S[9] - t25;
+    const real t27 = t13 * t26;
+    Z[7] = t27;
+    const real t28 = S[12] * t3;
+    const real t29 = S[13] - t28;
+    const real t30 = t13 * t29;
+    Z[8] = t30;
+    Z[9] = 0.0;
+    Z[10] = 0.0;
+    Z[11] = 0.0;
+    const real t31 = S[3] * t8;
+    const real t32 = S[5] - t31;
+    const real t33 = t14 * t23;
+    const real t34 = t32 - t33;
+    const real t35 = t18 * t34;
+    Z[12] = t35;
+    const real t36 = S[8] * t8;
+    const real t37 = S[10] - t36;
+    const real t38 = t14 * t26;
+    const real t39 = t37 - t38;
+    const real t40 = t18 * t39;
+    Z[13] = t40;
+    const real t41 = S[12] * t8;
+    const real t42 = S[14] - t41;
+    const real t43 = t14 * t29;
+    const real t44 = t42 - t43;
+    const real t45 = t18 * t44;
+    Z[14] = t45;
+    Z[15] = 0.0;
+    Z[16] = 0.0;
+    Z[17] = 0.0;
+    const real t46 = tau[0] - e[3];
+    const real t47 = t2 * t46;
+    z[0] = t47;
+    const real t48 = tau[1] - e[4];
+    const real t49 = t3 * t46;
+    const real t50 = t48 - t49;
+    const real t51 = t13 * t50;
+    z[1] = t51;
+    const real t52 = tau[2] - e[5];
+    const real t53 = t8 * t46;
+    const real t54 = t52 - t53;
+    const real t55 = t14 * t50;
     const real t56 = t54 - t55;
-    const real t57 = t22 * t56;
-    const real t58 = t14 * t57;
-    const real t59 = t52 - t58;
-    const real t60 = t3 * t59;
-    const real t61 = t49 - t60;
-    const real t62 = t8 * t57;
-    const real t63 = t61 - t62;
-    G[2] = t63;
-    G[3] = 1.0;
-    G[4] = 0.0;
-    G[5] = 0.0;
-    G[6] = t29;
-    G[7] = t44;
-    G[8] = t59;
-    G[9] = 0.0;
-    G[10] = 1.0;
-    G[11] = 0.0;
-    G[12] = t27;
-    G[13] = t42;
-    G[14] = t57;
-    G[15] = 0.0;
-    G[16] = 0.0;
-    G[17] = 1.0;
-    const real t64 = tau[0] - e[3];
-    const real t65 = t2 * t64;
-    const real t66 = tau[1] - e[4];
-    const real t67 = t3 * t64;
-    const real t68 = t66 - t67;
-    const real t69 = t13 * t68;
-    const real t70 = tau[2] - e[5];
-    const real t71 = t8 * t64;
-    const real t72 = t70 - t71;
-    const real t73 = t14 * t68;
-    const real t74 = t72 - t73;
-    const real t75 = t22 * t74;
-    const real t76 = t14 * t75;
-    const real t77 = t69 - t76;
-    const real t78 = t3 * t77;
-    const real t79 = t65 - t78;
-    const real t80 = t8 * t75;
-    const real t81 = t79 - t80;
-    g[0] = t81;
-    g[1] = t77;
-    g[2] = t75;
-    const real t82 = S[3] * t33;
-    const real t83 = S[4] * t29;
-    const real t84 = t82 + t83;
-    const real t85 = S[5] * t27;
-    const real t86 = t84 + t85;
-    const real t87 = S[0] - t86;
-    S_Q[0] = t87;
-    const real t88 = S[3] * t48;
-    const real t89 = S[4] * t44;
-    const real t90 = t88 + t89;
-    const real t91 = S[5] * t42;
-    const real t92 = t90 + t91;
-    const real t93 = S[1] - t92;
-    S_Q[1] = t93;
-    const real t94 = S[3] * t63;
-    const real t95 = S[4] * t59;
-    const real t96 = t94 + t95;
-    const real t97 = S[5] * t57;
-    const real t98 = t96 + t97;
-    const real t99 = S[2] - t98;
-    S_Q[2] = t99;
+    const real t57 = t18 * t56;
+    z[2] = t57;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 1.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 1.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 0.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 1.0;
+    const real t58 = S[3] * t19;
+    const real t59 = t23 * t24;
+    const real t60 = t58 + t59;
+    const real t61 = t34 * t35;
+    const real t62 = t60 + t61;
+    const real t63 = S[0] - t62;
+    S_Q[0] = t63;
+    const real t64 = S[3] * t20;
+    const real t65 = t23 * t27;
+    const real t66 = t64 + t65;
+    const real t67 = t34 * t40;
+    const real t68 = t66 + t67;
+    const real t69 = S[1] - t68;
+    S_Q[1] = t69;
+    const real t70 = S[3] * t21;
+    const real t71 = t23 * t30;
+    const real t72 = t70 + t71;
+    const real t73 = t34 * t45;
+    const real t74 = t72 + t73;
+    const real t75 = S[2] - t74;
+    S_Q[2] = t75;
     S_Q[3] = 0.0;
     S_Q[4] = 0.0;
     S_Q[5] = 0.0;
-    const real t100 = S[8] * t48;
-    const real t101 = S[9] * t44;
-    const real t102 = t100 + t101;
-    const real t103 = S[10] * t42;
-    const real t104 = t102 + t103;
-    const real t105 = S[6] - t104;
-    S_Q[6] = t105;
-    const real t106 = S[8] * t63;
-    const real t107 = S[9] * t59;
-    const real t108 = t106 + t107;
-    const real t109 = S[10] * t57;
-    const real t110 = t108 + t109;
-    const real t111 = S[7] - t110;
-    S_Q[7] = t111;
+    const real t76 = S[8] * t20;
+    const real t77 = t26 * t27;
+    const real t78 = t76 + t77;
+    const real t79 = t39 * t40;
+    const real t80 = t78 + t79;
+    const real t81 = S[6] - t80;
+    S_Q[6] = t81;
+    const real t82 = S[8] * t21;
+    const real t83 = t26 * t30;
+    const real t84 = t82 + t83;
+    const real t85 = t39 * t45;
+    const real t86 = t84 + t85;
+    const real t87 = S[7] - t86;
+    S_Q[7] = t87;
     S_Q[8] = 0.0;
     S_Q[9] = 0.0;
     S_Q[10] = 0.0;
-    const real t112 = S[12] * t63;
-    const real t113 = S[13] * t59;
-    const real t114 = t112 + t113;
-    const real t115 = S[14] * t57;
-    const real t116 = t114 + t115;
-    const real t117 = S[11] - t116;
-    S_Q[11] = t117;
+    const real t88 = S[12] * t21;
+    const real t89 = t29 * t30;
+    const real t90 = t88 + t89;
+    const real t91 = t44 * t45;
+    const real t92 = t90 + t91;
+    const real t93 = S[11] - t92;
+    S_Q[11] = t93;
     S_Q[12] = 0.0;
     S_Q[13] = 0.0;
     S_Q[14] = 0.0;
@@ -1254,27 +1258,27 @@ int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
     S_Q[18] = 0.0;
     S_Q[19] = 0.0;
     S_Q[20] = 0.0;
-    const real t118 = t33 * t64;
-    const real t119 = t29 * t66;
-    const real t120 = t118 + t119;
-    const real t121 = t27 * t70;
-    const real t122 = t120 + t121;
-    const real t123 = e[0] + t122;
-    e_Q[0] = t123;
-    const real t124 = t48 * t64;
-    const real t125 = t44 * t66;
-    const real t126 = t124 + t125;
-    const real t127 = t42 * t70;
-    const real t128 = t126 + t127;
-    const real t129 = e[1] + t128;
-    e_Q[1] = t129;
-    const real t130 = t63 * t64;
-    const real t131 = t59 * t66;
-    const real t132 = t130 + t131;
-    const real t133 = t57 * t70;
-    const real t134 = t132 + t133;
-    const real t135 = e[2] + t134;
-    e_Q[2] = t135;
+    const real t94 = t19 * t46;
+    const real t95 = t24 * t50;
+    const real t96 = t94 + t95;
+    const real t97 = t35 * t56;
+    const real t98 = t96 + t97;
+    const real t99 = e[0] + t98;
+    e_Q[0] = t99;
+    const real t100 = t20 * t46;
+    const real t101 = t27 * t50;
+    const real t102 = t100 + t101;
+    const real t103 = t40 * t56;
+    const real t104 = t102 + t103;
+    const real t105 = e[1] + t104;
+    e_Q[1] = t105;
+    const real t106 = t21 * t46;
+    const real t107 = t30 * t50;
+    const real t108 = t106 + t107;
+    const real t109 = t45 * t56;
+    const real t110 = t108 + t109;
+    const real t111 = e[2] + t110;
+    e_Q[2] = t111;
     e_Q[3] = tau[0];
     e_Q[4] = tau[1];
     e_Q[5] = tau[2];
@@ -1287,7 +1291,7 @@ int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
 static int mstmm_hinge_ball_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_ball_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_ball_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_ball_eliminate_inputs[] = {
@@ -1299,17 +1303,16 @@ static const mstmm_port mstmm_hinge_ball_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_ball_eliminate_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
+    {"F", 9, "", 0, 0},
+    {"Z", 18, "", 0, 0},
+    {"z", 3, "", 0, 0},
+    {"W", 18, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 3, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_ball_eliminate_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
@@ -1385,11 +1388,11 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_ball_eliminate,
         .call = mstmm_hinge_ball_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_ball_eliminate_inputs,
         .outputs = mstmm_hinge_ball_eliminate_outputs,
-        .ir_hash = "3f4f7117074389ccf74a44493277e93a2188bd6ebdad04ea83f658e2ddc0e143",
-        .n_guards = 6,
+        .ir_hash = "b3e1003e98237dbf2b42acf53a98d29ee48a54b4b87136b700df361bf69f9587",
+        .n_guards = 3,
         .guards = mstmm_hinge_ball_eliminate_guards,
     },
 };
@@ -1398,7 +1401,7 @@ const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "95b3c294c14e4686dc3d073845addc580ba99d97c4e74a354e98eae959dc3cab",
+    .hash = "0e46fec2fe29421e4e5fe6a51652f1fa9bbe8be2dfda63684dc4297f82ceab6d",
     .nq = 4,
     .nu = 3,
     .np = 0,

@@ -23,8 +23,9 @@ int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restric
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
@@ -909,15 +910,18 @@ static const mstmm_port mstmm_hinge_cylindrical_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
- * out G[2][6] udot = g - G a_Q
- * out g[2] udot = g - G a_Q
+ * out F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[2][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[2] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[2][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[2] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)p;
     (void)q;
@@ -930,137 +934,141 @@ int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restri
     const real t5 = S[20] - t4;
     const real t6 = t1 < t5;
     if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t7 = S[2] * t2;
-    const real t8 = 1.0 / t5;
-    const real t9 = S[2] * t3;
-    const real t10 = S[5] - t9;
-    const real t11 = t8 * t10;
-    const real t12 = t3 * t11;
-    const real t13 = t7 - t12;
-    G[0] = t13;
-    const real t14 = S[7] * t2;
+    F[0] = t2;
+    F[1] = 0.0;
+    F[2] = t3;
+    const real t7 = 1.0 / t5;
+    F[3] = t7;
+    const real t8 = S[2] * t2;
+    Z[0] = t8;
+    const real t9 = S[7] * t2;
+    Z[1] = t9;
+    Z[2] = 0.0;
+    const real t10 = S[12] * t2;
+    Z[3] = t10;
+    const real t11 = S[13] * t2;
+    Z[4] = t11;
+    Z[5] = 0.0;
+    const real t12 = S[2] * t3;
+    const real t13 = S[5] - t12;
+    const real t14 = t7 * t13;
+    Z[6] = t14;
     const real t15 = S[7] * t3;
     const real t16 = S[10] - t15;
-    const real t17 = t8 * t16;
-    const real t18 = t3 * t17;
-    const real t19 = t14 - t18;
-    G[1] = t19;
-    G[2] = 1.0;
-    const real t20 = S[12] * t2;
-    const real t21 = S[12] * t3;
-    const real t22 = S[17] - t21;
-    const real t23 = t8 * t22;
-    const real t24 = t3 * t23;
-    const real t25 = t20 - t24;
-    G[3] = t25;
-    const real t26 = S[13] * t2;
-    const real t27 = S[13] * t3;
-    const real t28 = S[19] - t27;
-    const real t29 = t8 * t28;
-    const real t30 = t3 * t29;
-    const real t31 = t26 - t30;
-    G[4] = t31;
-    G[5] = 0.0;
-    G[6] = t11;
-    G[7] = t17;
-    G[8] = 0.0;
-    G[9] = t23;
-    G[10] = t29;
-    G[11] = 1.0;
-    const real t32 = tau[0] - e[2];
-    const real t33 = t2 * t32;
-    const real t34 = tau[1] - e[5];
-    const real t35 = t3 * t32;
-    const real t36 = t34 - t35;
-    const real t37 = t8 * t36;
-    const real t38 = t3 * t37;
-    const real t39 = t33 - t38;
-    g[0] = t39;
-    g[1] = t37;
-    const real t40 = S[2] * t13;
-    const real t41 = S[5] * t11;
-    const real t42 = t40 + t41;
-    const real t43 = S[0] - t42;
-    S_Q[0] = t43;
-    const real t44 = S[2] * t19;
-    const real t45 = S[5] * t17;
-    const real t46 = t44 + t45;
-    const real t47 = S[1] - t46;
-    S_Q[1] = t47;
+    const real t17 = t7 * t16;
+    Z[7] = t17;
+    Z[8] = 0.0;
+    const real t18 = S[12] * t3;
+    const real t19 = S[17] - t18;
+    const real t20 = t7 * t19;
+    Z[9] = t20;
+    const real t21 = S[13] * t3;
+    const real t22 = S[19] - t21;
+    const real t23 = t7 * t22;
+    Z[10] = t23;
+    Z[11] = 0.0;
+    const real t24 = tau[0] - e[2];
+    const real t25 = t2 * t24;
+    z[0] = t25;
+    const real t26 = tau[1] - e[5];
+    const real t27 = t3 * t24;
+    const real t28 = t26 - t27;
+    const real t29 = t7 * t28;
+    z[1] = t29;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 1.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 1.0;
+    const real t30 = S[2] * t8;
+    const real t31 = t13 * t14;
+    const real t32 = t30 + t31;
+    const real t33 = S[0] - t32;
+    S_Q[0] = t33;
+    const real t34 = S[2] * t9;
+    const real t35 = t13 * t17;
+    const real t36 = t34 + t35;
+    const real t37 = S[1] - t36;
+    S_Q[1] = t37;
     S_Q[2] = 0.0;
-    const real t48 = S[2] * t25;
-    const real t49 = S[5] * t23;
-    const real t50 = t48 + t49;
-    const real t51 = S[3] - t50;
-    S_Q[3] = t51;
-    const real t52 = S[2] * t31;
-    const real t53 = S[5] * t29;
-    const real t54 = t52 + t53;
-    const real t55 = S[4] - t54;
-    S_Q[4] = t55;
+    const real t38 = S[2] * t10;
+    const real t39 = t13 * t20;
+    const real t40 = t38 + t39;
+    const real t41 = S[3] - t40;
+    S_Q[3] = t41;
+    const real t42 = S[2] * t11;
+    const real t43 = t13 * t23;
+    const real t44 = t42 + t43;
+    const real t45 = S[4] - t44;
+    S_Q[4] = t45;
     S_Q[5] = 0.0;
-    const real t56 = S[7] * t19;
-    const real t57 = S[10] * t17;
-    const real t58 = t56 + t57;
-    const real t59 = S[6] - t58;
-    S_Q[6] = t59;
+    const real t46 = S[7] * t9;
+    const real t47 = t16 * t17;
+    const real t48 = t46 + t47;
+    const real t49 = S[6] - t48;
+    S_Q[6] = t49;
     S_Q[7] = 0.0;
-    const real t60 = S[7] * t25;
-    const real t61 = S[10] * t23;
-    const real t62 = t60 + t61;
-    const real t63 = S[8] - t62;
-    S_Q[8] = t63;
-    const real t64 = S[7] * t31;
-    const real t65 = S[10] * t29;
-    const real t66 = t64 + t65;
-    const real t67 = S[9] - t66;
-    S_Q[9] = t67;
+    const real t50 = S[7] * t10;
+    const real t51 = t16 * t20;
+    const real t52 = t50 + t51;
+    const real t53 = S[8] - t52;
+    S_Q[8] = t53;
+    const real t54 = S[7] * t11;
+    const real t55 = t16 * t23;
+    const real t56 = t54 + t55;
+    const real t57 = S[9] - t56;
+    S_Q[9] = t57;
     S_Q[10] = 0.0;
     S_Q[11] = 0.0;
     S_Q[12] = 0.0;
     S_Q[13] = 0.0;
     S_Q[14] = 0.0;
-    const real t68 = S[12] * t25;
-    const real t69 = S[17] * t23;
-    const real t70 = t68 + t69;
-    const real t71 = S[15] - t70;
-    S_Q[15] = t71;
-    const real t72 = S[12] * t31;
-    const real t73 = S[17] * t29;
-    const real t74 = t72 + t73;
-    const real t75 = S[16] - t74;
-    S_Q[16] = t75;
+    const real t58 = S[12] * t10;
+    const real t59 = t19 * t20;
+    const real t60 = t58 + t59;
+    const real t61 = S[15] - t60;
+    S_Q[15] = t61;
+    const real t62 = S[12] * t11;
+    const real t63 = t19 * t23;
+    const real t64 = t62 + t63;
+    const real t65 = S[16] - t64;
+    S_Q[16] = t65;
     S_Q[17] = 0.0;
-    const real t76 = S[13] * t31;
-    const real t77 = S[19] * t29;
-    const real t78 = t76 + t77;
-    const real t79 = S[18] - t78;
-    S_Q[18] = t79;
+    const real t66 = S[13] * t11;
+    const real t67 = t22 * t23;
+    const real t68 = t66 + t67;
+    const real t69 = S[18] - t68;
+    S_Q[18] = t69;
     S_Q[19] = 0.0;
     S_Q[20] = 0.0;
-    const real t80 = t13 * t32;
-    const real t81 = t11 * t34;
-    const real t82 = t80 + t81;
-    const real t83 = e[0] + t82;
-    e_Q[0] = t83;
-    const real t84 = t19 * t32;
-    const real t85 = t17 * t34;
-    const real t86 = t84 + t85;
-    const real t87 = e[1] + t86;
-    e_Q[1] = t87;
+    const real t70 = t8 * t24;
+    const real t71 = t14 * t28;
+    const real t72 = t70 + t71;
+    const real t73 = e[0] + t72;
+    e_Q[0] = t73;
+    const real t74 = t9 * t24;
+    const real t75 = t17 * t28;
+    const real t76 = t74 + t75;
+    const real t77 = e[1] + t76;
+    e_Q[1] = t77;
     e_Q[2] = tau[0];
-    const real t88 = t25 * t32;
-    const real t89 = t23 * t34;
-    const real t90 = t88 + t89;
-    const real t91 = e[3] + t90;
-    e_Q[3] = t91;
-    const real t92 = t31 * t32;
-    const real t93 = t29 * t34;
-    const real t94 = t92 + t93;
-    const real t95 = e[4] + t94;
-    e_Q[4] = t95;
+    const real t78 = t10 * t24;
+    const real t79 = t20 * t28;
+    const real t80 = t78 + t79;
+    const real t81 = e[3] + t80;
+    e_Q[3] = t81;
+    const real t82 = t11 * t24;
+    const real t83 = t23 * t28;
+    const real t84 = t82 + t83;
+    const real t85 = e[4] + t84;
+    e_Q[4] = t85;
     e_Q[5] = tau[1];
     D_ii[0] = S[11];
     D_ii[1] = S[20];
@@ -1070,7 +1078,7 @@ int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restri
 static int mstmm_hinge_cylindrical_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_cylindrical_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_cylindrical_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_cylindrical_eliminate_inputs[] = {
@@ -1082,16 +1090,16 @@ static const mstmm_port mstmm_hinge_cylindrical_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_cylindrical_eliminate_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
+    {"F", 4, "", 0, 0},
+    {"Z", 12, "", 0, 0},
+    {"z", 2, "", 0, 0},
+    {"W", 12, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 2, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_cylindrical_eliminate_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
 };
@@ -1166,11 +1174,11 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_cylindrical_eliminate,
         .call = mstmm_hinge_cylindrical_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_cylindrical_eliminate_inputs,
         .outputs = mstmm_hinge_cylindrical_eliminate_outputs,
-        .ir_hash = "5b6f0085391c8af792a1e01f41c54e13b472a27ac6270a97929455ce5b7c0e71",
-        .n_guards = 4,
+        .ir_hash = "e0ccd15697acb607a25614f825c5409bf484106d1432376ebcec459b56a2f0bc",
+        .n_guards = 2,
         .guards = mstmm_hinge_cylindrical_eliminate_guards,
     },
 };
@@ -1179,7 +1187,7 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "cc625168808c77f9aa338861a965e48c02da5c5d63a33a6a51249655e1322884",
+    .hash = "d28ac360b10870df6a26f7cfa319db20d448654251b0975be0fe01b693406040",
     .nq = 2,
     .nu = 2,
     .np = 0,

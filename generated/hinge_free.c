@@ -23,8 +23,9 @@ int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the free hinge
  * in  p[0] parameters
@@ -1482,15 +1483,18 @@ static const mstmm_port mstmm_hinge_free_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[6] (N, N*m) efforts on the free coordinates
- * out G[6][6] udot = g - G a_Q
- * out g[6] udot = g - G a_Q
+ * out F[6][6] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[6][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[6] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[6][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[6] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)p;
     (void)q;
@@ -1601,127 +1605,163 @@ int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
     const real t99 = t87 - t98;
     const real t100 = t63 < t99;
     if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    G[0] = 1.0;
-    G[1] = 0.0;
-    G[2] = 0.0;
-    G[3] = 0.0;
-    G[4] = 0.0;
-    G[5] = 0.0;
-    G[6] = 0.0;
-    G[7] = 1.0;
-    G[8] = 0.0;
-    G[9] = 0.0;
-    G[10] = 0.0;
-    G[11] = 0.0;
-    G[12] = 0.0;
-    G[13] = 0.0;
-    G[14] = 1.0;
-    G[15] = 0.0;
-    G[16] = 0.0;
-    G[17] = 0.0;
-    G[18] = 0.0;
-    G[19] = 0.0;
-    G[20] = 0.0;
-    G[21] = 1.0;
-    G[22] = 0.0;
-    G[23] = 0.0;
-    G[24] = 0.0;
-    G[25] = 0.0;
-    G[26] = 0.0;
-    G[27] = 0.0;
-    G[28] = 1.0;
-    G[29] = 0.0;
-    G[30] = 0.0;
-    G[31] = 0.0;
-    G[32] = 0.0;
-    G[33] = 0.0;
-    G[34] = 0.0;
-    G[35] = 1.0;
-    const real t101 = tau[0] - e[0];
-    const real t102 = t2 * t101;
-    const real t103 = tau[1] - e[1];
-    const real t104 = t3 * t101;
-    const real t105 = t103 - t104;
-    const real t106 = t13 * t105;
-    const real t107 = tau[2] - e[2];
-    const real t108 = t8 * t101;
-    const real t109 = t107 - t108;
-    const real t110 = t14 * t105;
-    const real t111 = t109 - t110;
-    const real t112 = t31 * t111;
-    const real t113 = tau[3] - e[3];
-    const real t114 = t19 * t101;
-    const real t115 = t113 - t114;
-    const real t116 = t24 * t105;
-    const real t117 = t115 - t116;
-    const real t118 = t32 * t111;
-    const real t119 = t117 - t118;
-    const real t120 = t58 * t119;
-    const real t121 = tau[4] - e[4];
-    const real t122 = t37 * t101;
-    const real t123 = t121 - t122;
-    const real t124 = t42 * t105;
-    const real t125 = t123 - t124;
-    const real t126 = t49 * t111;
-    const real t127 = t125 - t126;
-    const real t128 = t59 * t119;
-    const real t129 = t127 - t128;
-    const real t130 = t96 * t129;
-    const real t131 = 1.0 / t99;
+    F[0] = t2;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = 0.0;
+    F[4] = 0.0;
+    F[5] = 0.0;
+    F[6] = t3;
+    F[7] = t13;
+    F[8] = 0.0;
+    F[9] = 0.0;
+    F[10] = 0.0;
+    F[11] = 0.0;
+    F[12] = t8;
+    F[13] = t14;
+    F[14] = t31;
+    F[15] = 0.0;
+    F[16] = 0.0;
+    F[17] = 0.0;
+    F[18] = t19;
+    F[19] = t24;
+    F[20] = t32;
+    F[21] = t58;
+    F[22] = 0.0;
+    F[23] = 0.0;
+    F[24] = t37;
+    F[25] = t42;
+    F[26] = t49;
+    F[27] = t59;
+    F[28] = t96;
+    F[29] = 0.0;
+    F[30] = t64;
+    F[31] = t69;
+    F[32] = t76;
+    F[33] = t85;
+    F[34] = t97;
+    const real t101 = 1.0 / t99;
+    F[35] = t101;
+    Z[0] = 0.0;
+    Z[1] = 0.0;
+    Z[2] = 0.0;
+    Z[3] = 0.0;
+    Z[4] = 0.0;
+    Z[5] = 0.0;
+    Z[6] = 0.0;
+    Z[7] = 0.0;
+    Z[8] = 0.0;
+    Z[9] = 0.0;
+    Z[10] = 0.0;
+    Z[11] = 0.0;
+    Z[12] = 0.0;
+    Z[13] = 0.0;
+    Z[14] = 0.0;
+    Z[15] = 0.0;
+    Z[16] = 0.0;
+    Z[17] = 0.0;
+    Z[18] = 0.0;
+    Z[19] = 0.0;
+    Z[20] = 0.0;
+    Z[21] = 0.0;
+    Z[22] = 0.0;
+    Z[23] = 0.0;
+    Z[24] = 0.0;
+    Z[25] = 0.0;
+    Z[26] = 0.0;
+    Z[27] = 0.0;
+    Z[28] = 0.0;
+    Z[29] = 0.0;
+    Z[30] = 0.0;
+    Z[31] = 0.0;
+    Z[32] = 0.0;
+    Z[33] = 0.0;
+    Z[34] = 0.0;
+    Z[35] = 0.0;
+    const real t102 = tau[0] - e[0];
+    const real t103 = t2 * t102;
+    z[0] = t103;
+    const real t104 = tau[1] - e[1];
+    const real t105 = t3 * t102;
+    const real t106 = t104 - t105;
+    const real t107 = t13 * t106;
+    z[1] = t107;
+    const real t108 = tau[2] - e[2];
+    const real t109 = t8 * t102;
+    const real t110 = t108 - t109;
+    const real t111 = t14 * t106;
+    const real t112 = t110 - t111;
+    const real t113 = t31 * t112;
+    z[2] = t113;
+    const real t114 = tau[3] - e[3];
+    const real t115 = t19 * t102;
+    const real t116 = t114 - t115;
+    const real t117 = t24 * t106;
+    const real t118 = t116 - t117;
+    const real t119 = t32 * t112;
+    const real t120 = t118 - t119;
+    const real t121 = t58 * t120;
+    z[3] = t121;
+    const real t122 = tau[4] - e[4];
+    const real t123 = t37 * t102;
+    const real t124 = t122 - t123;
+    const real t125 = t42 * t106;
+    const real t126 = t124 - t125;
+    const real t127 = t49 * t112;
+    const real t128 = t126 - t127;
+    const real t129 = t59 * t120;
+    const real t130 = t128 - t129;
+    const real t131 = t96 * t130;
+    z[4] = t131;
     const real t132 = tau[5] - e[5];
-    const real t133 = t64 * t101;
+    const real t133 = t64 * t102;
     const real t134 = t132 - t133;
-    const real t135 = t69 * t105;
+    const real t135 = t69 * t106;
     const real t136 = t134 - t135;
-    const real t137 = t76 * t111;
+    const real t137 = t76 * t112;
     const real t138 = t136 - t137;
-    const real t139 = t85 * t119;
+    const real t139 = t85 * t120;
     const real t140 = t138 - t139;
-    const real t141 = t97 * t129;
+    const real t141 = t97 * t130;
     const real t142 = t140 - t141;
-    const real t143 = t131 * t142;
-    const real t144 = t97 * t143;
-    const real t145 = t130 - t144;
-    const real t146 = t59 * t145;
-    const real t147 = t120 - t146;
-    const real t148 = t85 * t143;
-    const real t149 = t147 - t148;
-    const real t150 = t32 * t149;
-    const real t151 = t112 - t150;
-    const real t152 = t49 * t145;
-    const real t153 = t151 - t152;
-    const real t154 = t76 * t143;
-    const real t155 = t153 - t154;
-    const real t156 = t14 * t155;
-    const real t157 = t106 - t156;
-    const real t158 = t24 * t149;
-    const real t159 = t157 - t158;
-    const real t160 = t42 * t145;
-    const real t161 = t159 - t160;
-    const real t162 = t69 * t143;
-    const real t163 = t161 - t162;
-    const real t164 = t3 * t163;
-    const real t165 = t102 - t164;
-    const real t166 = t8 * t155;
-    const real t167 = t165 - t166;
-    const real t168 = t19 * t149;
-    const real t169 = t167 - t168;
-    const real t170 = t37 * t145;
-    const real t171 = t169 - t170;
-    const real t172 = t64 * t143;
-    const real t173 = t171 - t172;
-    g[0] = t173;
-    g[1] = t163;
-    g[2] = t155;
-    g[3] = t149;
-    g[4] = t145;
-    g[5] = t143;
+    const real t143 = t101 * t142;
+    z[5] = t143;
+    W[0] = 1.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 1.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 1.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 0.0;
+    W[18] = 0.0;
+    W[19] = 0.0;
+    W[20] = 0.0;
+    W[21] = 1.0;
+    W[22] = 0.0;
+    W[23] = 0.0;
+    W[24] = 0.0;
+    W[25] = 0.0;
+    W[26] = 0.0;
+    W[27] = 0.0;
+    W[28] = 1.0;
+    W[29] = 0.0;
+    W[30] = 0.0;
+    W[31] = 0.0;
+    W[32] = 0.0;
+    W[33] = 0.0;
+    W[34] = 0.0;
+    W[35] = 1.0;
     S_Q[0] = 0.0;
     S_Q[1] = 0.0;
     S_Q[2] = 0.0;
@@ -1761,7 +1801,7 @@ int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
 static int mstmm_hinge_free_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_free_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_free_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_free_eliminate_inputs[] = {
@@ -1773,20 +1813,16 @@ static const mstmm_port mstmm_hinge_free_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_free_eliminate_outputs[] = {
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
+    {"F", 36, "", 0, 0},
+    {"Z", 36, "", 0, 0},
+    {"z", 6, "", 0, 0},
+    {"W", 36, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 6, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_free_eliminate_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
@@ -1865,11 +1901,11 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_free_eliminate,
         .call = mstmm_hinge_free_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_free_eliminate_inputs,
         .outputs = mstmm_hinge_free_eliminate_outputs,
-        .ir_hash = "57cac09900eb78ec301ec657c7d5999bc28e97ba60612a8c8891fdef1ad88286",
-        .n_guards = 12,
+        .ir_hash = "70f59ffbed5953114798e7df9534a3222bcec4a0f82fae6aabdaf6bfdbfc39b7",
+        .n_guards = 6,
         .guards = mstmm_hinge_free_eliminate_guards,
     },
 };
@@ -1878,7 +1914,7 @@ const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "21c18b19856f73deeb33e6db6f8a68b1ed50bed5134e0d8f223d0c77c26b5569",
+    .hash = "f3ab39262b903211aea13cb70b84e4c7c12ae2436108141fc3d528988061bc19",
     .nq = 7,
     .nu = 6,
     .np = 0,

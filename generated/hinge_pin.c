@@ -24,8 +24,9 @@ int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, con
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
@@ -858,36 +859,45 @@ static const mstmm_port mstmm_hinge_pin_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
- * out G[1][6] udot = g - G a_Q
- * out g[1] udot = g - G a_Q
+ * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[1] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[1][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[1] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)p;
     (void)q;
     const real t0 = 0.0 < S[20];
     if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
     const real t1 = 1.0 / S[20];
+    F[0] = t1;
     const real t2 = S[5] * t1;
-    G[0] = t2;
+    Z[0] = t2;
     const real t3 = S[10] * t1;
-    G[1] = t3;
+    Z[1] = t3;
     const real t4 = S[14] * t1;
-    G[2] = t4;
+    Z[2] = t4;
     const real t5 = S[17] * t1;
-    G[3] = t5;
+    Z[3] = t5;
     const real t6 = S[19] * t1;
-    G[4] = t6;
-    G[5] = 1.0;
+    Z[4] = t6;
+    Z[5] = 0.0;
     const real t7 = tau[0] - e[5];
     const real t8 = t1 * t7;
-    g[0] = t8;
+    z[0] = t8;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 1.0;
     const real t9 = S[5] * t2;
     const real t10 = S[0] - t9;
     S_Q[0] = t10;
@@ -962,7 +972,7 @@ int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
 static int mstmm_hinge_pin_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_pin_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_pin_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_pin_eliminate_inputs[] = {
@@ -974,15 +984,16 @@ static const mstmm_port mstmm_hinge_pin_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_pin_eliminate_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"Z", 6, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"W", 6, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 1, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_pin_eliminate_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
@@ -1056,11 +1067,11 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_pin_eliminate,
         .call = mstmm_hinge_pin_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_pin_eliminate_inputs,
         .outputs = mstmm_hinge_pin_eliminate_outputs,
-        .ir_hash = "f8a4c3115e6674b3bf4ba12c6c3b666be79cce6cbd28f27bfa848042e8bddaea",
-        .n_guards = 2,
+        .ir_hash = "0173c296aba772bf68c9ff1231d266b0bb0e5e284d622c8e1dcece15a267102a",
+        .n_guards = 1,
         .guards = mstmm_hinge_pin_eliminate_guards,
     },
 };
@@ -1069,7 +1080,7 @@ const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "768f45477998f911ef8bc9e2048bbb439f26817dac13c069fb6c58db885346b6",
+    .hash = "ec23e91f34962752e3d5c2620d1a8aed0de69ad82ced716e3a33d12088f5f898",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -23,8 +23,9 @@ int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict 
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
@@ -855,36 +856,45 @@ static const mstmm_port mstmm_hinge_prismatic_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
- * out G[1][6] udot = g - G a_Q
- * out g[1] udot = g - G a_Q
+ * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[1] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[1][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[1] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)p;
     (void)q;
     const real t0 = 0.0 < S[11];
     if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
     const real t1 = 1.0 / S[11];
+    F[0] = t1;
     const real t2 = S[2] * t1;
-    G[0] = t2;
+    Z[0] = t2;
     const real t3 = S[7] * t1;
-    G[1] = t3;
-    G[2] = 1.0;
+    Z[1] = t3;
+    Z[2] = 0.0;
     const real t4 = S[12] * t1;
-    G[3] = t4;
+    Z[3] = t4;
     const real t5 = S[13] * t1;
-    G[4] = t5;
+    Z[4] = t5;
     const real t6 = S[14] * t1;
-    G[5] = t6;
+    Z[5] = t6;
     const real t7 = tau[0] - e[2];
     const real t8 = t1 * t7;
-    g[0] = t8;
+    z[0] = t8;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 1.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
     const real t9 = S[2] * t2;
     const real t10 = S[0] - t9;
     S_Q[0] = t10;
@@ -959,7 +969,7 @@ int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict
 static int mstmm_hinge_prismatic_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_prismatic_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_prismatic_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_prismatic_eliminate_inputs[] = {
@@ -971,15 +981,16 @@ static const mstmm_port mstmm_hinge_prismatic_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_prismatic_eliminate_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"Z", 6, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"W", 6, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 1, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_prismatic_eliminate_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
@@ -1053,11 +1064,11 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_prismatic_eliminate,
         .call = mstmm_hinge_prismatic_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_prismatic_eliminate_inputs,
         .outputs = mstmm_hinge_prismatic_eliminate_outputs,
-        .ir_hash = "5a7116ed2825bbe013eab5f949e1125d2da975b817c0870ed9fa1e9a241c73a7",
-        .n_guards = 2,
+        .ir_hash = "c8275dd1fc59e0b263ce7ca4c52b87e49b001a7ab63d0b4f606201560046e33e",
+        .n_guards = 1,
         .guards = mstmm_hinge_prismatic_eliminate_guards,
     },
 };
@@ -1066,7 +1077,7 @@ const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "f699a71b95824fd3e1b20c9bd8531d722d8b0b85c5b14ba71d72b88ab1976391",
+    .hash = "53dcf411be57c4f06037f7cf36888e6179288faa53d047867832510506ed4998",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -23,8 +23,9 @@ int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the screw hinge
  * in  p[1] parameters: lead [m]
@@ -997,15 +998,18 @@ static const mstmm_port mstmm_hinge_screw_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
- * out G[1][6] udot = g - G a_Q
- * out g[1] udot = g - G a_Q
+ * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[1] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[1][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[1] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     (void)q;
     const real t0 = MSTMM_PI * 2.0;
@@ -1019,49 +1023,55 @@ int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
     const real t8 = t4 + t7;
     const real t9 = 0.0 < t8;
     if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t10 = S[2] * t2;
-    const real t11 = S[5] + t10;
-    const real t12 = 1.0 / t8;
-    const real t13 = t11 * t12;
-    G[0] = t13;
+    const real t10 = 1.0 / t8;
+    F[0] = t10;
+    const real t11 = S[2] * t2;
+    const real t12 = S[5] + t11;
+    const real t13 = t12 * t10;
+    Z[0] = t13;
     const real t14 = S[7] * t2;
     const real t15 = S[10] + t14;
-    const real t16 = t15 * t12;
-    G[1] = t16;
-    const real t17 = t6 * t12;
-    G[2] = t17;
+    const real t16 = t15 * t10;
+    Z[1] = t16;
+    const real t17 = t6 * t10;
+    Z[2] = t17;
     const real t18 = S[12] * t2;
     const real t19 = S[17] + t18;
-    const real t20 = t19 * t12;
-    G[3] = t20;
+    const real t20 = t19 * t10;
+    Z[3] = t20;
     const real t21 = S[13] * t2;
     const real t22 = S[19] + t21;
-    const real t23 = t22 * t12;
-    G[4] = t23;
-    const real t24 = t4 * t12;
-    G[5] = t24;
+    const real t23 = t22 * t10;
+    Z[4] = t23;
+    const real t24 = t4 * t10;
+    Z[5] = t24;
     const real t25 = e[2] * t2;
     const real t26 = e[5] + t25;
     const real t27 = tau[0] - t26;
-    const real t28 = t12 * t27;
-    g[0] = t28;
-    const real t29 = t11 * t13;
+    const real t28 = t10 * t27;
+    z[0] = t28;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    const real t29 = t12 * t13;
     const real t30 = S[0] - t29;
     S_Q[0] = t30;
-    const real t31 = t11 * t16;
+    const real t31 = t12 * t16;
     const real t32 = S[1] - t31;
     S_Q[1] = t32;
-    const real t33 = t11 * t17;
+    const real t33 = t12 * t17;
     const real t34 = S[2] - t33;
     S_Q[2] = t34;
-    const real t35 = t11 * t20;
+    const real t35 = t12 * t20;
     const real t36 = S[3] - t35;
     S_Q[3] = t36;
-    const real t37 = t11 * t23;
+    const real t37 = t12 * t23;
     const real t38 = S[4] - t37;
     S_Q[4] = t38;
-    const real t39 = t11 * t24;
+    const real t39 = t12 * t24;
     const real t40 = S[5] - t39;
     S_Q[5] = t40;
     const real t41 = t15 * t16;
@@ -1134,7 +1144,7 @@ int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
 static int mstmm_hinge_screw_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_screw_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_screw_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_screw_eliminate_inputs[] = {
@@ -1146,15 +1156,16 @@ static const mstmm_port mstmm_hinge_screw_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_screw_eliminate_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"Z", 6, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"W", 6, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 1, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_screw_eliminate_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
@@ -1236,11 +1247,11 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_screw_eliminate,
         .call = mstmm_hinge_screw_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_screw_eliminate_inputs,
         .outputs = mstmm_hinge_screw_eliminate_outputs,
-        .ir_hash = "c043fbbcf391f2197aeeb65001640b2d4d84b0a5fea8b73c96c8a7ef0b58658e",
-        .n_guards = 2,
+        .ir_hash = "90352486b457ec12614ef6566edfcf4d2b4940222de60d193401d8bd796c9958",
+        .n_guards = 1,
         .guards = mstmm_hinge_screw_eliminate_guards,
     },
 };
@@ -1249,7 +1260,7 @@ const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "3f47b910b56f9b14a47f2e7215ea3cf6f615ae67e0485cc4cff49cb83d083258",
+    .hash = "5306cc2acfd05aaa4e16f08061ad711fec811495becb398c7d07da62a879a199",
     .nq = 1,
     .nu = 1,
     .np = 1,

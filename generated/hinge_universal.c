@@ -23,8 +23,9 @@ int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict 
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
 
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
@@ -1136,15 +1137,18 @@ static const mstmm_port mstmm_hinge_universal_recover_outputs[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
- * out G[2][6] udot = g - G a_Q
- * out g[2] udot = g - G a_Q
+ * out F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[2][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[2] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[2][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[2] (kg*m2 or kg) diagonal of D
  */
 int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     const real t0 = sin(p[0]);
     const real t1 = sin(q[1]);
@@ -1181,187 +1185,189 @@ int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict
     const real t31 = S[20] - t30;
     const real t32 = t27 < t31;
     if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t33 = S[3] * t2;
-    const real t34 = S[4] * t5;
-    const real t35 = t33 + t34;
-    const real t36 = S[5] * t8;
-    const real t37 = t35 + t36;
-    const real t38 = t37 * t28;
-    const real t39 = 1.0 / t31;
-    const real t40 = t37 * t29;
-    const real t41 = S[5] - t40;
-    const real t42 = t39 * t41;
-    const real t43 = t29 * t42;
-    const real t44 = t38 - t43;
-    G[0] = t44;
-    const real t45 = S[8] * t2;
-    const real t46 = S[9] * t5;
-    const real t47 = t45 + t46;
-    const real t48 = S[10] * t8;
-    const real t49 = t47 + t48;
-    const real t50 = t49 * t28;
-    const real t51 = t49 * t29;
-    const real t52 = S[10] - t51;
-    const real t53 = t39 * t52;
-    const real t54 = t29 * t53;
-    const real t55 = t50 - t54;
-    G[1] = t55;
-    const real t56 = S[12] * t2;
-    const real t57 = S[13] * t5;
-    const real t58 = t56 + t57;
-    const real t59 = S[14] * t8;
-    const real t60 = t58 + t59;
-    const real t61 = t60 * t28;
-    const real t62 = t60 * t29;
-    const real t63 = S[14] - t62;
-    const real t64 = t39 * t63;
-    const real t65 = t29 * t64;
-    const real t66 = t61 - t65;
-    G[2] = t66;
-    const real t67 = t10 * t28;
-    const real t68 = t10 * t29;
-    const real t69 = S[17] - t68;
-    const real t70 = t39 * t69;
-    const real t71 = t29 * t70;
-    const real t72 = t67 - t71;
-    G[3] = t72;
-    const real t73 = t16 * t28;
-    const real t74 = t16 * t29;
-    const real t75 = S[19] - t74;
-    const real t76 = t39 * t75;
-    const real t77 = t29 * t76;
-    const real t78 = t73 - t77;
-    G[4] = t78;
-    G[5] = 0.0;
-    G[6] = t42;
-    G[7] = t53;
-    G[8] = t64;
-    G[9] = t70;
-    G[10] = t76;
-    G[11] = 1.0;
-    const real t79 = e[3] * t2;
-    const real t80 = e[4] * t5;
-    const real t81 = t79 + t80;
-    const real t82 = e[5] * t8;
-    const real t83 = t81 + t82;
-    const real t84 = tau[0] - t83;
-    const real t85 = t28 * t84;
-    const real t86 = tau[1] - e[5];
-    const real t87 = t29 * t84;
-    const real t88 = t86 - t87;
-    const real t89 = t39 * t88;
-    const real t90 = t29 * t89;
-    const real t91 = t85 - t90;
-    g[0] = t91;
-    g[1] = t89;
-    const real t92 = t37 * t44;
-    const real t93 = S[5] * t42;
+    F[0] = t28;
+    F[1] = 0.0;
+    F[2] = t29;
+    const real t33 = 1.0 / t31;
+    F[3] = t33;
+    const real t34 = S[3] * t2;
+    const real t35 = S[4] * t5;
+    const real t36 = t34 + t35;
+    const real t37 = S[5] * t8;
+    const real t38 = t36 + t37;
+    const real t39 = t38 * t28;
+    Z[0] = t39;
+    const real t40 = S[8] * t2;
+    const real t41 = S[9] * t5;
+    const real t42 = t40 + t41;
+    const real t43 = S[10] * t8;
+    const real t44 = t42 + t43;
+    const real t45 = t44 * t28;
+    Z[1] = t45;
+    const real t46 = S[12] * t2;
+    const real t47 = S[13] * t5;
+    const real t48 = t46 + t47;
+    const real t49 = S[14] * t8;
+    const real t50 = t48 + t49;
+    const real t51 = t50 * t28;
+    Z[2] = t51;
+    const real t52 = t10 * t28;
+    Z[3] = t52;
+    const real t53 = t16 * t28;
+    Z[4] = t53;
+    Z[5] = 0.0;
+    const real t54 = t38 * t29;
+    const real t55 = S[5] - t54;
+    const real t56 = t33 * t55;
+    Z[6] = t56;
+    const real t57 = t44 * t29;
+    const real t58 = S[10] - t57;
+    const real t59 = t33 * t58;
+    Z[7] = t59;
+    const real t60 = t50 * t29;
+    const real t61 = S[14] - t60;
+    const real t62 = t33 * t61;
+    Z[8] = t62;
+    const real t63 = t10 * t29;
+    const real t64 = S[17] - t63;
+    const real t65 = t33 * t64;
+    Z[9] = t65;
+    const real t66 = t16 * t29;
+    const real t67 = S[19] - t66;
+    const real t68 = t33 * t67;
+    Z[10] = t68;
+    Z[11] = 0.0;
+    const real t69 = e[3] * t2;
+    const real t70 = e[4] * t5;
+    const real t71 = t69 + t70;
+    const real t72 = e[5] * t8;
+    const real t73 = t71 + t72;
+    const real t74 = tau[0] - t73;
+    const real t75 = t28 * t74;
+    z[0] = t75;
+    const real t76 = tau[1] - e[5];
+    const real t77 = t29 * t74;
+    const real t78 = t76 - t77;
+    const real t79 = t33 * t78;
+    z[1] = t79;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 1.0;
+    const real t80 = t38 * t39;
+    const real t81 = t55 * t56;
+    const real t82 = t80 + t81;
+    const real t83 = S[0] - t82;
+    S_Q[0] = t83;
+    const real t84 = t38 * t45;
+    const real t85 = t55 * t59;
+    const real t86 = t84 + t85;
+    const real t87 = S[1] - t86;
+    S_Q[1] = t87;
+    const real t88 = t38 * t51;
+    const real t89 = t55 * t62;
+    const real t90 = t88 + t89;
+    const real t91 = S[2] - t90;
+    S_Q[2] = t91;
+    const real t92 = t38 * t52;
+    const real t93 = t55 * t65;
     const real t94 = t92 + t93;
-    const real t95 = S[0] - t94;
-    S_Q[0] = t95;
-    const real t96 = t37 * t55;
-    const real t97 = S[5] * t53;
+    const real t95 = S[3] - t94;
+    S_Q[3] = t95;
+    const real t96 = t38 * t53;
+    const real t97 = t55 * t68;
     const real t98 = t96 + t97;
-    const real t99 = S[1] - t98;
-    S_Q[1] = t99;
-    const real t100 = t37 * t66;
-    const real t101 = S[5] * t64;
-    const real t102 = t100 + t101;
-    const real t103 = S[2] - t102;
-    S_Q[2] = t103;
-    const real t104 = t37 * t72;
-    const real t105 = S[5] * t70;
-    const real t106 = t104 + t105;
-    const real t107 = S[3] - t106;
-    S_Q[3] = t107;
-    const real t108 = t37 * t78;
-    const real t109 = S[5] * t76;
-    const real t110 = t108 + t109;
-    const real t111 = S[4] - t110;
-    S_Q[4] = t111;
+    const real t99 = S[4] - t98;
+    S_Q[4] = t99;
     S_Q[5] = 0.0;
-    const real t112 = t49 * t55;
-    const real t113 = S[10] * t53;
+    const real t100 = t44 * t45;
+    const real t101 = t58 * t59;
+    const real t102 = t100 + t101;
+    const real t103 = S[6] - t102;
+    S_Q[6] = t103;
+    const real t104 = t44 * t51;
+    const real t105 = t58 * t62;
+    const real t106 = t104 + t105;
+    const real t107 = S[7] - t106;
+    S_Q[7] = t107;
+    const real t108 = t44 * t52;
+    const real t109 = t58 * t65;
+    const real t110 = t108 + t109;
+    const real t111 = S[8] - t110;
+    S_Q[8] = t111;
+    const real t112 = t44 * t53;
+    const real t113 = t58 * t68;
     const real t114 = t112 + t113;
-    const real t115 = S[6] - t114;
-    S_Q[6] = t115;
-    const real t116 = t49 * t66;
-    const real t117 = S[10] * t64;
-    const real t118 = t116 + t117;
-    const real t119 = S[7] - t118;
-    S_Q[7] = t119;
-    const real t120 = t49 * t72;
-    const real t121 = S[10] * t70;
-    const real t122 = t120 + t121;
-    const real t123 = S[8] - t122;
-    S_Q[8] = t123;
-    const real t124 = t49 * t78;
-    const real t125 = S[10] * t76;
-    const real t126 = t124 + t125;
-    const real t127 = S[9] - t126;
-    S_Q[9] = t127;
+    const real t115 = S[9] - t114;
+    S_Q[9] = t115;
     S_Q[10] = 0.0;
-    const real t128 = t60 * t66;
-    const real t129 = S[14] * t64;
-    const real t130 = t128 + t129;
-    const real t131 = S[11] - t130;
-    S_Q[11] = t131;
-    const real t132 = t60 * t72;
-    const real t133 = S[14] * t70;
-    const real t134 = t132 + t133;
-    const real t135 = S[12] - t134;
-    S_Q[12] = t135;
-    const real t136 = t60 * t78;
-    const real t137 = S[14] * t76;
-    const real t138 = t136 + t137;
-    const real t139 = S[13] - t138;
-    S_Q[13] = t139;
+    const real t116 = t50 * t51;
+    const real t117 = t61 * t62;
+    const real t118 = t116 + t117;
+    const real t119 = S[11] - t118;
+    S_Q[11] = t119;
+    const real t120 = t50 * t52;
+    const real t121 = t61 * t65;
+    const real t122 = t120 + t121;
+    const real t123 = S[12] - t122;
+    S_Q[12] = t123;
+    const real t124 = t50 * t53;
+    const real t125 = t61 * t68;
+    const real t126 = t124 + t125;
+    const real t127 = S[13] - t126;
+    S_Q[13] = t127;
     S_Q[14] = 0.0;
-    const real t140 = t10 * t72;
-    const real t141 = S[17] * t70;
-    const real t142 = t140 + t141;
-    const real t143 = S[15] - t142;
-    S_Q[15] = t143;
-    const real t144 = t10 * t78;
-    const real t145 = S[17] * t76;
-    const real t146 = t144 + t145;
-    const real t147 = S[16] - t146;
-    S_Q[16] = t147;
+    const real t128 = t10 * t52;
+    const real t129 = t64 * t65;
+    const real t130 = t128 + t129;
+    const real t131 = S[15] - t130;
+    S_Q[15] = t131;
+    const real t132 = t10 * t53;
+    const real t133 = t64 * t68;
+    const real t134 = t132 + t133;
+    const real t135 = S[16] - t134;
+    S_Q[16] = t135;
     S_Q[17] = 0.0;
-    const real t148 = t16 * t78;
-    const real t149 = S[19] * t76;
-    const real t150 = t148 + t149;
-    const real t151 = S[18] - t150;
-    S_Q[18] = t151;
+    const real t136 = t16 * t53;
+    const real t137 = t67 * t68;
+    const real t138 = t136 + t137;
+    const real t139 = S[18] - t138;
+    S_Q[18] = t139;
     S_Q[19] = 0.0;
     S_Q[20] = 0.0;
-    const real t152 = t44 * t84;
-    const real t153 = t42 * t86;
+    const real t140 = t39 * t74;
+    const real t141 = t56 * t78;
+    const real t142 = t140 + t141;
+    const real t143 = e[0] + t142;
+    e_Q[0] = t143;
+    const real t144 = t45 * t74;
+    const real t145 = t59 * t78;
+    const real t146 = t144 + t145;
+    const real t147 = e[1] + t146;
+    e_Q[1] = t147;
+    const real t148 = t51 * t74;
+    const real t149 = t62 * t78;
+    const real t150 = t148 + t149;
+    const real t151 = e[2] + t150;
+    e_Q[2] = t151;
+    const real t152 = t52 * t74;
+    const real t153 = t65 * t78;
     const real t154 = t152 + t153;
-    const real t155 = e[0] + t154;
-    e_Q[0] = t155;
-    const real t156 = t55 * t84;
-    const real t157 = t53 * t86;
+    const real t155 = e[3] + t154;
+    e_Q[3] = t155;
+    const real t156 = t53 * t74;
+    const real t157 = t68 * t78;
     const real t158 = t156 + t157;
-    const real t159 = e[1] + t158;
-    e_Q[1] = t159;
-    const real t160 = t66 * t84;
-    const real t161 = t64 * t86;
-    const real t162 = t160 + t161;
-    const real t163 = e[2] + t162;
-    e_Q[2] = t163;
-    const real t164 = t72 * t84;
-    const real t165 = t70 * t86;
-    const real t166 = t164 + t165;
-    const real t167 = e[3] + t166;
-    e_Q[3] = t167;
-    const real t168 = t78 * t84;
-    const real t169 = t76 * t86;
-    const real t170 = t168 + t169;
-    const real t171 = e[4] + t170;
-    e_Q[4] = t171;
+    const real t159 = e[4] + t158;
+    e_Q[4] = t159;
     e_Q[5] = tau[1];
     D_ii[0] = t25;
     D_ii[1] = S[20];
@@ -1371,7 +1377,7 @@ int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict
 static int mstmm_hinge_universal_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_universal_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_hinge_universal_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_hinge_universal_eliminate_inputs[] = {
@@ -1383,16 +1389,16 @@ static const mstmm_port mstmm_hinge_universal_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_hinge_universal_eliminate_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
+    {"F", 4, "", 0, 0},
+    {"Z", 12, "", 0, 0},
+    {"z", 2, "", 0, 0},
+    {"W", 12, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 2, "kg*m2 or kg", 0, 0},
 };
 
 static const mstmm_guard mstmm_hinge_universal_eliminate_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
 };
@@ -1475,11 +1481,11 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .function = (void (*)(void))mstmm_hinge_universal_eliminate,
         .call = mstmm_hinge_universal_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_hinge_universal_eliminate_inputs,
         .outputs = mstmm_hinge_universal_eliminate_outputs,
-        .ir_hash = "304e63f831827272aaeb15edfeca5134d8b1ecc9ecf7d8cfc16d1febd07a793d",
-        .n_guards = 4,
+        .ir_hash = "3482f038ff1d187ea6175be670c4a7e45d8b6f28f8bcd379c019b62e912ab40e",
+        .n_guards = 2,
         .guards = mstmm_hinge_universal_eliminate_guards,
     },
 };
@@ -1488,7 +1494,7 @@ const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "be2c7d2896d195716047036b0ef626740dfc4aed41d8ebf88bacf617e04e14a9",
+    .hash = "edad246232876d176816be0a4dd5238ae3fef258fc292943d3e828451987b281",
     .nq = 2,
     .nu = 2,
     .np = 1,

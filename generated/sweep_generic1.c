@@ -26,8 +26,12 @@ int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic1_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1215,15 +1219,18 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
- * out G[1][6] udot = g - G a_Q
- * out g[1] udot = g - G a_Q
+ * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[1] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[1][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[1] (kg*m2 or kg) diagonal of D
  */
 int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     const real t0 = H[0] * S[0];
     const real t1 = H[1] * S[1];
@@ -1305,20 +1312,20 @@ int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict 
     const real t77 = J[0] + t76;
     const real t78 = 0.0 < t77;
     if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
     const real t79 = 1.0 / t77;
+    F[0] = t79;
     const real t80 = t10 * t79;
-    G[0] = t80;
+    Z[0] = t80;
     const real t81 = t22 * t79;
-    G[1] = t81;
+    Z[1] = t81;
     const real t82 = t35 * t79;
-    G[2] = t82;
+    Z[2] = t82;
     const real t83 = t48 * t79;
-    G[3] = t83;
+    Z[3] = t83;
     const real t84 = t61 * t79;
-    G[4] = t84;
+    Z[4] = t84;
     const real t85 = t74 * t79;
-    G[5] = t85;
+    Z[5] = t85;
     const real t86 = H[0] * e[0];
     const real t87 = H[1] * e[1];
     const real t88 = t86 + t87;
@@ -1332,7 +1339,13 @@ int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict 
     const real t96 = t94 + t95;
     const real t97 = tau[0] - t96;
     const real t98 = t79 * t97;
-    g[0] = t98;
+    z[0] = t98;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
     const real t99 = t10 * t80;
     const real t100 = S[0] - t99;
     S_Q[0] = t100;
@@ -1421,7 +1434,7 @@ int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict 
 static int mstmm_sweep_generic1_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_generic1_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_sweep_generic1_eliminate_inputs[] = {
@@ -1433,8 +1446,10 @@ static const mstmm_port mstmm_sweep_generic1_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_generic1_eliminate_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"Z", 6, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"W", 6, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 1, "kg*m2 or kg", 0, 0},
@@ -1442,7 +1457,147 @@ static const mstmm_port mstmm_sweep_generic1_eliminate_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_generic1_eliminate_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* accelerations recovered behind a factored hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace of the free coordinates
+ * in  F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * in  z[1] diag(d)^-1 L^-1 (tau - H^T e)
+ * in  W[1][6] unit columns of H, transposed
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[1] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic1_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    (void)F;
+    const real t0 = r[2] * delta_I[4];
+    const real t1 = r[1] * delta_I[5];
+    const real t2 = t0 - t1;
+    const real t3 = delta_I[0] + t2;
+    const real t4 = Rc[0] * t3;
+    const real t5 = r[0] * delta_I[5];
+    const real t6 = r[2] * delta_I[3];
+    const real t7 = t5 - t6;
+    const real t8 = delta_I[1] + t7;
+    const real t9 = Rc[3] * t8;
+    const real t10 = t4 + t9;
+    const real t11 = r[1] * delta_I[3];
+    const real t12 = r[0] * delta_I[4];
+    const real t13 = t11 - t12;
+    const real t14 = delta_I[2] + t13;
+    const real t15 = Rc[6] * t14;
+    const real t16 = t10 + t15;
+    const real t17 = Z[0] * t16;
+    const real t18 = Rc[1] * t3;
+    const real t19 = Rc[4] * t8;
+    const real t20 = t18 + t19;
+    const real t21 = Rc[7] * t14;
+    const real t22 = t20 + t21;
+    const real t23 = Z[1] * t22;
+    const real t24 = t17 + t23;
+    const real t25 = Rc[2] * t3;
+    const real t26 = Rc[5] * t8;
+    const real t27 = t25 + t26;
+    const real t28 = Rc[8] * t14;
+    const real t29 = t27 + t28;
+    const real t30 = Z[2] * t29;
+    const real t31 = t24 + t30;
+    const real t32 = Rc[0] * delta_I[3];
+    const real t33 = Rc[3] * delta_I[4];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[6] * delta_I[5];
+    const real t36 = t34 + t35;
+    const real t37 = Z[3] * t36;
+    const real t38 = t31 + t37;
+    const real t39 = Rc[1] * delta_I[3];
+    const real t40 = Rc[4] * delta_I[4];
+    const real t41 = t39 + t40;
+    const real t42 = Rc[7] * delta_I[5];
+    const real t43 = t41 + t42;
+    const real t44 = Z[4] * t43;
+    const real t45 = t38 + t44;
+    const real t46 = Rc[2] * delta_I[3];
+    const real t47 = Rc[5] * delta_I[4];
+    const real t48 = t46 + t47;
+    const real t49 = Rc[8] * delta_I[5];
+    const real t50 = t48 + t49;
+    const real t51 = Z[5] * t50;
+    const real t52 = t45 + t51;
+    const real t53 = z[0] - t52;
+    const real t54 = W[0] * t16;
+    const real t55 = W[1] * t22;
+    const real t56 = t54 + t55;
+    const real t57 = W[2] * t29;
+    const real t58 = t56 + t57;
+    const real t59 = W[3] * t36;
+    const real t60 = t58 + t59;
+    const real t61 = W[4] * t43;
+    const real t62 = t60 + t61;
+    const real t63 = W[5] * t50;
+    const real t64 = t62 + t63;
+    const real t65 = t53 - t64;
+    udot[0] = t65;
+    const real t66 = H[0] * t53;
+    const real t67 = H[0] * t64;
+    const real t68 = t66 - t67;
+    const real t69 = t16 + t68;
+    delta[0] = t69;
+    const real t70 = H[1] * t53;
+    const real t71 = H[1] * t64;
+    const real t72 = t70 - t71;
+    const real t73 = t22 + t72;
+    delta[1] = t73;
+    const real t74 = H[2] * t53;
+    const real t75 = H[2] * t64;
+    const real t76 = t74 - t75;
+    const real t77 = t29 + t76;
+    delta[2] = t77;
+    const real t78 = H[3] * t53;
+    const real t79 = H[3] * t64;
+    const real t80 = t78 - t79;
+    const real t81 = t36 + t80;
+    delta[3] = t81;
+    const real t82 = H[4] * t53;
+    const real t83 = H[4] * t64;
+    const real t84 = t82 - t83;
+    const real t85 = t43 + t84;
+    delta[4] = t85;
+    const real t86 = H[5] * t53;
+    const real t87 = H[5] * t64;
+    const real t88 = t86 - t87;
+    const real t89 = t50 + t88;
+    delta[5] = t89;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_recover_factored_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_recover_factored(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_recover_factored_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"Z", 6, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"W", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_recover_factored_outputs[] = {
+    {"udot", 1, "", 0, 0},
+    {"delta", 6, "", 0, 0},
 };
 
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
@@ -1511,12 +1666,24 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .function = (void (*)(void))mstmm_sweep_generic1_eliminate,
         .call = mstmm_sweep_generic1_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_sweep_generic1_eliminate_inputs,
         .outputs = mstmm_sweep_generic1_eliminate_outputs,
-        .ir_hash = "2853c19986849b47016b98bf1e67ce4d3eacb569583d5e41f39c615f6e9e1420",
-        .n_guards = 2,
+        .ir_hash = "e3be5dc6abb32e20dee1e0804f65ed6677fe70b11dee754a868de7591ead42f5",
+        .n_guards = 1,
         .guards = mstmm_sweep_generic1_eliminate_guards,
+    },
+    {
+        .name = "recover_factored",
+        .function = (void (*)(void))mstmm_sweep_generic1_recover_factored,
+        .call = mstmm_sweep_generic1_recover_factored_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_recover_factored_inputs,
+        .outputs = mstmm_sweep_generic1_recover_factored_outputs,
+        .ir_hash = "4cf66246286ce12b7e60a934559892e51e52e98303edacbbb2c29a2fcb3effb0",
+        .n_guards = 0,
+        .guards = NULL,
     },
 };
 
@@ -1524,7 +1691,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "7cbd70c7d83948c771d08e7eb5cf6fcd2dae1594361ce678f9f99c368b1ac1db",
+    .hash = "6caa27c276521a4cad2de450bd7153eb5c270e4a2650b43ed8a34ff97156fff3",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1534,6 +1701,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 6,
+    .n_kernels = 7,
     .kernels = mstmm_sweep_generic1_kernels,
 };

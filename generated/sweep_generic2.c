@@ -26,8 +26,12 @@ int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic2_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1534,15 +1538,18 @@ static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
- * out G[2][6] udot = g - G a_Q
- * out g[2] udot = g - G a_Q
+ * out F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[2][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[2] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[2][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[2] (kg*m2 or kg) diagonal of D
  */
 int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     const real t0 = H[0] * S[0];
     const real t1 = H[2] * S[1];
@@ -1720,224 +1727,224 @@ int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict 
     const real t172 = t156 - t171;
     const real t173 = t157 < t172;
     if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t174 = t10 * t169;
-    const real t175 = 1.0 / t172;
-    const real t176 = t10 * t170;
-    const real t177 = t89 - t176;
-    const real t178 = t175 * t177;
-    const real t179 = t170 * t178;
-    const real t180 = t174 - t179;
-    G[0] = t180;
-    const real t181 = t22 * t169;
-    const real t182 = t22 * t170;
-    const real t183 = t101 - t182;
-    const real t184 = t175 * t183;
-    const real t185 = t170 * t184;
-    const real t186 = t181 - t185;
-    G[1] = t186;
-    const real t187 = t35 * t169;
-    const real t188 = t35 * t170;
-    const real t189 = t114 - t188;
-    const real t190 = t175 * t189;
-    const real t191 = t170 * t190;
-    const real t192 = t187 - t191;
-    G[2] = t192;
-    const real t193 = t48 * t169;
-    const real t194 = t48 * t170;
-    const real t195 = t127 - t194;
-    const real t196 = t175 * t195;
-    const real t197 = t170 * t196;
-    const real t198 = t193 - t197;
-    G[3] = t198;
-    const real t199 = t61 * t169;
-    const real t200 = t61 * t170;
-    const real t201 = t140 - t200;
-    const real t202 = t175 * t201;
-    const real t203 = t170 * t202;
-    const real t204 = t199 - t203;
-    G[4] = t204;
-    const real t205 = t74 * t169;
-    const real t206 = t74 * t170;
-    const real t207 = t153 - t206;
-    const real t208 = t175 * t207;
-    const real t209 = t170 * t208;
-    const real t210 = t205 - t209;
-    G[5] = t210;
-    G[6] = t178;
-    G[7] = t184;
-    G[8] = t190;
-    G[9] = t196;
-    G[10] = t202;
-    G[11] = t208;
-    const real t211 = H[0] * e[0];
-    const real t212 = H[2] * e[1];
-    const real t213 = t211 + t212;
-    const real t214 = H[4] * e[2];
-    const real t215 = t213 + t214;
-    const real t216 = H[6] * e[3];
-    const real t217 = t215 + t216;
-    const real t218 = H[8] * e[4];
-    const real t219 = t217 + t218;
-    const real t220 = H[10] * e[5];
-    const real t221 = t219 + t220;
-    const real t222 = tau[0] - t221;
-    const real t223 = t169 * t222;
-    const real t224 = H[1] * e[0];
-    const real t225 = H[3] * e[1];
-    const real t226 = t224 + t225;
-    const real t227 = H[5] * e[2];
-    const real t228 = t226 + t227;
-    const real t229 = H[7] * e[3];
-    const real t230 = t228 + t229;
-    const real t231 = H[9] * e[4];
-    const real t232 = t230 + t231;
-    const real t233 = H[11] * e[5];
-    const real t234 = t232 + t233;
-    const real t235 = tau[1] - t234;
-    const real t236 = t170 * t222;
-    const real t237 = t235 - t236;
-    const real t238 = t175 * t237;
-    const real t239 = t170 * t238;
-    const real t240 = t223 - t239;
-    g[0] = t240;
-    g[1] = t238;
-    const real t241 = t10 * t180;
-    const real t242 = t89 * t178;
-    const real t243 = t241 + t242;
-    const real t244 = S[0] - t243;
-    S_Q[0] = t244;
-    const real t245 = t10 * t186;
-    const real t246 = t89 * t184;
-    const real t247 = t245 + t246;
-    const real t248 = S[1] - t247;
-    S_Q[1] = t248;
-    const real t249 = t10 * t192;
-    const real t250 = t89 * t190;
-    const real t251 = t249 + t250;
-    const real t252 = S[2] - t251;
-    S_Q[2] = t252;
-    const real t253 = t10 * t198;
-    const real t254 = t89 * t196;
-    const real t255 = t253 + t254;
-    const real t256 = S[3] - t255;
-    S_Q[3] = t256;
-    const real t257 = t10 * t204;
-    const real t258 = t89 * t202;
-    const real t259 = t257 + t258;
-    const real t260 = S[4] - t259;
-    S_Q[4] = t260;
-    const real t261 = t10 * t210;
-    const real t262 = t89 * t208;
-    const real t263 = t261 + t262;
-    const real t264 = S[5] - t263;
-    S_Q[5] = t264;
-    const real t265 = t22 * t186;
-    const real t266 = t101 * t184;
-    const real t267 = t265 + t266;
-    const real t268 = S[6] - t267;
-    S_Q[6] = t268;
-    const real t269 = t22 * t192;
-    const real t270 = t101 * t190;
-    const real t271 = t269 + t270;
-    const real t272 = S[7] - t271;
-    S_Q[7] = t272;
-    const real t273 = t22 * t198;
-    const real t274 = t101 * t196;
-    const real t275 = t273 + t274;
-    const real t276 = S[8] - t275;
-    S_Q[8] = t276;
-    const real t277 = t22 * t204;
-    const real t278 = t101 * t202;
-    const real t279 = t277 + t278;
-    const real t280 = S[9] - t279;
-    S_Q[9] = t280;
-    const real t281 = t22 * t210;
-    const real t282 = t101 * t208;
-    const real t283 = t281 + t282;
-    const real t284 = S[10] - t283;
-    S_Q[10] = t284;
-    const real t285 = t35 * t192;
-    const real t286 = t114 * t190;
-    const real t287 = t285 + t286;
-    const real t288 = S[11] - t287;
-    S_Q[11] = t288;
-    const real t289 = t35 * t198;
-    const real t290 = t114 * t196;
-    const real t291 = t289 + t290;
-    const real t292 = S[12] - t291;
-    S_Q[12] = t292;
-    const real t293 = t35 * t204;
-    const real t294 = t114 * t202;
-    const real t295 = t293 + t294;
-    const real t296 = S[13] - t295;
-    S_Q[13] = t296;
-    const real t297 = t35 * t210;
-    const real t298 = t114 * t208;
-    const real t299 = t297 + t298;
-    const real t300 = S[14] - t299;
-    S_Q[14] = t300;
-    const real t301 = t48 * t198;
-    const real t302 = t127 * t196;
-    const real t303 = t301 + t302;
-    const real t304 = S[15] - t303;
-    S_Q[15] = t304;
-    const real t305 = t48 * t204;
-    const real t306 = t127 * t202;
-    const real t307 = t305 + t306;
-    const real t308 = S[16] - t307;
-    S_Q[16] = t308;
-    const real t309 = t48 * t210;
-    const real t310 = t127 * t208;
-    const real t311 = t309 + t310;
-    const real t312 = S[17] - t311;
-    S_Q[17] = t312;
-    const real t313 = t61 * t204;
-    const real t314 = t140 * t202;
-    const real t315 = t313 + t314;
-    const real t316 = S[18] - t315;
-    S_Q[18] = t316;
-    const real t317 = t61 * t210;
-    const real t318 = t140 * t208;
-    const real t319 = t317 + t318;
-    const real t320 = S[19] - t319;
-    S_Q[19] = t320;
-    const real t321 = t74 * t210;
-    const real t322 = t153 * t208;
-    const real t323 = t321 + t322;
-    const real t324 = S[20] - t323;
-    S_Q[20] = t324;
-    const real t325 = t180 * t222;
-    const real t326 = t178 * t235;
-    const real t327 = t325 + t326;
-    const real t328 = e[0] + t327;
-    e_Q[0] = t328;
-    const real t329 = t186 * t222;
-    const real t330 = t184 * t235;
-    const real t331 = t329 + t330;
-    const real t332 = e[1] + t331;
-    e_Q[1] = t332;
-    const real t333 = t192 * t222;
-    const real t334 = t190 * t235;
-    const real t335 = t333 + t334;
-    const real t336 = e[2] + t335;
-    e_Q[2] = t336;
-    const real t337 = t198 * t222;
-    const real t338 = t196 * t235;
-    const real t339 = t337 + t338;
-    const real t340 = e[3] + t339;
-    e_Q[3] = t340;
-    const real t341 = t204 * t222;
-    const real t342 = t202 * t235;
-    const real t343 = t341 + t342;
-    const real t344 = e[4] + t343;
-    e_Q[4] = t344;
-    const real t345 = t210 * t222;
-    const real t346 = t208 * t235;
-    const real t347 = t345 + t346;
-    const real t348 = e[5] + t347;
-    e_Q[5] = t348;
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = t170;
+    const real t174 = 1.0 / t172;
+    F[3] = t174;
+    const real t175 = t10 * t169;
+    Z[0] = t175;
+    const real t176 = t22 * t169;
+    Z[1] = t176;
+    const real t177 = t35 * t169;
+    Z[2] = t177;
+    const real t178 = t48 * t169;
+    Z[3] = t178;
+    const real t179 = t61 * t169;
+    Z[4] = t179;
+    const real t180 = t74 * t169;
+    Z[5] = t180;
+    const real t181 = t10 * t170;
+    const real t182 = t89 - t181;
+    const real t183 = t174 * t182;
+    Z[6] = t183;
+    const real t184 = t22 * t170;
+    const real t185 = t101 - t184;
+    const real t186 = t174 * t185;
+    Z[7] = t186;
+    const real t187 = t35 * t170;
+    const real t188 = t114 - t187;
+    const real t189 = t174 * t188;
+    Z[8] = t189;
+    const real t190 = t48 * t170;
+    const real t191 = t127 - t190;
+    const real t192 = t174 * t191;
+    Z[9] = t192;
+    const real t193 = t61 * t170;
+    const real t194 = t140 - t193;
+    const real t195 = t174 * t194;
+    Z[10] = t195;
+    const real t196 = t74 * t170;
+    const real t197 = t153 - t196;
+    const real t198 = t174 * t197;
+    Z[11] = t198;
+    const real t199 = H[0] * e[0];
+    const real t200 = H[2] * e[1];
+    const real t201 = t199 + t200;
+    const real t202 = H[4] * e[2];
+    const real t203 = t201 + t202;
+    const real t204 = H[6] * e[3];
+    const real t205 = t203 + t204;
+    const real t206 = H[8] * e[4];
+    const real t207 = t205 + t206;
+    const real t208 = H[10] * e[5];
+    const real t209 = t207 + t208;
+    const real t210 = tau[0] - t209;
+    const real t211 = t169 * t210;
+    z[0] = t211;
+    const real t212 = H[1] * e[0];
+    const real t213 = H[3] * e[1];
+    const real t214 = t212 + t213;
+    const real t215 = H[5] * e[2];
+    const real t216 = t214 + t215;
+    const real t217 = H[7] * e[3];
+    const real t218 = t216 + t217;
+    const real t219 = H[9] * e[4];
+    const real t220 = t218 + t219;
+    const real t221 = H[11] * e[5];
+    const real t222 = t220 + t221;
+    const real t223 = tau[1] - t222;
+    const real t224 = t170 * t210;
+    const real t225 = t223 - t224;
+    const real t226 = t174 * t225;
+    z[1] = t226;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    const real t227 = t10 * t175;
+    const real t228 = t182 * t183;
+    const real t229 = t227 + t228;
+    const real t230 = S[0] - t229;
+    S_Q[0] = t230;
+    const real t231 = t10 * t176;
+    const real t232 = t182 * t186;
+    const real t233 = t231 + t232;
+    const real t234 = S[1] - t233;
+    S_Q[1] = t234;
+    const real t235 = t10 * t177;
+    const real t236 = t182 * t189;
+    const real t237 = t235 + t236;
+    const real t238 = S[2] - t237;
+    S_Q[2] = t238;
+    const real t239 = t10 * t178;
+    const real t240 = t182 * t192;
+    const real t241 = t239 + t240;
+    const real t242 = S[3] - t241;
+    S_Q[3] = t242;
+    const real t243 = t10 * t179;
+    const real t244 = t182 * t195;
+    const real t245 = t243 + t244;
+    const real t246 = S[4] - t245;
+    S_Q[4] = t246;
+    const real t247 = t10 * t180;
+    const real t248 = t182 * t198;
+    const real t249 = t247 + t248;
+    const real t250 = S[5] - t249;
+    S_Q[5] = t250;
+    const real t251 = t22 * t176;
+    const real t252 = t185 * t186;
+    const real t253 = t251 + t252;
+    const real t254 = S[6] - t253;
+    S_Q[6] = t254;
+    const real t255 = t22 * t177;
+    const real t256 = t185 * t189;
+    const real t257 = t255 + t256;
+    const real t258 = S[7] - t257;
+    S_Q[7] = t258;
+    const real t259 = t22 * t178;
+    const real t260 = t185 * t192;
+    const real t261 = t259 + t260;
+    const real t262 = S[8] - t261;
+    S_Q[8] = t262;
+    const real t263 = t22 * t179;
+    const real t264 = t185 * t195;
+    const real t265 = t263 + t264;
+    const real t266 = S[9] - t265;
+    S_Q[9] = t266;
+    const real t267 = t22 * t180;
+    const real t268 = t185 * t198;
+    const real t269 = t267 + t268;
+    const real t270 = S[10] - t269;
+    S_Q[10] = t270;
+    const real t271 = t35 * t177;
+    const real t272 = t188 * t189;
+    const real t273 = t271 + t272;
+    const real t274 = S[11] - t273;
+    S_Q[11] = t274;
+    const real t275 = t35 * t178;
+    const real t276 = t188 * t192;
+    const real t277 = t275 + t276;
+    const real t278 = S[12] - t277;
+    S_Q[12] = t278;
+    const real t279 = t35 * t179;
+    const real t280 = t188 * t195;
+    const real t281 = t279 + t280;
+    const real t282 = S[13] - t281;
+    S_Q[13] = t282;
+    const real t283 = t35 * t180;
+    const real t284 = t188 * t198;
+    const real t285 = t283 + t284;
+    const real t286 = S[14] - t285;
+    S_Q[14] = t286;
+    const real t287 = t48 * t178;
+    const real t288 = t191 * t192;
+    const real t289 = t287 + t288;
+    const real t290 = S[15] - t289;
+    S_Q[15] = t290;
+    const real t291 = t48 * t179;
+    const real t292 = t191 * t195;
+    const real t293 = t291 + t292;
+    const real t294 = S[16] - t293;
+    S_Q[16] = t294;
+    const real t295 = t48 * t180;
+    const real t296 = t191 * t198;
+    const real t297 = t295 + t296;
+    const real t298 = S[17] - t297;
+    S_Q[17] = t298;
+    const real t299 = t61 * t179;
+    const real t300 = t194 * t195;
+    const real t301 = t299 + t300;
+    const real t302 = S[18] - t301;
+    S_Q[18] = t302;
+    const real t303 = t61 * t180;
+    const real t304 = t194 * t198;
+    const real t305 = t303 + t304;
+    const real t306 = S[19] - t305;
+    S_Q[19] = t306;
+    const real t307 = t74 * t180;
+    const real t308 = t197 * t198;
+    const real t309 = t307 + t308;
+    const real t310 = S[20] - t309;
+    S_Q[20] = t310;
+    const real t311 = t175 * t210;
+    const real t312 = t183 * t225;
+    const real t313 = t311 + t312;
+    const real t314 = e[0] + t313;
+    e_Q[0] = t314;
+    const real t315 = t176 * t210;
+    const real t316 = t186 * t225;
+    const real t317 = t315 + t316;
+    const real t318 = e[1] + t317;
+    e_Q[1] = t318;
+    const real t319 = t177 * t210;
+    const real t320 = t189 * t225;
+    const real t321 = t319 + t320;
+    const real t322 = e[2] + t321;
+    e_Q[2] = t322;
+    const real t323 = t178 * t210;
+    const real t324 = t192 * t225;
+    const real t325 = t323 + t324;
+    const real t326 = e[3] + t325;
+    e_Q[3] = t326;
+    const real t327 = t179 * t210;
+    const real t328 = t195 * t225;
+    const real t329 = t327 + t328;
+    const real t330 = e[4] + t329;
+    e_Q[4] = t330;
+    const real t331 = t180 * t210;
+    const real t332 = t198 * t225;
+    const real t333 = t331 + t332;
+    const real t334 = e[5] + t333;
+    e_Q[5] = t334;
     D_ii[0] = t77;
     D_ii[1] = t156;
     return 0;
@@ -1946,7 +1953,7 @@ int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict 
 static int mstmm_sweep_generic2_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_generic2_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_sweep_generic2_eliminate_inputs[] = {
@@ -1958,8 +1965,10 @@ static const mstmm_port mstmm_sweep_generic2_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_generic2_eliminate_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
+    {"F", 4, "", 0, 0},
+    {"Z", 12, "", 0, 0},
+    {"z", 2, "", 0, 0},
+    {"W", 12, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 2, "kg*m2 or kg", 0, 0},
@@ -1968,8 +1977,197 @@ static const mstmm_port mstmm_sweep_generic2_eliminate_outputs[] = {
 static const mstmm_guard mstmm_sweep_generic2_eliminate_guards[] = {
     {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* accelerations recovered behind a factored hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  Z[2][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * in  z[2] diag(d)^-1 L^-1 (tau - H^T e)
+ * in  W[2][6] unit columns of H, transposed
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[2] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic2_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = r[2] * delta_I[4];
+    const real t1 = r[1] * delta_I[5];
+    const real t2 = t0 - t1;
+    const real t3 = delta_I[0] + t2;
+    const real t4 = Rc[0] * t3;
+    const real t5 = r[0] * delta_I[5];
+    const real t6 = r[2] * delta_I[3];
+    const real t7 = t5 - t6;
+    const real t8 = delta_I[1] + t7;
+    const real t9 = Rc[3] * t8;
+    const real t10 = t4 + t9;
+    const real t11 = r[1] * delta_I[3];
+    const real t12 = r[0] * delta_I[4];
+    const real t13 = t11 - t12;
+    const real t14 = delta_I[2] + t13;
+    const real t15 = Rc[6] * t14;
+    const real t16 = t10 + t15;
+    const real t17 = Z[0] * t16;
+    const real t18 = Rc[1] * t3;
+    const real t19 = Rc[4] * t8;
+    const real t20 = t18 + t19;
+    const real t21 = Rc[7] * t14;
+    const real t22 = t20 + t21;
+    const real t23 = Z[1] * t22;
+    const real t24 = t17 + t23;
+    const real t25 = Rc[2] * t3;
+    const real t26 = Rc[5] * t8;
+    const real t27 = t25 + t26;
+    const real t28 = Rc[8] * t14;
+    const real t29 = t27 + t28;
+    const real t30 = Z[2] * t29;
+    const real t31 = t24 + t30;
+    const real t32 = Rc[0] * delta_I[3];
+    const real t33 = Rc[3] * delta_I[4];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[6] * delta_I[5];
+    const real t36 = t34 + t35;
+    const real t37 = Z[3] * t36;
+    const real t38 = t31 + t37;
+    const real t39 = Rc[1] * delta_I[3];
+    const real t40 = Rc[4] * delta_I[4];
+    const real t41 = t39 + t40;
+    const real t42 = Rc[7] * delta_I[5];
+    const real t43 = t41 + t42;
+    const real t44 = Z[4] * t43;
+    const real t45 = t38 + t44;
+    const real t46 = Rc[2] * delta_I[3];
+    const real t47 = Rc[5] * delta_I[4];
+    const real t48 = t46 + t47;
+    const real t49 = Rc[8] * delta_I[5];
+    const real t50 = t48 + t49;
+    const real t51 = Z[5] * t50;
+    const real t52 = t45 + t51;
+    const real t53 = z[0] - t52;
+    const real t54 = Z[6] * t16;
+    const real t55 = Z[7] * t22;
+    const real t56 = t54 + t55;
+    const real t57 = Z[8] * t29;
+    const real t58 = t56 + t57;
+    const real t59 = Z[9] * t36;
+    const real t60 = t58 + t59;
+    const real t61 = Z[10] * t43;
+    const real t62 = t60 + t61;
+    const real t63 = Z[11] * t50;
+    const real t64 = t62 + t63;
+    const real t65 = z[1] - t64;
+    const real t66 = F[2] * t65;
+    const real t67 = t53 - t66;
+    const real t68 = W[0] * t16;
+    const real t69 = W[1] * t22;
+    const real t70 = t68 + t69;
+    const real t71 = W[2] * t29;
+    const real t72 = t70 + t71;
+    const real t73 = W[3] * t36;
+    const real t74 = t72 + t73;
+    const real t75 = W[4] * t43;
+    const real t76 = t74 + t75;
+    const real t77 = W[5] * t50;
+    const real t78 = t76 + t77;
+    const real t79 = t67 - t78;
+    udot[0] = t79;
+    const real t80 = W[6] * t16;
+    const real t81 = W[7] * t22;
+    const real t82 = t80 + t81;
+    const real t83 = W[8] * t29;
+    const real t84 = t82 + t83;
+    const real t85 = W[9] * t36;
+    const real t86 = t84 + t85;
+    const real t87 = W[10] * t43;
+    const real t88 = t86 + t87;
+    const real t89 = W[11] * t50;
+    const real t90 = t88 + t89;
+    const real t91 = t65 - t90;
+    udot[1] = t91;
+    const real t92 = H[0] * t67;
+    const real t93 = H[1] * t65;
+    const real t94 = t92 + t93;
+    const real t95 = H[0] * t78;
+    const real t96 = H[1] * t90;
+    const real t97 = t95 + t96;
+    const real t98 = t94 - t97;
+    const real t99 = t16 + t98;
+    delta[0] = t99;
+    const real t100 = H[2] * t67;
+    const real t101 = H[3] * t65;
+    const real t102 = t100 + t101;
+    const real t103 = H[2] * t78;
+    const real t104 = H[3] * t90;
+    const real t105 = t103 + t104;
+    const real t106 = t102 - t105;
+    const real t107 = t22 + t106;
+    delta[1] = t107;
+    const real t108 = H[4] * t67;
+    const real t109 = H[5] * t65;
+    const real t110 = t108 + t109;
+    const real t111 = H[4] * t78;
+    const real t112 = H[5] * t90;
+    const real t113 = t111 + t112;
+    const real t114 = t110 - t113;
+    const real t115 = t29 + t114;
+    delta[2] = t115;
+    const real t116 = H[6] * t67;
+    const real t117 = H[7] * t65;
+    const real t118 = t116 + t117;
+    const real t119 = H[6] * t78;
+    const real t120 = H[7] * t90;
+    const real t121 = t119 + t120;
+    const real t122 = t118 - t121;
+    const real t123 = t36 + t122;
+    delta[3] = t123;
+    const real t124 = H[8] * t67;
+    const real t125 = H[9] * t65;
+    const real t126 = t124 + t125;
+    const real t127 = H[8] * t78;
+    const real t128 = H[9] * t90;
+    const real t129 = t127 + t128;
+    const real t130 = t126 - t129;
+    const real t131 = t43 + t130;
+    delta[4] = t131;
+    const real t132 = H[10] * t67;
+    const real t133 = H[11] * t65;
+    const real t134 = t132 + t133;
+    const real t135 = H[10] * t78;
+    const real t136 = H[11] * t90;
+    const real t137 = t135 + t136;
+    const real t138 = t134 - t137;
+    const real t139 = t50 + t138;
+    delta[5] = t139;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_recover_factored_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_recover_factored(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_recover_factored_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"F", 4, "", 0, 0},
+    {"Z", 12, "", 0, 0},
+    {"z", 2, "", 0, 0},
+    {"W", 12, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_recover_factored_outputs[] = {
+    {"udot", 2, "", 0, 0},
+    {"delta", 6, "", 0, 0},
 };
 
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
@@ -2038,12 +2236,24 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .function = (void (*)(void))mstmm_sweep_generic2_eliminate,
         .call = mstmm_sweep_generic2_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_sweep_generic2_eliminate_inputs,
         .outputs = mstmm_sweep_generic2_eliminate_outputs,
-        .ir_hash = "611b28bbd193e79b85541b08e4cbfde017f507fbb9cdf25f07e4cc5cbb8dd14c",
-        .n_guards = 4,
+        .ir_hash = "bcde1894607190dbf7897a2c83fa144225d5eafef0b64ff83c0d3d27c485d284",
+        .n_guards = 2,
         .guards = mstmm_sweep_generic2_eliminate_guards,
+    },
+    {
+        .name = "recover_factored",
+        .function = (void (*)(void))mstmm_sweep_generic2_recover_factored,
+        .call = mstmm_sweep_generic2_recover_factored_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_recover_factored_inputs,
+        .outputs = mstmm_sweep_generic2_recover_factored_outputs,
+        .ir_hash = "9a68994b257de880ea858d4fa6cc5891740fba7f87a9fc54d94c4dea3d9ec2e1",
+        .n_guards = 0,
+        .guards = NULL,
     },
 };
 
@@ -2051,7 +2261,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "d41c4ce20b8ae4d17fe4cfae869e54324876b731758189e07cae72a86301ae2f",
+    .hash = "e3938d0088e3b9e6f0e69da14238bf48432c3489757223541f87ad1e878654cb",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2061,6 +2271,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 6,
+    .n_kernels = 7,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -26,8 +26,12 @@ int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
 int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii);
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii);
+int mstmm_sweep_generic3_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1917,15 +1921,18 @@ static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
  * in  S[21] f = S a + e of everything outboard, at P
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
- * out G[3][6] udot = g - G a_Q
- * out g[3] udot = g - G a_Q
+ * out F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out Z[3][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * out z[3] diag(d)^-1 L^-1 (tau - H^T e)
+ * out W[3][6] unit columns of H, transposed
  * out S_Q[21] S behind the hinge, hinge axes
  * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
  * out D_ii[3] (kg*m2 or kg) diagonal of D
  */
 int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_Q, real *restrict e_Q, real *restrict D_ii)
+    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
+    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
+    real *restrict D_ii)
 {
     const real t0 = H[0] * S[0];
     const real t1 = H[3] * S[1];
@@ -2215,361 +2222,343 @@ int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict 
     const real t283 = t266 - t282;
     const real t284 = t252 < t283;
     if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t285 = t10 * t169;
-    const real t286 = t10 * t170;
-    const real t287 = t89 - t286;
-    const real t288 = t280 * t287;
-    const real t289 = 1.0 / t283;
-    const real t290 = t10 * t264;
-    const real t291 = t184 - t290;
-    const real t292 = t281 * t287;
-    const real t293 = t291 - t292;
-    const real t294 = t289 * t293;
-    const real t295 = t281 * t294;
-    const real t296 = t288 - t295;
-    const real t297 = t170 * t296;
-    const real t298 = t285 - t297;
-    const real t299 = t264 * t294;
-    const real t300 = t298 - t299;
-    G[0] = t300;
-    const real t301 = t22 * t169;
-    const real t302 = t22 * t170;
-    const real t303 = t101 - t302;
-    const real t304 = t280 * t303;
-    const real t305 = t22 * t264;
-    const real t306 = t196 - t305;
-    const real t307 = t281 * t303;
-    const real t308 = t306 - t307;
-    const real t309 = t289 * t308;
-    const real t310 = t281 * t309;
-    const real t311 = t304 - t310;
-    const real t312 = t170 * t311;
-    const real t313 = t301 - t312;
-    const real t314 = t264 * t309;
-    const real t315 = t313 - t314;
-    G[1] = t315;
-    const real t316 = t35 * t169;
-    const real t317 = t35 * t170;
-    const real t318 = t114 - t317;
-    const real t319 = t280 * t318;
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = t170;
+    F[4] = t280;
+    F[5] = 0.0;
+    F[6] = t264;
+    F[7] = t281;
+    const real t285 = 1.0 / t283;
+    F[8] = t285;
+    const real t286 = t10 * t169;
+    Z[0] = t286;
+    const real t287 = t22 * t169;
+    Z[1] = t287;
+    const real t288 = t35 * t169;
+    Z[2] = t288;
+    const real t289 = t48 * t169;
+    Z[3] = t289;
+    const real t290 = t61 * t169;
+    Z[4] = t290;
+    const real t291 = t74 * t169;
+    Z[5] = t291;
+    const real t292 = t10 * t170;
+    const real t293 = t89 - t292;
+    const real t294 = t280 * t293;
+    Z[6] = t294;
+    const real t295 = t22 * t170;
+    const real t296 = t101 - t295;
+    const real t297 = t280 * t296;
+    Z[7] = t297;
+    const real t298 = t35 * t170;
+    const real t299 = t114 - t298;
+    const real t300 = t280 * t299;
+    Z[8] = t300;
+    const real t301 = t48 * t170;
+    const real t302 = t127 - t301;
+    const real t303 = t280 * t302;
+    Z[9] = t303;
+    const real t304 = t61 * t170;
+    const real t305 = t140 - t304;
+    const real t306 = t280 * t305;
+    Z[10] = t306;
+    const real t307 = t74 * t170;
+    const real t308 = t153 - t307;
+    const real t309 = t280 * t308;
+    Z[11] = t309;
+    const real t310 = t10 * t264;
+    const real t311 = t184 - t310;
+    const real t312 = t281 * t293;
+    const real t313 = t311 - t312;
+    const real t314 = t285 * t313;
+    Z[12] = t314;
+    const real t315 = t22 * t264;
+    const real t316 = t196 - t315;
+    const real t317 = t281 * t296;
+    const real t318 = t316 - t317;
+    const real t319 = t285 * t318;
+    Z[13] = t319;
     const real t320 = t35 * t264;
     const real t321 = t209 - t320;
-    const real t322 = t281 * t318;
+    const real t322 = t281 * t299;
     const real t323 = t321 - t322;
-    const real t324 = t289 * t323;
-    const real t325 = t281 * t324;
-    const real t326 = t319 - t325;
-    const real t327 = t170 * t326;
-    const real t328 = t316 - t327;
-    const real t329 = t264 * t324;
-    const real t330 = t328 - t329;
-    G[2] = t330;
-    const real t331 = t48 * t169;
-    const real t332 = t48 * t170;
-    const real t333 = t127 - t332;
-    const real t334 = t280 * t333;
-    const real t335 = t48 * t264;
-    const real t336 = t222 - t335;
-    const real t337 = t281 * t333;
+    const real t324 = t285 * t323;
+    Z[14] = t324;
+    const real t325 = t48 * t264;
+    const real t326 = t222 - t325;
+    const real t327 = t281 * t302;
+    const real t328 = t326 - t327;
+    const real t329 = t285 * t328;
+    Z[15] = t329;
+    const real t330 = t61 * t264;
+    const real t331 = t235 - t330;
+    const real t332 = t281 * t305;
+    const real t333 = t331 - t332;
+    const real t334 = t285 * t333;
+    Z[16] = t334;
+    const real t335 = t74 * t264;
+    const real t336 = t248 - t335;
+    const real t337 = t281 * t308;
     const real t338 = t336 - t337;
-    const real t339 = t289 * t338;
-    const real t340 = t281 * t339;
-    const real t341 = t334 - t340;
-    const real t342 = t170 * t341;
-    const real t343 = t331 - t342;
-    const real t344 = t264 * t339;
-    const real t345 = t343 - t344;
-    G[3] = t345;
-    const real t346 = t61 * t169;
-    const real t347 = t61 * t170;
-    const real t348 = t140 - t347;
-    const real t349 = t280 * t348;
-    const real t350 = t61 * t264;
-    const real t351 = t235 - t350;
-    const real t352 = t281 * t348;
-    const real t353 = t351 - t352;
-    const real t354 = t289 * t353;
-    const real t355 = t281 * t354;
-    const real t356 = t349 - t355;
-    const real t357 = t170 * t356;
-    const real t358 = t346 - t357;
-    const real t359 = t264 * t354;
-    const real t360 = t358 - t359;
-    G[4] = t360;
-    const real t361 = t74 * t169;
-    const real t362 = t74 * t170;
-    const real t363 = t153 - t362;
-    const real t364 = t280 * t363;
-    const real t365 = t74 * t264;
-    const real t366 = t248 - t365;
-    const real t367 = t281 * t363;
-    const real t368 = t366 - t367;
-    const real t369 = t289 * t368;
-    const real t370 = t281 * t369;
-    const real t371 = t364 - t370;
-    const real t372 = t170 * t371;
-    const real t373 = t361 - t372;
-    const real t374 = t264 * t369;
-    const real t375 = t373 - t374;
-    G[5] = t375;
-    G[6] = t296;
-    G[7] = t311;
-    G[8] = t326;
-    G[9] = t341;
-    G[10] = t356;
-    G[11] = t371;
-    G[12] = t294;
-    G[13] = t309;
-    G[14] = t324;
-    G[15] = t339;
-    G[16] = t354;
-    G[17] = t369;
-    const real t376 = H[0] * e[0];
-    const real t377 = H[3] * e[1];
+    const real t339 = t285 * t338;
+    Z[17] = t339;
+    const real t340 = H[0] * e[0];
+    const real t341 = H[3] * e[1];
+    const real t342 = t340 + t341;
+    const real t343 = H[6] * e[2];
+    const real t344 = t342 + t343;
+    const real t345 = H[9] * e[3];
+    const real t346 = t344 + t345;
+    const real t347 = H[12] * e[4];
+    const real t348 = t346 + t347;
+    const real t349 = H[15] * e[5];
+    const real t350 = t348 + t349;
+    const real t351 = tau[0] - t350;
+    const real t352 = t169 * t351;
+    z[0] = t352;
+    const real t353 = H[1] * e[0];
+    const real t354 = H[4] * e[1];
+    const real t355 = t353 + t354;
+    const real t356 = H[7] * e[2];
+    const real t357 = t355 + t356;
+    const real t358 = H[10] * e[3];
+    const real t359 = t357 + t358;
+    const real t360 = H[13] * e[4];
+    const real t361 = t359 + t360;
+    const real t362 = H[16] * e[5];
+    const real t363 = t361 + t362;
+    const real t364 = tau[1] - t363;
+    const real t365 = t170 * t351;
+    const real t366 = t364 - t365;
+    const real t367 = t280 * t366;
+    z[1] = t367;
+    const real t368 = H[2] * e[0];
+    const real t369 = H[5] * e[1];
+    const real t370 = t368 + t369;
+    const real t371 = H[8] * e[2];
+    const real t372 = t370 + t371;
+    const real t373 = H[11] * e[3];
+    const real t374 = t372 + t373;
+    const real t375 = H[14] * e[4];
+    const real t376 = t374 + t375;
+    const real t377 = H[17] * e[5];
     const real t378 = t376 + t377;
-    const real t379 = H[6] * e[2];
-    const real t380 = t378 + t379;
-    const real t381 = H[9] * e[3];
-    const real t382 = t380 + t381;
-    const real t383 = H[12] * e[4];
-    const real t384 = t382 + t383;
-    const real t385 = H[15] * e[5];
-    const real t386 = t384 + t385;
-    const real t387 = tau[0] - t386;
-    const real t388 = t169 * t387;
-    const real t389 = H[1] * e[0];
-    const real t390 = H[4] * e[1];
-    const real t391 = t389 + t390;
-    const real t392 = H[7] * e[2];
+    const real t379 = tau[2] - t378;
+    const real t380 = t264 * t351;
+    const real t381 = t379 - t380;
+    const real t382 = t281 * t366;
+    const real t383 = t381 - t382;
+    const real t384 = t285 * t383;
+    z[2] = t384;
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 0.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 0.0;
+    const real t385 = t10 * t286;
+    const real t386 = t293 * t294;
+    const real t387 = t385 + t386;
+    const real t388 = t313 * t314;
+    const real t389 = t387 + t388;
+    const real t390 = S[0] - t389;
+    S_Q[0] = t390;
+    const real t391 = t10 * t287;
+    const real t392 = t293 * t297;
     const real t393 = t391 + t392;
-    const real t394 = H[10] * e[3];
+    const real t394 = t313 * t319;
     const real t395 = t393 + t394;
-    const real t396 = H[13] * e[4];
-    const real t397 = t395 + t396;
-    const real t398 = H[16] * e[5];
+    const real t396 = S[1] - t395;
+    S_Q[1] = t396;
+    const real t397 = t10 * t288;
+    const real t398 = t293 * t300;
     const real t399 = t397 + t398;
-    const real t400 = tau[1] - t399;
-    const real t401 = t170 * t387;
-    const real t402 = t400 - t401;
-    const real t403 = t280 * t402;
-    const real t404 = H[2] * e[0];
-    const real t405 = H[5] * e[1];
-    const real t406 = t404 + t405;
-    const real t407 = H[8] * e[2];
-    const real t408 = t406 + t407;
-    const real t409 = H[11] * e[3];
-    const real t410 = t408 + t409;
-    const real t411 = H[14] * e[4];
-    const real t412 = t410 + t411;
-    const real t413 = H[17] * e[5];
-    const real t414 = t412 + t413;
-    const real t415 = tau[2] - t414;
-    const real t416 = t264 * t387;
-    const real t417 = t415 - t416;
-    const real t418 = t281 * t402;
-    const real t419 = t417 - t418;
-    const real t420 = t289 * t419;
-    const real t421 = t281 * t420;
-    const real t422 = t403 - t421;
-    const real t423 = t170 * t422;
-    const real t424 = t388 - t423;
-    const real t425 = t264 * t420;
-    const real t426 = t424 - t425;
-    g[0] = t426;
-    g[1] = t422;
-    g[2] = t420;
-    const real t427 = t10 * t300;
-    const real t428 = t89 * t296;
+    const real t400 = t313 * t324;
+    const real t401 = t399 + t400;
+    const real t402 = S[2] - t401;
+    S_Q[2] = t402;
+    const real t403 = t10 * t289;
+    const real t404 = t293 * t303;
+    const real t405 = t403 + t404;
+    const real t406 = t313 * t329;
+    const real t407 = t405 + t406;
+    const real t408 = S[3] - t407;
+    S_Q[3] = t408;
+    const real t409 = t10 * t290;
+    const real t410 = t293 * t306;
+    const real t411 = t409 + t410;
+    const real t412 = t313 * t334;
+    const real t413 = t411 + t412;
+    const real t414 = S[4] - t413;
+    S_Q[4] = t414;
+    const real t415 = t10 * t291;
+    const real t416 = t293 * t309;
+    const real t417 = t415 + t416;
+    const real t418 = t313 * t339;
+    const real t419 = t417 + t418;
+    const real t420 = S[5] - t419;
+    S_Q[5] = t420;
+    const real t421 = t22 * t287;
+    const real t422 = t296 * t297;
+    const real t423 = t421 + t422;
+    const real t424 = t318 * t319;
+    const real t425 = t423 + t424;
+    const real t426 = S[6] - t425;
+    S_Q[6] = t426;
+    const real t427 = t22 * t288;
+    const real t428 = t296 * t300;
     const real t429 = t427 + t428;
-    const real t430 = t184 * t294;
+    const real t430 = t318 * t324;
     const real t431 = t429 + t430;
-    const real t432 = S[0] - t431;
-    S_Q[0] = t432;
-    const real t433 = t10 * t315;
-    const real t434 = t89 * t311;
+    const real t432 = S[7] - t431;
+    S_Q[7] = t432;
+    const real t433 = t22 * t289;
+    const real t434 = t296 * t303;
     const real t435 = t433 + t434;
-    const real t436 = t184 * t309;
+    const real t436 = t318 * t329;
     const real t437 = t435 + t436;
-    const real t438 = S[1] - t437;
-    S_Q[1] = t438;
-    const real t439 = t10 * t330;
-    const real t440 = t89 * t326;
+    const real t438 = S[8] - t437;
+    S_Q[8] = t438;
+    const real t439 = t22 * t290;
+    const real t440 = t296 * t306;
     const real t441 = t439 + t440;
-    const real t442 = t184 * t324;
+    const real t442 = t318 * t334;
     const real t443 = t441 + t442;
-    const real t444 = S[2] - t443;
-    S_Q[2] = t444;
-    const real t445 = t10 * t345;
-    const real t446 = t89 * t341;
+    const real t444 = S[9] - t443;
+    S_Q[9] = t444;
+    const real t445 = t22 * t291;
+    const real t446 = t296 * t309;
     const real t447 = t445 + t446;
-    const real t448 = t184 * t339;
+    const real t448 = t318 * t339;
     const real t449 = t447 + t448;
-    const real t450 = S[3] - t449;
-    S_Q[3] = t450;
-    const real t451 = t10 * t360;
-    const real t452 = t89 * t356;
+    const real t450 = S[10] - t449;
+    S_Q[10] = t450;
+    const real t451 = t35 * t288;
+    const real t452 = t299 * t300;
     const real t453 = t451 + t452;
-    const real t454 = t184 * t354;
+    const real t454 = t323 * t324;
     const real t455 = t453 + t454;
-    const real t456 = S[4] - t455;
-    S_Q[4] = t456;
-    const real t457 = t10 * t375;
-    const real t458 = t89 * t371;
+    const real t456 = S[11] - t455;
+    S_Q[11] = t456;
+    const real t457 = t35 * t289;
+    const real t458 = t299 * t303;
     const real t459 = t457 + t458;
-    const real t460 = t184 * t369;
+    const real t460 = t323 * t329;
     const real t461 = t459 + t460;
-    const real t462 = S[5] - t461;
-    S_Q[5] = t462;
-    const real t463 = t22 * t315;
-    const real t464 = t101 * t311;
+    const real t462 = S[12] - t461;
+    S_Q[12] = t462;
+    const real t463 = t35 * t290;
+    const real t464 = t299 * t306;
     const real t465 = t463 + t464;
-    const real t466 = t196 * t309;
+    const real t466 = t323 * t334;
     const real t467 = t465 + t466;
-    const real t468 = S[6] - t467;
-    S_Q[6] = t468;
-    const real t469 = t22 * t330;
-    const real t470 = t101 * t326;
+    const real t468 = S[13] - t467;
+    S_Q[13] = t468;
+    const real t469 = t35 * t291;
+    const real t470 = t299 * t309;
     const real t471 = t469 + t470;
-    const real t472 = t196 * t324;
+    const real t472 = t323 * t339;
     const real t473 = t471 + t472;
-    const real t474 = S[7] - t473;
-    S_Q[7] = t474;
-    const real t475 = t22 * t345;
-    const real t476 = t101 * t341;
+    const real t474 = S[14] - t473;
+    S_Q[14] = t474;
+    const real t475 = t48 * t289;
+    const real t476 = t302 * t303;
     const real t477 = t475 + t476;
-    const real t478 = t196 * t339;
+    const real t478 = t328 * t329;
     const real t479 = t477 + t478;
-    const real t480 = S[8] - t479;
-    S_Q[8] = t480;
-    const real t481 = t22 * t360;
-    const real t482 = t101 * t356;
+    const real t480 = S[15] - t479;
+    S_Q[15] = t480;
+    const real t481 = t48 * t290;
+    const real t482 = t302 * t306;
     const real t483 = t481 + t482;
-    const real t484 = t196 * t354;
+    const real t484 = t328 * t334;
     const real t485 = t483 + t484;
-    const real t486 = S[9] - t485;
-    S_Q[9] = t486;
-    const real t487 = t22 * t375;
-    const real t488 = t101 * t371;
+    const real t486 = S[16] - t485;
+    S_Q[16] = t486;
+    const real t487 = t48 * t291;
+    const real t488 = t302 * t309;
     const real t489 = t487 + t488;
-    const real t490 = t196 * t369;
+    const real t490 = t328 * t339;
     const real t491 = t489 + t490;
-    const real t492 = S[10] - t491;
-    S_Q[10] = t492;
-    const real t493 = t35 * t330;
-    const real t494 = t114 * t326;
+    const real t492 = S[17] - t491;
+    S_Q[17] = t492;
+    const real t493 = t61 * t290;
+    const real t494 = t305 * t306;
     const real t495 = t493 + t494;
-    const real t496 = t209 * t324;
+    const real t496 = t333 * t334;
     const real t497 = t495 + t496;
-    const real t498 = S[11] - t497;
-    S_Q[11] = t498;
-    const real t499 = t35 * t345;
-    const real t500 = t114 * t341;
+    const real t498 = S[18] - t497;
+    S_Q[18] = t498;
+    const real t499 = t61 * t291;
+    const real t500 = t305 * t309;
     const real t501 = t499 + t500;
-    const real t502 = t209 * t339;
+    const real t502 = t333 * t339;
     const real t503 = t501 + t502;
-    const real t504 = S[12] - t503;
-    S_Q[12] = t504;
-    const real t505 = t35 * t360;
-    const real t506 = t114 * t356;
+    const real t504 = S[19] - t503;
+    S_Q[19] = t504;
+    const real t505 = t74 * t291;
+    const real t506 = t308 * t309;
     const real t507 = t505 + t506;
-    const real t508 = t209 * t354;
+    const real t508 = t338 * t339;
     const real t509 = t507 + t508;
-    const real t510 = S[13] - t509;
-    S_Q[13] = t510;
-    const real t511 = t35 * t375;
-    const real t512 = t114 * t371;
+    const real t510 = S[20] - t509;
+    S_Q[20] = t510;
+    const real t511 = t286 * t351;
+    const real t512 = t294 * t366;
     const real t513 = t511 + t512;
-    const real t514 = t209 * t369;
+    const real t514 = t314 * t383;
     const real t515 = t513 + t514;
-    const real t516 = S[14] - t515;
-    S_Q[14] = t516;
-    const real t517 = t48 * t345;
-    const real t518 = t127 * t341;
+    const real t516 = e[0] + t515;
+    e_Q[0] = t516;
+    const real t517 = t287 * t351;
+    const real t518 = t297 * t366;
     const real t519 = t517 + t518;
-    const real t520 = t222 * t339;
+    const real t520 = t319 * t383;
     const real t521 = t519 + t520;
-    const real t522 = S[15] - t521;
-    S_Q[15] = t522;
-    const real t523 = t48 * t360;
-    const real t524 = t127 * t356;
+    const real t522 = e[1] + t521;
+    e_Q[1] = t522;
+    const real t523 = t288 * t351;
+    const real t524 = t300 * t366;
     const real t525 = t523 + t524;
-    const real t526 = t222 * t354;
+    const real t526 = t324 * t383;
     const real t527 = t525 + t526;
-    const real t528 = S[16] - t527;
-    S_Q[16] = t528;
-    const real t529 = t48 * t375;
-    const real t530 = t127 * t371;
+    const real t528 = e[2] + t527;
+    e_Q[2] = t528;
+    const real t529 = t289 * t351;
+    const real t530 = t303 * t366;
     const real t531 = t529 + t530;
-    const real t532 = t222 * t369;
+    const real t532 = t329 * t383;
     const real t533 = t531 + t532;
-    const real t534 = S[17] - t533;
-    S_Q[17] = t534;
-    const real t535 = t61 * t360;
-    const real t536 = t140 * t356;
+    const real t534 = e[3] + t533;
+    e_Q[3] = t534;
+    const real t535 = t290 * t351;
+    const real t536 = t306 * t366;
     const real t537 = t535 + t536;
-    const real t538 = t235 * t354;
+    const real t538 = t334 * t383;
     const real t539 = t537 + t538;
-    const real t540 = S[18] - t539;
-    S_Q[18] = t540;
-    const real t541 = t61 * t375;
-    const real t542 = t140 * t371;
+    const real t540 = e[4] + t539;
+    e_Q[4] = t540;
+    const real t541 = t291 * t351;
+    const real t542 = t309 * t366;
     const real t543 = t541 + t542;
-    const real t544 = t235 * t369;
+    const real t544 = t339 * t383;
     const real t545 = t543 + t544;
-    const real t546 = S[19] - t545;
-    S_Q[19] = t546;
-    const real t547 = t74 * t375;
-    const real t548 = t153 * t371;
-    const real t549 = t547 + t548;
-    const real t550 = t248 * t369;
-    const real t551 = t549 + t550;
-    const real t552 = S[20] - t551;
-    S_Q[20] = t552;
-    const real t553 = t300 * t387;
-    const real t554 = t296 * t400;
-    const real t555 = t553 + t554;
-    const real t556 = t294 * t415;
-    const real t557 = t555 + t556;
-    const real t558 = e[0] + t557;
-    e_Q[0] = t558;
-    const real t559 = t315 * t387;
-    const real t560 = t311 * t400;
-    const real t561 = t559 + t560;
-    const real t562 = t309 * t415;
-    const real t563 = t561 + t562;
-    const real t564 = e[1] + t563;
-    e_Q[1] = t564;
-    const real t565 = t330 * t387;
-    const real t566 = t326 * t400;
-    const real t567 = t565 + t566;
-    const real t568 = t324 * t415;
-    const real t569 = t567 + t568;
-    const real t570 = e[2] + t569;
-    e_Q[2] = t570;
-    const real t571 = t345 * t387;
-    const real t572 = t341 * t400;
-    const real t573 = t571 + t572;
-    const real t574 = t339 * t415;
-    const real t575 = t573 + t574;
-    const real t576 = e[3] + t575;
-    e_Q[3] = t576;
-    const real t577 = t360 * t387;
-    const real t578 = t356 * t400;
-    const real t579 = t577 + t578;
-    const real t580 = t354 * t415;
-    const real t581 = t579 + t580;
-    const real t582 = e[4] + t581;
-    e_Q[4] = t582;
-    const real t583 = t375 * t387;
-    const real t584 = t371 * t400;
-    const real t585 = t583 + t584;
-    const real t586 = t369 * t415;
-    const real t587 = t585 + t586;
-    const real t588 = e[5] + t587;
-    e_Q[5] = t588;
+    const real t546 = e[5] + t545;
+    e_Q[5] = t546;
     D_ii[0] = t77;
     D_ii[1] = t156;
     D_ii[2] = t251;
@@ -2579,7 +2568,7 @@ int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict 
 static int mstmm_sweep_generic3_eliminate_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_generic3_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_sweep_generic3_eliminate_inputs[] = {
@@ -2591,8 +2580,10 @@ static const mstmm_port mstmm_sweep_generic3_eliminate_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_generic3_eliminate_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
+    {"F", 9, "", 0, 0},
+    {"Z", 18, "", 0, 0},
+    {"z", 3, "", 0, 0},
+    {"W", 18, "", 0, 0},
     {"S_Q", 21, "", 0, 0},
     {"e_Q", 6, "N, N*m", 0, 0},
     {"D_ii", 3, "kg*m2 or kg", 0, 0},
@@ -2602,9 +2593,250 @@ static const mstmm_guard mstmm_sweep_generic3_eliminate_guards[] = {
     {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
     {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* accelerations recovered behind a factored hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace of the free coordinates
+ * in  F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  Z[3][6] diag(d)^-1 L^-1 U^T, zero along unit directions
+ * in  z[3] diag(d)^-1 L^-1 (tau - H^T e)
+ * in  W[3][6] unit columns of H, transposed
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[3] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic3_recover_factored(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
+    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = r[2] * delta_I[4];
+    const real t1 = r[1] * delta_I[5];
+    const real t2 = t0 - t1;
+    const real t3 = delta_I[0] + t2;
+    const real t4 = Rc[0] * t3;
+    const real t5 = r[0] * delta_I[5];
+    const real t6 = r[2] * delta_I[3];
+    const real t7 = t5 - t6;
+    const real t8 = delta_I[1] + t7;
+    const real t9 = Rc[3] * t8;
+    const real t10 = t4 + t9;
+    const real t11 = r[1] * delta_I[3];
+    const real t12 = r[0] * delta_I[4];
+    const real t13 = t11 - t12;
+    const real t14 = delta_I[2] + t13;
+    const real t15 = Rc[6] * t14;
+    const real t16 = t10 + t15;
+    const real t17 = Z[0] * t16;
+    const real t18 = Rc[1] * t3;
+    const real t19 = Rc[4] * t8;
+    const real t20 = t18 + t19;
+    const real t21 = Rc[7] * t14;
+    const real t22 = t20 + t21;
+    const real t23 = Z[1] * t22;
+    const real t24 = t17 + t23;
+    const real t25 = Rc[2] * t3;
+    const real t26 = Rc[5] * t8;
+    const real t27 = t25 + t26;
+    const real t28 = Rc[8] * t14;
+    const real t29 = t27 + t28;
+    const real t30 = Z[2] * t29;
+    const real t31 = t24 + t30;
+    const real t32 = Rc[0] * delta_I[3];
+    const real t33 = Rc[3] * delta_I[4];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[6] * delta_I[5];
+    const real t36 = t34 + t35;
+    const real t37 = Z[3] * t36;
+    const real t38 = t31 + t37;
+    const real t39 = Rc[1] * delta_I[3];
+    const real t40 = Rc[4] * delta_I[4];
+    const real t41 = t39 + t40;
+    const real t42 = Rc[7] * delta_I[5];
+    const real t43 = t41 + t42;
+    const real t44 = Z[4] * t43;
+    const real t45 = t38 + t44;
+    const real t46 = Rc[2] * delta_I[3];
+    const real t47 = Rc[5] * delta_I[4];
+    const real t48 = t46 + t47;
+    const real t49 = Rc[8] * delta_I[5];
+    const real t50 = t48 + t49;
+    const real t51 = Z[5] * t50;
+    const real t52 = t45 + t51;
+    const real t53 = z[0] - t52;
+    const real t54 = Z[6] * t16;
+    const real t55 = Z[7] * t22;
+    const real t56 = t54 + t55;
+    const real t57 = Z[8] * t29;
+    const real t58 = t56 + t57;
+    const real t59 = Z[9] * t36;
+    const real t60 = t58 + t59;
+    const real t61 = Z[10] * t43;
+    const real t62 = t60 + t61;
+    const real t63 = Z[11] * t50;
+    const real t64 = t62 + t63;
+    const real t65 = z[1] - t64;
+    const real t66 = Z[12] * t16;
+    const real t67 = Z[13] * t22;
+    const real t68 = t66 + t67;
+    const real t69 = Z[14] * t29;
+    const real t70 = t68 + t69;
+    const real t71 = Z[15] * t36;
+    const real t72 = t70 + t71;
+    const real t73 = Z[16] * t43;
+    const real t74 = t72 + t73;
+    const real t75 = Z[17] * t50;
+    const real t76 = t74 + t75;
+    const real t77 = z[2] - t76;
+    const real t78 = F[7] * t77;
+    const real t79 = t65 - t78;
+    const real t80 = F[3] * t79;
+    const real t81 = t53 - t80;
+    const real t82 = F[6] * t77;
+    const real t83 = t81 - t82;
+    const real t84 = W[0] * t16;
+    const real t85 = W[1] * t22;
+    const real t86 = t84 + t85;
+    const real t87 = W[2] * t29;
+    const real t88 = t86 + t87;
+    const real t89 = W[3] * t36;
+    const real t90 = t88 + t89;
+    const real t91 = W[4] * t43;
+    const real t92 = t90 + t91;
+    const real t93 = W[5] * t50;
+    const real t94 = t92 + t93;
+    const real t95 = t83 - t94;
+    udot[0] = t95;
+    const real t96 = W[6] * t16;
+    const real t97 = W[7] * t22;
+    const real t98 = t96 + t97;
+    const real t99 = W[8] * t29;
+    const real t100 = t98 + t99;
+    const real t101 = W[9] * t36;
+    const real t102 = t100 + t101;
+    const real t103 = W[10] * t43;
+    const real t104 = t102 + t103;
+    const real t105 = W[11] * t50;
+    const real t106 = t104 + t105;
+    const real t107 = t79 - t106;
+    udot[1] = t107;
+    const real t108 = W[12] * t16;
+    const real t109 = W[13] * t22;
+    const real t110 = t108 + t109;
+    const real t111 = W[14] * t29;
+    const real t112 = t110 + t111;
+    const real t113 = W[15] * t36;
+    const real t114 = t112 + t113;
+    const real t115 = W[16] * t43;
+    const real t116 = t114 + t115;
+    const real t117 = W[17] * t50;
+    const real t118 = t116 + t117;
+    const real t119 = t77 - t118;
+    udot[2] = t119;
+    const real t120 = H[0] * t83;
+    const real t121 = H[1] * t79;
+    const real t122 = t120 + t121;
+    const real t123 = H[2] * t77;
+    const real t124 = t122 + t123;
+    const real t125 = H[0] * t94;
+    const real t126 = H[1] * t106;
+    const real t127 = t125 + t126;
+    const real t128 = H[2] * t118;
+    const real t129 = t127 + t128;
+    const real t130 = t124 - t129;
+    const real t131 = t16 + t130;
+    delta[0] = t131;
+    const real t132 = H[3] * t83;
+    const real t133 = H[4] * t79;
+    const real t134 = t132 + t133;
+    const real t135 = H[5] * t77;
+    const real t136 = t134 + t135;
+    const real t137 = H[3] * t94;
+    const real t138 = H[4] * t106;
+    const real t139 = t137 + t138;
+    const real t140 = H[5] * t118;
+    const real t141 = t139 + t140;
+    const real t142 = t136 - t141;
+    const real t143 = t22 + t142;
+    delta[1] = t143;
+    const real t144 = H[6] * t83;
+    const real t145 = H[7] * t79;
+    const real t146 = t144 + t145;
+    const real t147 = H[8] * t77;
+    const real t148 = t146 + t147;
+    const real t149 = H[6] * t94;
+    const real t150 = H[7] * t106;
+    const real t151 = t149 + t150;
+    const real t152 = H[8] * t118;
+    const real t153 = t151 + t152;
+    const real t154 = t148 - t153;
+    const real t155 = t29 + t154;
+    delta[2] = t155;
+    const real t156 = H[9] * t83;
+    const real t157 = H[10] * t79;
+    const real t158 = t156 + t157;
+    const real t159 = H[11] * t77;
+    const real t160 = t158 + t159;
+    const real t161 = H[9] * t94;
+    const real t162 = H[10] * t106;
+    const real t163 = t161 + t162;
+    const real t164 = H[11] * t118;
+    const real t165 = t163 + t164;
+    const real t166 = t160 - t165;
+    const real t167 = t36 + t166;
+    delta[3] = t167;
+    const real t168 = H[12] * t83;
+    const real t169 = H[13] * t79;
+    const real t170 = t168 + t169;
+    const real t171 = H[14] * t77;
+    const real t172 = t170 + t171;
+    const real t173 = H[12] * t94;
+    const real t174 = H[13] * t106;
+    const real t175 = t173 + t174;
+    const real t176 = H[14] * t118;
+    const real t177 = t175 + t176;
+    const real t178 = t172 - t177;
+    const real t179 = t43 + t178;
+    delta[4] = t179;
+    const real t180 = H[15] * t83;
+    const real t181 = H[16] * t79;
+    const real t182 = t180 + t181;
+    const real t183 = H[17] * t77;
+    const real t184 = t182 + t183;
+    const real t185 = H[15] * t94;
+    const real t186 = H[16] * t106;
+    const real t187 = t185 + t186;
+    const real t188 = H[17] * t118;
+    const real t189 = t187 + t188;
+    const real t190 = t184 - t189;
+    const real t191 = t50 + t190;
+    delta[5] = t191;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_recover_factored_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_recover_factored(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_recover_factored_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"F", 9, "", 0, 0},
+    {"Z", 18, "", 0, 0},
+    {"z", 3, "", 0, 0},
+    {"W", 18, "", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_recover_factored_outputs[] = {
+    {"udot", 3, "", 0, 0},
+    {"delta", 6, "", 0, 0},
 };
 
 static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
@@ -2673,12 +2905,24 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .function = (void (*)(void))mstmm_sweep_generic3_eliminate,
         .call = mstmm_sweep_generic3_eliminate_call,
         .n_inputs = 5,
-        .n_outputs = 5,
+        .n_outputs = 7,
         .inputs = mstmm_sweep_generic3_eliminate_inputs,
         .outputs = mstmm_sweep_generic3_eliminate_outputs,
-        .ir_hash = "41e851b3fa842e8c02408e13107b411d2bc6768915b6ff7fbe8957445e2945ae",
-        .n_guards = 6,
+        .ir_hash = "e0d9814ce6a6d585e67e407c8c256849d965fe99e0338f279b2cfb93571a1769",
+        .n_guards = 3,
         .guards = mstmm_sweep_generic3_eliminate_guards,
+    },
+    {
+        .name = "recover_factored",
+        .function = (void (*)(void))mstmm_sweep_generic3_recover_factored,
+        .call = mstmm_sweep_generic3_recover_factored_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_recover_factored_inputs,
+        .outputs = mstmm_sweep_generic3_recover_factored_outputs,
+        .ir_hash = "62a86da084f14df95b983f6774a84ec95c2b90f889b3beddc528163f86f99289",
+        .n_guards = 0,
+        .guards = NULL,
     },
 };
 
@@ -2686,7 +2930,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "9c5010b032e3d70b3c5bb6683bd08148aae059bdf1269b2d8751a91fe652411d",
+    .hash = "2cc1bef928647aae144da183f2728cc63f4be8d541f5cc9d1dc2bbee3500f847",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2696,6 +2940,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 6,
+    .n_kernels = 7,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -10,6 +10,8 @@
 extern const mstmm_element mstmm_sweep_screw;
 int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,
     const real *restrict e, real *restrict S_I, real *restrict e_I);
+int mstmm_sweep_screw_condense_turn_by_trace(const real *restrict Rc, const real *restrict S,
+    const real *restrict e, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_screw_condense_x(const real *restrict turn, const real *restrict d,
     const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
 int mstmm_sweep_screw_condense_plain_x(const real *restrict turn, const real *restrict d,
@@ -352,6 +354,319 @@ static const mstmm_port mstmm_sweep_screw_condense_turn_inputs[] = {
 };
 
 static const mstmm_port mstmm_sweep_screw_condense_turn_outputs[] = {
+    {"S_I", 21, "", 0, 0},
+    {"e_I", 6, "N, N*m", 0, 0},
+};
+
+/* S and e in turned axes, by the trace
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, outboard axes to inboard axes
+ * in  S[21] f = S a + e of everything outboard, at P
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * out S_I[21] f = S a + e at the inboard origin
+ * out e_I[6] (N, N*m) force part at the inboard origin
+ */
+int mstmm_sweep_screw_condense_turn_by_trace(const real *restrict Rc, const real *restrict S,
+    const real *restrict e, real *restrict S_I, real *restrict e_I)
+{
+    const real t0 = Rc[5] * S[2];
+    const real t1 = Rc[3] * S[0];
+    const real t2 = Rc[4] * S[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = Rc[3] * t4;
+    const real t6 = Rc[5] * S[7];
+    const real t7 = Rc[3] * S[1];
+    const real t8 = Rc[4] * S[6];
+    const real t9 = t7 + t8;
+    const real t10 = t6 + t9;
+    const real t11 = Rc[4] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[5] * S[11];
+    const real t14 = Rc[3] * S[2];
+    const real t15 = Rc[4] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = t13 + t16;
+    const real t18 = Rc[5] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = Rc[8] * S[2];
+    const real t21 = Rc[6] * S[0];
+    const real t22 = Rc[7] * S[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    const real t25 = Rc[6] * t24;
+    const real t26 = Rc[8] * S[7];
+    const real t27 = Rc[6] * S[1];
+    const real t28 = Rc[7] * S[6];
+    const real t29 = t27 + t28;
+    const real t30 = t26 + t29;
+    const real t31 = Rc[7] * t30;
+    const real t32 = t25 + t31;
+    const real t33 = Rc[8] * S[11];
+    const real t34 = Rc[6] * S[2];
+    const real t35 = Rc[7] * S[7];
+    const real t36 = t34 + t35;
+    const real t37 = t33 + t36;
+    const real t38 = Rc[8] * t37;
+    const real t39 = t32 + t38;
+    const real t40 = t19 + t39;
+    const real t41 = S[0] - t40;
+    const real t42 = S[6] + t41;
+    const real t43 = S[11] + t42;
+    S_I[0] = t43;
+    const real t44 = Rc[0] * t4;
+    const real t45 = Rc[1] * t10;
+    const real t46 = t44 + t45;
+    const real t47 = Rc[2] * t17;
+    const real t48 = t46 + t47;
+    S_I[1] = t48;
+    const real t49 = Rc[0] * t24;
+    const real t50 = Rc[1] * t30;
+    const real t51 = t49 + t50;
+    const real t52 = Rc[2] * t37;
+    const real t53 = t51 + t52;
+    S_I[2] = t53;
+    const real t54 = Rc[0] * S[3];
+    const real t55 = Rc[1] * S[8];
+    const real t56 = t54 + t55;
+    const real t57 = Rc[2] * S[12];
+    const real t58 = t56 + t57;
+    const real t59 = Rc[0] * t58;
+    const real t60 = Rc[0] * S[4];
+    const real t61 = Rc[1] * S[9];
+    const real t62 = t60 + t61;
+    const real t63 = Rc[2] * S[13];
+    const real t64 = t62 + t63;
+    const real t65 = Rc[1] * t64;
+    const real t66 = t59 + t65;
+    const real t67 = Rc[0] * S[5];
+    const real t68 = Rc[1] * S[10];
+    const real t69 = t67 + t68;
+    const real t70 = Rc[2] * S[14];
+    const real t71 = t69 + t70;
+    const real t72 = Rc[2] * t71;
+    const real t73 = t66 + t72;
+    S_I[3] = t73;
+    const real t74 = Rc[3] * t58;
+    const real t75 = Rc[4] * t64;
+    const real t76 = t74 + t75;
+    const real t77 = Rc[5] * t71;
+    const real t78 = t76 + t77;
+    S_I[4] = t78;
+    const real t79 = Rc[6] * t58;
+    const real t80 = Rc[7] * t64;
+    const real t81 = t79 + t80;
+    const real t82 = Rc[8] * t71;
+    const real t83 = t81 + t82;
+    S_I[5] = t83;
+    S_I[6] = t19;
+    const real t84 = Rc[6] * t4;
+    const real t85 = Rc[7] * t10;
+    const real t86 = t84 + t85;
+    const real t87 = Rc[8] * t17;
+    const real t88 = t86 + t87;
+    S_I[7] = t88;
+    const real t89 = Rc[3] * S[3];
+    const real t90 = Rc[4] * S[8];
+    const real t91 = t89 + t90;
+    const real t92 = Rc[5] * S[12];
+    const real t93 = t91 + t92;
+    const real t94 = Rc[0] * t93;
+    const real t95 = Rc[3] * S[4];
+    const real t96 = Rc[4] * S[9];
+    const real t97 = t95 + t96;
+    const real t98 = Rc[5] * S[13];
+    const real t99 = t97 + t98;
+    const real t100 = Rc[1] * t99;
+    const real t101 = t94 + t100;
+    const real t102 = Rc[3] * S[5];
+    const real t103 = Rc[4] * S[10];
+    const real t104 = t102 + t103;
+    const real t105 = Rc[5] * S[14];
+    const real t106 = t104 + t105;
+    const real t107 = Rc[2] * t106;
+    const real t108 = t101 + t107;
+    S_I[8] = t108;
+    const real t109 = Rc[3] * t93;
+    const real t110 = Rc[4] * t99;
+    const real t111 = t109 + t110;
+    const real t112 = Rc[5] * t106;
+    const real t113 = t111 + t112;
+    S_I[9] = t113;
+    const real t114 = Rc[6] * t93;
+    const real t115 = Rc[7] * t99;
+    const real t116 = t114 + t115;
+    const real t117 = Rc[8] * t106;
+    const real t118 = t116 + t117;
+    S_I[10] = t118;
+    S_I[11] = t39;
+    const real t119 = Rc[6] * S[3];
+    const real t120 = Rc[7] * S[8];
+    const real t121 = t119 + t120;
+    const real t122 = Rc[8] * S[12];
+    const real t123 = t121 + t122;
+    const real t124 = Rc[0] * t123;
+    const real t125 = Rc[6] * S[4];
+    const real t126 = Rc[7] * S[9];
+    const real t127 = t125 + t126;
+    const real t128 = Rc[8] * S[13];
+    const real t129 = t127 + t128;
+    const real t130 = Rc[1] * t129;
+    const real t131 = t124 + t130;
+    const real t132 = Rc[6] * S[5];
+    const real t133 = Rc[7] * S[10];
+    const real t134 = t132 + t133;
+    const real t135 = Rc[8] * S[14];
+    const real t136 = t134 + t135;
+    const real t137 = Rc[2] * t136;
+    const real t138 = t131 + t137;
+    S_I[12] = t138;
+    const real t139 = Rc[3] * t123;
+    const real t140 = Rc[4] * t129;
+    const real t141 = t139 + t140;
+    const real t142 = Rc[5] * t136;
+    const real t143 = t141 + t142;
+    S_I[13] = t143;
+    const real t144 = Rc[6] * t123;
+    const real t145 = Rc[7] * t129;
+    const real t146 = t144 + t145;
+    const real t147 = Rc[8] * t136;
+    const real t148 = t146 + t147;
+    S_I[14] = t148;
+    const real t149 = Rc[0] * S[15];
+    const real t150 = Rc[1] * S[16];
+    const real t151 = t149 + t150;
+    const real t152 = Rc[2] * S[17];
+    const real t153 = t151 + t152;
+    const real t154 = Rc[0] * t153;
+    const real t155 = Rc[0] * S[16];
+    const real t156 = Rc[1] * S[18];
+    const real t157 = t155 + t156;
+    const real t158 = Rc[2] * S[19];
+    const real t159 = t157 + t158;
+    const real t160 = Rc[1] * t159;
+    const real t161 = t154 + t160;
+    const real t162 = Rc[0] * S[17];
+    const real t163 = Rc[1] * S[19];
+    const real t164 = t162 + t163;
+    const real t165 = Rc[2] * S[20];
+    const real t166 = t164 + t165;
+    const real t167 = Rc[2] * t166;
+    const real t168 = t161 + t167;
+    S_I[15] = t168;
+    const real t169 = Rc[3] * t153;
+    const real t170 = Rc[4] * t159;
+    const real t171 = t169 + t170;
+    const real t172 = Rc[5] * t166;
+    const real t173 = t171 + t172;
+    S_I[16] = t173;
+    const real t174 = Rc[6] * t153;
+    const real t175 = Rc[7] * t159;
+    const real t176 = t174 + t175;
+    const real t177 = Rc[8] * t166;
+    const real t178 = t176 + t177;
+    S_I[17] = t178;
+    const real t179 = Rc[3] * S[15];
+    const real t180 = Rc[4] * S[16];
+    const real t181 = t179 + t180;
+    const real t182 = Rc[5] * S[17];
+    const real t183 = t181 + t182;
+    const real t184 = Rc[3] * t183;
+    const real t185 = Rc[3] * S[16];
+    const real t186 = Rc[4] * S[18];
+    const real t187 = t185 + t186;
+    const real t188 = Rc[5] * S[19];
+    const real t189 = t187 + t188;
+    const real t190 = Rc[4] * t189;
+    const real t191 = t184 + t190;
+    const real t192 = Rc[3] * S[17];
+    const real t193 = Rc[4] * S[19];
+    const real t194 = t192 + t193;
+    const real t195 = Rc[5] * S[20];
+    const real t196 = t194 + t195;
+    const real t197 = Rc[5] * t196;
+    const real t198 = t191 + t197;
+    S_I[18] = t198;
+    const real t199 = Rc[6] * t183;
+    const real t200 = Rc[7] * t189;
+    const real t201 = t199 + t200;
+    const real t202 = Rc[8] * t196;
+    const real t203 = t201 + t202;
+    S_I[19] = t203;
+    const real t204 = Rc[6] * S[15];
+    const real t205 = Rc[7] * S[16];
+    const real t206 = t204 + t205;
+    const real t207 = Rc[8] * S[17];
+    const real t208 = t206 + t207;
+    const real t209 = Rc[6] * t208;
+    const real t210 = Rc[6] * S[16];
+    const real t211 = Rc[7] * S[18];
+    const real t212 = t210 + t211;
+    const real t213 = Rc[8] * S[19];
+    const real t214 = t212 + t213;
+    const real t215 = Rc[7] * t214;
+    const real t216 = t209 + t215;
+    const real t217 = Rc[6] * S[17];
+    const real t218 = Rc[7] * S[19];
+    const real t219 = t217 + t218;
+    const real t220 = Rc[8] * S[20];
+    const real t221 = t219 + t220;
+    const real t222 = Rc[8] * t221;
+    const real t223 = t216 + t222;
+    S_I[20] = t223;
+    const real t224 = Rc[0] * e[0];
+    const real t225 = Rc[1] * e[1];
+    const real t226 = t224 + t225;
+    const real t227 = Rc[2] * e[2];
+    const real t228 = t226 + t227;
+    e_I[0] = t228;
+    const real t229 = Rc[3] * e[0];
+    const real t230 = Rc[4] * e[1];
+    const real t231 = t229 + t230;
+    const real t232 = Rc[5] * e[2];
+    const real t233 = t231 + t232;
+    e_I[1] = t233;
+    const real t234 = Rc[6] * e[0];
+    const real t235 = Rc[7] * e[1];
+    const real t236 = t234 + t235;
+    const real t237 = Rc[8] * e[2];
+    const real t238 = t236 + t237;
+    e_I[2] = t238;
+    const real t239 = Rc[0] * e[3];
+    const real t240 = Rc[1] * e[4];
+    const real t241 = t239 + t240;
+    const real t242 = Rc[2] * e[5];
+    const real t243 = t241 + t242;
+    e_I[3] = t243;
+    const real t244 = Rc[3] * e[3];
+    const real t245 = Rc[4] * e[4];
+    const real t246 = t244 + t245;
+    const real t247 = Rc[5] * e[5];
+    const real t248 = t246 + t247;
+    e_I[4] = t248;
+    const real t249 = Rc[6] * e[3];
+    const real t250 = Rc[7] * e[4];
+    const real t251 = t249 + t250;
+    const real t252 = Rc[8] * e[5];
+    const real t253 = t251 + t252;
+    e_I[5] = t253;
+    return 0;
+}
+
+static int mstmm_sweep_screw_condense_turn_by_trace_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_screw_condense_turn_by_trace(in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_screw_condense_turn_by_trace_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_screw_condense_turn_by_trace_outputs[] = {
     {"S_I", 21, "", 0, 0},
     {"e_I", 6, "N, N*m", 0, 0},
 };
@@ -1300,6 +1615,18 @@ static const mstmm_kernel mstmm_sweep_screw_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "condense_turn_by_trace",
+        .function = (void (*)(void))mstmm_sweep_screw_condense_turn_by_trace,
+        .call = mstmm_sweep_screw_condense_turn_by_trace_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_screw_condense_turn_by_trace_inputs,
+        .outputs = mstmm_sweep_screw_condense_turn_by_trace_outputs,
+        .ir_hash = "3ff5c9d5774155d0c6ff15d33ca3e07fd0f96fb3a110f2c70128d6ed9a428c46",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "condense_x",
         .function = (void (*)(void))mstmm_sweep_screw_condense_x,
         .call = mstmm_sweep_screw_condense_x_call,
@@ -1401,7 +1728,7 @@ const mstmm_element mstmm_sweep_screw = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "screw",
-    .hash = "f2548d65985eb52d998907adbd7885c7e2f1c0d3058967e4fd5f83258ce76f6f",
+    .hash = "b834fb151b4dac355d428dac51a25800612e2e65cf4adad0282237414189a852",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1411,6 +1738,6 @@ const mstmm_element mstmm_sweep_screw = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 9,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_screw_kernels,
 };

@@ -326,14 +326,25 @@ class Graph:
         size_symbol: str | None = None,
         purpose: str = "",
         sources: Iterable[str] = (),
+        as_made: bool = False,
     ) -> KernelIR:
         """Order what the outputs need (dead terms drop out) into a frozen kernel.
+
+        With `as_made` values stand in the order in which they were made, each guard and store
+        right behind what it waits for (kernels without run-time size); otherwise in the order in
+        which guards and outputs ask for them.
 
         `values[port]` is a node, or a nested list of nodes in the port's shape; an entry None is
         not stored.  An axis of the size symbol has no list: one value, which may contain
         `LOOP_INDEX`, stands for all k < n.
         """
         writer = _Writer(self)
+        if as_made:
+            writer.as_made(self._guards, outputs, values)
+            return KernelIR(
+                name, tuple(inputs), tuple(outputs), tuple(writer.statements), None, purpose,
+                tuple(sources),
+            )  # fmt: skip
         writer.statements.extend(self._solves)
         for request in self._guards:
             condition = writer.operand(request.condition)
@@ -369,6 +380,27 @@ class _Writer:
 
     def operand(self, node: Node) -> Operand:
         return self._emit(node, self.statements, self._operands)
+
+    def as_made(
+        self, guards: Iterable[_GuardRequest], outputs: Iterable[Port], values: dict[str, object]
+    ) -> None:
+        """Everything in the order of the nodes' numbers."""
+        waiting: dict[int, list[Callable[[], Statement]]] = {}
+        roots: list[Node] = []
+
+        def wait(node: Node, statement: Callable[[], Statement]) -> None:
+            roots.append(node)
+            waiting.setdefault(node.number, []).append(statement)
+
+        for g in guards:
+            wait(g.condition, lambda g=g: Guard(self.operand(g.condition), g.code, g.message))  # type: ignore[misc]
+        for port in outputs:
+            for index, entry in _flatten(values[port.name], port.shape):
+                node = self.graph.node(entry)  # type: ignore[arg-type]
+                wait(node, lambda p=port.name, i=index, n=node: Store(p, i, self.operand(n)))  # type: ignore[misc]
+        for node in sorted(_behind(roots), key=lambda n: n.number):
+            self.operand(node)
+            self.statements += [statement() for statement in waiting.get(node.number, ())]
 
     def _leaf(self, node: Node) -> Operand | None:
         if isinstance(node.leaf, Fraction):
@@ -425,6 +457,18 @@ class _Writer:
                 self.statements.append(Store(port.name, index, operand, body))
             else:
                 self.statements.append(Store(port.name, index, self.operand(node)))
+
+
+def _behind(roots: Iterable[Node]) -> list[Node]:
+    """`roots` and everything that they are made of."""
+    found: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        node = stack.pop()
+        if node.number not in found:
+            found[node.number] = node
+            stack.extend(node.args)
+    return list(found.values())
 
 
 def _walk(root: Node) -> list[Node]:
