@@ -108,7 +108,7 @@ def parts(kind: str, bodies: int, pieces: list[slice]) -> tuple[dict[str, list[P
 
 def _subjects(tree: Any, model: Any, q: np.ndarray, u: np.ndarray) -> dict[str, native.Subject]:
     found = {"mstmm one by one": mstmm_engines.fused(model, q, u)}
-    flags, sines = {"O2 scalar": casadi_peer.FLAGS["O2 scalar"]}, ("", "libm", "libmvec8")
+    flags, sines = {"O2": casadi_peer.FLAGS["O2"]}, ("", "libm", "libmvec8")
     for name, subject in casadi_peer.subjects(tree, q, u, False, flags, sines).items():
         found[f"casadi {name}"] = subject
     for name, subject in pinocchio_peer.subjects(tree, q, u).items():

@@ -101,7 +101,7 @@ def field_of(kind: str, bodies: int, engines: bool = True) -> Field:
 def _add_casadi(found: Field, q: np.ndarray, u: np.ndarray) -> None:
     every, tree = casadi_peer.FLAGS, found.tree
     some = {name: every[name] for name in ("O2 scalar", "O3")}
-    one = {"O2 scalar": every["O2 scalar"]}
+    one = {"O2": every["O2"]}
     # Numbers in the text?, flags, where sines and cosines are computed.
     forms = [(False, every, ("", "libm")), (False, one, ("libmvec8",)), (True, some, ("", "libm"))]
     if found.bodies > 25:
