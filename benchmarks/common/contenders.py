@@ -18,7 +18,7 @@ from .scenes import KINDS, long_chain
 
 #: Largest number of bodies that each is asked for (compile time, memory or patience beyond).
 LIMITS = {
-    "mstmm fused": 50, "mstmm looped": 10**6, "casadi": 100, "pinocchio": 1000, "mujoco": 1000,
+    "mstmm fused": 50, "mstmm looped": 10**6, "casadi": 100, "pinocchio": 1000, "mujoco": 300,
     "drake": 100, "exudyn": 100,
 }  # fmt: skip
 #: Contender -> family whose best member counts.

@@ -78,7 +78,7 @@ class DrakeRun:
         integrator.set_fixed_step_mode(tolerance == 0)
         if tolerance:
             integrator.set_target_accuracy(tolerance)
-            integrator.set_requested_minimum_step_size(1e-5)
+            integrator.set_requested_minimum_step_size(1e-8)
             integrator.set_throw_on_minimum_step_size_violation(True)
         self.simulator.Initialize()
 

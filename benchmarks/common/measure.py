@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-PEERS = ("numpy", "scipy", "mstmm", "casadi", "pin", "mujoco", "drake", "exudyn")
+PEERS = ("numpy", "scipy", "casadi", "pin", "mujoco", "drake", "exudyn")
 
 
 def machine() -> dict[str, Any]:
@@ -53,6 +53,13 @@ def versions() -> dict[str, str]:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
+    import mstmm
+
+    home = Path(mstmm.__file__).parent
+    commit = subprocess.run(
+        ["git", "-C", str(home), "rev-parse", "--short", "HEAD"], capture_output=True, text=True
+    )
+    found["mstmm"] = f"{mstmm.__version__} {commit.stdout.strip()}".strip()
     return found
 
 

@@ -24,7 +24,7 @@ from common.contenders import WRONG, Field, family, field_of  # noqa: E402
 SIZES = {
     "pins": (2, 3, 7, 12, 24, 50, 100, 1000, 10_000, 100_000),
     "balls": (2, 3, 7, 12, 24, 100, 1000, 10_000, 100_000),
-    "planar": (2, 3, 7, 12, 24, 50, 100, 1000, 10_000),
+    "planar": (2, 3, 7, 12, 24, 50, 100, 1000, 10_000, 100_000),
     "puma": (6,),
     "humanoid": (25,),
 }
@@ -86,7 +86,7 @@ def main() -> None:
     """Measure, print the table, draw."""
     parser = measure.options(str(__doc__).splitlines()[0], HERE)
     parser.add_argument("kinds", nargs="*", default=[])
-    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--rounds", type=int, default=11)
     parser.add_argument("--compile", action="store_true", help="only build what will be timed")
     options = parser.parse_args()
     if not options.plot:

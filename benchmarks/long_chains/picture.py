@@ -43,7 +43,7 @@ def draw(record: dict[str, Any], path: Path) -> None:
         bbox_to_anchor=(0.5, 0.035),
     )  # fmt: skip
     style.footer(
-        figure, record, "x: gives up at the next size tried (8 GiB and 60 s allowed; table.)"
+        figure, record, "x: gives up at the next size tried (8 GiB and 40 s allowed; table.)"
     )
     style.save(figure, path)
 

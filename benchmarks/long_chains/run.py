@@ -75,7 +75,7 @@ def table(results: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Measure, print the table, draw."""
     parser = measure.options(str(__doc__).splitlines()[0], HERE)
-    parser.add_argument("--seconds", type=float, default=60.0, help="limit for one tool and size")
+    parser.add_argument("--seconds", type=float, default=40.0, help="limit for one tool and size")
     options = parser.parse_args()
     if not options.plot:
         measure.save(options.json, measured(options.quick, options.seconds))

@@ -105,7 +105,7 @@ def drake_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Settin
         own_q = own_q.reshape(-1, 3)[:, ::-1].ravel()
         own_u = drake_peer.inboard_speeds(own_q, u)
     found: Settings = {}
-    for tolerance in [10.0**-k for k in range(3, 14)]:
+    for tolerance in [10.0**-k for k in (*range(3, 13), 12.5, 13)]:
         peer = drake_peer.DrakeRun(tree, own_q, own_u, t_end / 100, "runge_kutta5", tolerance)
 
         def run(peer: Any = peer) -> np.ndarray:

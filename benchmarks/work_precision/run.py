@@ -116,7 +116,7 @@ def table(results: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Measure, print the table, draw."""
     parser = measure.options(str(__doc__).splitlines()[0], HERE)
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=4)
     options = parser.parse_args()
     if not options.plot:
         count = 1 if options.quick else options.rounds
