@@ -56,7 +56,7 @@ def mstmm_looped(kind: str, n: int) -> dict[str, float]:
 
     import mstmm
 
-    small = mstmm.compile(mstmm.Scene(**scenes.long_chain(kind, 2)), engine="looped")
+    small = mstmm.compile(mstmm.Scene(**scenes.long_chain(kind, 6)), engine="looped")
     settings: dict[str, Any] = {"method": "dopri5", "rtol": 1e-6, "atol": 1e-6}
     small.simulate(RUN, output_times=[RUN], **settings)  # what is imported on first use
     before, begin = peak(), time.process_time()
