@@ -35,5 +35,5 @@ def draw(record: dict[str, Any], best: Callable[..., dict[str, float]], path: Pa
     axes.legend(fontsize=8, ncol=4, loc="upper right")
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * 3)
-    style.footer(figure, record, "Median wall-clock time of 8192 states per call.")
+    style.footer(figure, record, "Median wall-clock time of 2048 states per call.")
     style.save(figure, path)

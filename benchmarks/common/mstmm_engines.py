@@ -45,3 +45,26 @@ def fused(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
         address, np.asarray(model.fusion.numbers), q, u, memory=model._engine.start_memory(),
         keep=model,
     )  # fmt: skip
+
+
+class Lanes:
+    """The fused code over SIMD lanes on states q (n, nq), u (n, nu): one call in C for all."""
+
+    def __init__(self, model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> None:
+        library = model.fusion.ready_lanes(1e12)
+        ffi, self.function = library.ffi, library.descriptor.accelerations_many
+        self.udot = native.aligned(np.zeros_like(u))
+        self.codes = np.zeros(len(q), dtype=np.int32)
+        self.arrays = {
+            "p": native.aligned(model.fusion.numbers), "t": np.zeros(1), "q": native.aligned(q),
+            "u": native.aligned(u), "memory": model._engine.start_memory(), "udot": self.udot,
+        }  # fmt: skip
+        self.batch = ffi.new("mstmm_batch *")
+        self.batch.n, self.batch.codes = len(q), ffi.from_buffer("int[]", self.codes)
+        for name, array in self.arrays.items():
+            setattr(self.batch, name, ffi.from_buffer("double[]", array))
+
+    def __call__(self) -> None:
+        """udot of all states; RuntimeError if one is refused."""
+        if self.function(self.batch):
+            raise RuntimeError("a state was refused")
