@@ -126,7 +126,7 @@ def test_a_failing_product_ends_a_run_with_its_reason() -> None:
 
 
 def test_a_long_planar_chain_is_determined() -> None:
-    """Across its plane a chain grows as heavy as the cube of its length; its pivots do not see that."""
+    """Across its plane a chain grows as heavy as the cube of its length; no pivot sees that."""
     rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.001, 1 / 12, 1 / 12]}
     link = {**rod, "ends": {"tip": [1, 0, 0]}}
     line = {"name": "rope", "count": 120_000, "inboard": "ground", "body": link}
