@@ -37,7 +37,7 @@ PLAIN = "const double *arg[] = {p, q, u, efforts};"
 #: All sines and cosines first, so that no call splits the rest: libm's, or eight at a time glibc's
 #: vector library (at most 4 units in the last place off).
 AHEAD = """
-    double angles[PINS + 7], sines[PINS + 7], cosines[PINS + 7];
+    double angles[PINS + 7] = {0}, sines[PINS + 7], cosines[PINS + 7];
     static const int place[] = {%s};
     for (int i = 0; i < PINS; i++) angles[i] = q[place[i]];
     %s
