@@ -79,7 +79,7 @@ class Stage:
         return found["S_I"], found["e_I"]
 
     def _screw_axis(self) -> str:
-        """Axis about which this stage is a screw with an angle known only at run time, or ""."""
+        """Axis about which this stage is a screw, "" if none or if the plain product folds."""
         for k, axis in enumerate(AXES):
             if not axis:
                 continue
@@ -87,7 +87,7 @@ class Stage:
             cross = [self.rotation[3 * k + n] for n in others]
             cross += [self.rotation[3 * n + k] for n in others]
             aside = [self.position[n] for n in others]
-            turns = self.rotation[4 * others[0]].value is None
+            turns = self.rotation[4 * others[0]].value not in (0, 1, -1)
             if turns and all(x.value == 0 for x in (*cross, *aside)):
                 return axis
         return ""

@@ -53,7 +53,8 @@ def compile_scene(
             time: somewhat faster, but other parameters need the compiler again.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
-    leave a motion of the start undetermined; EnvironmentFailure if engine="fused" cannot be had.
+    leave a motion of the start undetermined; EnvironmentFailure if engine="fused" and there is no
+    compiler or it fails.
     """
     if engine not in ENGINES:
         raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
@@ -71,7 +72,10 @@ def compile_scene(
     if engine == "fused" and product is not None:
         raise SceneError('sweep = "product" has no fused code; use engine = "auto" or "looped"')
     if bake and engine != "fused":
-        raise SceneError('bake = True is for engine = "fused"; its numbers stand in the code')
+        raise SceneError(
+            "bake = True writes the numbers of the scene into its code; "
+            'it goes with engine = "fused"'
+        )
     refused = "asked for" if engine == "looped" else ""
 
     def fusing(packed: Packed, known: Known) -> Fusion:

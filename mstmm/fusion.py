@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import columns_abi
-from .errors import ElementError, EnvironmentFailure
+from .errors import ElementError, EnvironmentFailure, SceneError
 from .fused_abi import ABI, FLAGS, TUNING
 from .ir import KernelIR, from_json
 from .runtime.cache import Built, Recipe, find, opened
@@ -65,6 +65,7 @@ class Fusion:
     ) -> None:
         self._definitions = definitions
         self.obstacle = obstacle or _obstacle(packed)
+        self._looped_by_nature = bool(self.obstacle)
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
         self.note = ""
@@ -79,10 +80,15 @@ class Fusion:
     def build(self) -> FusedLibrary:
         """The scalar library, compiled if it is not in the cache.
 
-        Raises EnvironmentFailure if there is no compiler, it fails, or the scene cannot be fused.
+        Raises SceneError if such a scene has no fused code, EnvironmentFailure if there is no
+        compiler or it fails.
         """
         self._insisted = True
         found = self._get("scalar", build=True)
+        if found is None and self._looped_by_nature:
+            raise SceneError(
+                f'scene: no fused code: {self.obstacle}; use engine = "auto" or "looped"'
+            )
         if found is None:
             raise EnvironmentFailure(f"this scene cannot be fused: {self.obstacle}")
         return found
@@ -206,9 +212,10 @@ def _obstacle(packed: Packed) -> str:
     """Why a scene is not fused; empty if it can be."""
     count = int(packed.model.n_bodies)
     if packed.releases:
-        return "a hinge is released during the run, which changes the structure"
+        names = ", ".join(f'"{name}"' for name in packed.releases)
+        return f"hinge {names} is released during the run, which changes the structure"
     if count > MOST_BODIES:
-        return f"{count} bodies; fused code pays up to about {MOST_BODIES}"
+        return f"it has {count} bodies; fused code is for {MOST_BODIES} at most"
     if packed.model.product != packed.ffi.NULL:
         return "the product of classical matrices is looped"
     if any(packed.model.bodies[i].tape != packed.ffi.NULL for i in range(count)):

@@ -68,6 +68,7 @@ class Certificate:
         error: estimate of the error from a second run; None unless asked for (certify=True).
         finite: every number of q and u is finite.
         too_large: the scene has too many bodies for the pivots to be looked at.
+        samples: how many samples there are; balances need two.
         end: the run's own message.
     """
 
@@ -83,6 +84,7 @@ class Certificate:
     finite: bool
     end: str
     too_large: bool = False
+    samples: int = 2
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -95,7 +97,9 @@ class Certificate:
         return None if self.error is None else self.error.horizon
 
     def __str__(self) -> str:
-        rows = [("run", self.end), ("energy balance", str(self.energy))]
+        few = "not determined: one sample tells of no change; ask for more output times"
+        balance = few if self.samples < 2 else str(self.energy)
+        rows = [("run", self.end), ("energy balance", balance)]
         rows += [(f"{d.name}", str(d)) for d in self.momentum]
         if self.quaternion_residual:
             rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
@@ -126,7 +130,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
         statistics is not None and statistics.stability_limited,
         None if statistics is None else statistics.sum_local_error, error,
         bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()), run.message,
-        len(result.model.scene.bodies) > LARGEST,
+        len(result.model.scene.bodies) > LARGEST, len(result.t),
     )  # fmt: skip
 
 

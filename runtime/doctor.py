@@ -120,8 +120,9 @@ def _cache() -> Iterator[Finding]:
         "folder": str(place), "mode": f"{mode:04o}", "entries": len(entries), "bytes": size,
         "limit": allowed, "free": free,
     }  # fmt: skip
+    number = "1 library" if len(entries) == 1 else f"{len(entries)} libraries"
     text = (
-        f"{place} (mode {mode:04o}): {len(entries)} libraries, {size / 1e6:.1f} of "
+        f"{place} (mode {mode:04o}): {number}, {size / 1e6:.1f} of "
         f"{allowed / 1e6:.0f} MB; {free / 1e6:.0f} MB free on the disk"
     )
     yield Finding("cache", True, text, data)

@@ -91,7 +91,9 @@ class Engine:
         if lead is not None and array.shape[:-1] != lead:
             array = np.ascontiguousarray(np.broadcast_to(array, (*lead, width)))
         if not np.isfinite(array).all():
-            raise SceneError(f"{name} holds a number that is not finite")
+            place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
+            where = f"{name}[{', '.join(map(str, place))}]"
+            raise SceneError(f"{where} = {array[place]}: expected a finite number")
         return array.reshape(int(np.prod(array.shape[:-1], dtype=int)), width)
 
     def accelerations(

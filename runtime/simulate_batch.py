@@ -239,7 +239,13 @@ def checked(model: Model, settings: Settings, initial: tuple[ArrayLike, ArrayLik
             f"t_start = {settings.t_start:g} and t_end = {settings.t_end:g}"
         )
     q, u = initial
-    lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1])
+    try:
+        lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1])
+    except ValueError:
+        raise SceneError(
+            f"initial_states: q has shape {np.shape(q)} and u {np.shape(u)}; expected as many rows "
+            "in both, or one of them for all"
+        ) from None
     if len(lead) > 1:
         raise SceneError(f"initial_states have {len(lead)} leading axes, expected one: (n, nq)")
     lead = lead or (1,)

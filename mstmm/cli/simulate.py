@@ -312,4 +312,4 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
     for line in report.certificate_lines(result, console.width):
         output.say(line)
     output.say()
-    output.say(f"wrote {' and '.join(made)} ({len(result.t)} samples)")
+    output.say(f"wrote {' and '.join(made)} ({report.count(len(result.t), 'sample')})")

@@ -11,8 +11,8 @@ import sympy as sp
 
 from mstmm.derive.derivation import Derivation, Equation, Factor, Quantity, Triangular
 from mstmm.derive.direct import Undefined, evaluate_equations
-from mstmm.derive.evaluate import evaluate
 from mstmm.derive.element import Hinge
+from mstmm.derive.evaluate import evaluate
 from mstmm.derive.kernels import generic_kernels, hinge_kernels, screw_kernels
 from mstmm.derive.lower import lower
 from mstmm.derive.points import rotation

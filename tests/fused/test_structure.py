@@ -12,7 +12,7 @@ import pytest
 from support.result_scenes import pins
 
 import mstmm
-from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.errors import SceneError
 from mstmm.fusion import MOST_BODIES, PRINTERS
 from mstmm.ir import KernelIR
 from mstmm.runtime.structure import structure_of
@@ -140,7 +140,7 @@ def test_what_cannot_be_fused_says_why(scene: Any, reason: str) -> None:
     assert model.fusion.ready(1e12) is None
     assert model.engine == "looped"
     assert reason in model.engine_choice
-    with pytest.raises(EnvironmentFailure, match=reason):
+    with pytest.raises(SceneError, match=reason):
         mstmm.compile(scene(), engine="fused")
 
 

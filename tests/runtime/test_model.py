@@ -62,8 +62,8 @@ def test_an_empty_batch_and_a_scene_without_freedom() -> None:
     [
         ([0.0], [0.0, 0.0], r"q has shape \(1,\), expected \(\.\.\., 2\)"),
         ([0.0, 0.0], 0.0, r"u has shape \(1,\), expected \(\.\.\., 2\)"),
-        ([0.0, np.nan], [0.0, 0.0], "q holds a number that is not finite"),
-        ([0.0, 0.0], [np.inf, 0.0], "u holds a number that is not finite"),
+        ([0.0, np.nan], [0.0, 0.0], r"q\[1\] = nan: expected a finite number"),
+        ([0.0, 0.0], [np.inf, 0.0], r"u\[0\] = inf: expected a finite number"),
     ],
 )
 def test_states_that_do_not_fit(q: Any, u: Any, message: str) -> None:
