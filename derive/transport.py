@@ -32,7 +32,11 @@ class Fusion(Protocol):
 
 
 class Stage:
-    """One stage; S is carried by the double angle where it is a screw about z or x."""
+    """One stage.
+
+    S is carried across a screw by plain products: the double angle costs fewer operations, but
+    takes the small moments behind a long chain from differences of large ones.
+    """
 
     def __init__(self, fusion: Fusion, rotation: Nodes, position: Nodes) -> None:
         self.fusion, self.rotation, self.position = fusion, rotation, position
@@ -64,7 +68,7 @@ class Stage:
             k = AXES.index(axis)
             i, j = (k + 1) % 3, (k + 2) % 3
             found = f.screw(
-                f"condense_{axis}", turn=[self.rotation[4 * i], self.rotation[3 * j + i]],
+                f"condense_plain_{axis}", turn=[self.rotation[4 * i], self.rotation[3 * j + i]],
                 d=[self.position[k]], S=inertia, e=load,
             )  # fmt: skip
             return found["S_I"], found["e_I"]
