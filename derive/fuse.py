@@ -301,8 +301,8 @@ class _Fusion:
         own, h = nodes.own, self._free_subspace(index)
         diagonal = (0, 6, 11, 15, 18, 20)
         mass, inertia = (
-            self.graph.constant(PIVOT_FLOOR / 3) * (own[a] + own[b] + own[c])
-            for a, b, c in (diagonal[:3], diagonal[3:])
+            self.graph.constant(PIVOT_FLOOR / 3) * self._mean_of(own, nodes.inertia, places)
+            for places in (diagonal[:3], diagonal[3:])
         )
         for i, pivot in enumerate(pivots):
             column = h[i :: len(free)]
@@ -310,6 +310,13 @@ class _Fusion:
             self.fail_unless(
                 self.graph.call("lt", mass if moves else inertia, pivot), UNDETERMINED, index, 1
             )
+
+    @staticmethod
+    def _mean_of(own: Nodes, whole: Nodes, places: tuple[int, ...]) -> Node:
+        """Sum over the body's own entries; over all that hangs on it where it has none."""
+        a, b, c = places
+        total = own[a] + own[b] + own[c]
+        return total if total.value != 0 else whole[a] + whole[b] + whole[c]
 
     def _recover(self, index: int) -> None:
         body, nodes = self.structure.bodies[index], self.bodies[index]

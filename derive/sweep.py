@@ -300,7 +300,8 @@ def pivot_guards(
     """Each diagonal entry of D against what the body's own inertia lets pass for rounding.
 
     Not against the inertia of all that hangs on it: across the plane of a long planar chain that
-    grows with the cube of its length, while the pivots in the plane stay what they are.
+    grows with the cube of its length, while the pivots in the plane stay what they are.  A body
+    without inertia of its own has nothing else to be judged by.
     """
     pivot = _symbol("D", nu, nu)
     h = _symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
@@ -308,10 +309,15 @@ def pivot_guards(
     for i in range(nu):
         along = sum(h[k, i] ** 2 for k in range(3))
         about = sum(h[k, i] ** 2 for k in range(3, 6))
-        least = along * floor[0, 0] + about * floor[1, 0]
+        least = along * _own_or_all(floor[0, 0], 0) + about * _own_or_all(floor[1, 0], 3)
         text = f"speed {i + 1} of {nu} moves no inertia: its acceleration is undetermined"
         guards.append((pivot[i, i] > least, 1, text))
     return tuple(guards)
+
+
+def _own_or_all(own: sp.Expr, first: int) -> sp.Expr:
+    """The body's own floor, or that of all that hangs on it where the body has no inertia."""
+    return sp.Piecewise((own, own > 0), (floor_of(S.symbol)[first // 3], True))
 
 
 def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mstmm.errors import EnvironmentFailure
+from mstmm.errors import EnvironmentFailure, SceneError
 
 from .simulate import Compiled
 from .steppers import get
@@ -43,7 +43,7 @@ def at_once(model: Model, settings: Settings, recorded: str | None) -> Compiled 
     if library is None and recorded == FUSED:
         try:
             library = model.fusion.build()
-        except EnvironmentFailure as error:
+        except (EnvironmentFailure, SceneError) as error:
             raise EnvironmentFailure(
                 f"the run began on compiled code, which cannot be had now ({error}); "
                 "run without resume to start again"
