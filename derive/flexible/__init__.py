@@ -1,0 +1,1 @@
+"""Flexible bodies: floating-frame residual by invariants, sections as ports, local condensation."""

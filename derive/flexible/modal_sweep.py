@@ -1,0 +1,160 @@
+"""Steps of the Riccati sweep across a flexible body: absorb its ports, re-base, condense, recover.
+
+Between the load f on the frame, the frame's acceleration deviation a and the modal ones etadd
+
+    [f; tau] = [S  S_rf; S_rf^T  S_ff] [a; etadd] + [e; e_f]
+
+A port follows with a_O = X a + H etadd and brings f_O = S_O a_O + e_O.  Where the frame is not that
+of the section that is held, a = a_I + H_I etadd (re-base).  Then the modes are eliminated.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from ..sweep import DELTA, SHIFT, SOURCES, E, R, S
+from .modal import E_F, S_FF, S_RF
+from .symbols import N, column, modal, part, stack
+
+H = modal("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
+WORK = modal("U", 6, "S H")
+RATES = column("etadd", "modal accelerations")
+TAU = column("tau", "efforts on the modes")
+GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns of G, then -g")
+
+
+def _grow(quantity: Quantity) -> Quantity:
+    """The same array, as an output that is added to."""
+    return Quantity(quantity.symbol, quantity.unit, quantity.meaning, accumulate=True)
+
+
+def absorb() -> Derivation:
+    """Modal rows of what hangs on a port (its frame rows are carried as by any weld)."""
+    force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
+    lever = tilde(part(SHIFT.symbol, 0))
+    turned = R.symbol * force
+    return Derivation(
+        "modal",
+        "S and e of a port, seen by the modes",
+        (R, SHIFT, H, S, E),
+        (WORK, _grow(S_RF), _grow(S_FF), _grow(E_F)),
+        (
+            Equation("U = S H", WORK.symbol, S.symbol * H.symbol),
+            Equation("X^T U", S_RF.symbol, stack(turned, R.symbol * moment + lever * turned)),
+            Equation("H^T U", S_FF.symbol, H.symbol.T * WORK.symbol),
+            Equation("H^T e", E_F.symbol, H.symbol.T * E.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def rebase() -> Derivation:
+    """Modal rows and columns once the frame's acceleration is a_I + H etadd."""
+    based = modal("S_rf_I", 6, "S_rf + S H")
+    before = S_RF.symbol
+    return Derivation(
+        "modal",
+        "frame followed from the section that is held",
+        (H, S, E, S_RF),
+        (based, _grow(S_FF), _grow(E_F)),
+        (
+            Equation("S_rf + S H", based.symbol, before + S.symbol * H.symbol),
+            Equation(
+                "H^T S_rf_I + S_rf^T H", S_FF.symbol,
+                H.symbol.T * based.symbol + before.T * H.symbol,
+            ),
+            Equation("H^T e", E_F.symbol, H.symbol.T * E.symbol),
+        ),
+        sources=SOURCES,
+    )  # fmt: skip
+
+
+def condense() -> Derivation:
+    """Modes eliminated: S - S_rf S_ff^-1 S_fr and e - S_rf S_ff^-1 (e_f - tau)."""
+    right = Quantity(sp.MatrixSymbol("right", N, 7), "", "S_fr, e_f - tau")
+    reduced = Quantity(sp.MatrixSymbol("S_c", 6, 6), "", "S without modes", symmetric=True)
+    load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
+    both = sp.BlockMatrix([[S_RF.symbol.T, E_F.symbol - TAU.symbol]])
+    gain = GAIN.symbol
+    return Derivation(
+        "modal",
+        "modes of a flexible body condensed",
+        (S, E, S_RF, S_FF, E_F, TAU),
+        (right, GAIN, reduced, load),
+        (
+            Equation("[S_fr, e_f - tau]", right.symbol, both),
+            Equation("S_ff^-1 [S_fr, e_f - tau]", gain, Solve(S_FF.symbol, right.symbol, True)),
+            Equation(
+                "S_c", reduced.symbol, S.symbol - S_RF.symbol * gain[:, :6], symmetric=True
+            ),
+            Equation("e_c", load.symbol, E.symbol - S_RF.symbol * gain[:, 6:]),
+        ),
+        sources=SOURCES,
+    )
+
+
+FRAME_DELTA = Quantity(vector("delta_I", 6), "", "deviation of the frame without the modes' part")
+
+
+def recover() -> Derivation:
+    """Modal accelerations from the deviation of the frame."""
+    gain = GAIN.symbol
+    return Derivation(
+        "modal",
+        "modal accelerations recovered",
+        (GAIN, FRAME_DELTA),
+        (RATES,),
+        (
+            Equation(
+                "etadd = g - G a", RATES.symbol, -gain[:, 6:] - gain[:, :6] * FRAME_DELTA.symbol
+            ),
+        ),
+        sources=SOURCES,
+    )
+
+
+def displaced() -> Derivation:
+    """Deviation of what follows the modes: a + H etadd."""
+    return Derivation(
+        "modal",
+        "deviation with the modes' part",
+        (H, RATES, FRAME_DELTA),
+        (DELTA,),
+        (Equation("a + H etadd", DELTA.symbol, FRAME_DELTA.symbol + H.symbol * RATES.symbol),),
+        sources=SOURCES,
+    )
+
+
+def prescribed() -> Derivation:
+    """Loads of prescribed modal accelerations s."""
+    s = column("s", "prescribed modal accelerations")
+    grown = Quantity(E.symbol, E.unit, E.meaning, accumulate=True)
+    return Derivation(
+        "modal",
+        "loads of prescribed modal accelerations",
+        (S_RF, S_FF, s),
+        (grown, _grow(E_F)),
+        (
+            Equation("S_rf s", E.symbol, S_RF.symbol * s.symbol),
+            Equation("S_ff s", E_F.symbol, S_FF.symbol * s.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def modal_effort() -> Derivation:
+    """Efforts that the modes need: e_f + H^T e."""
+    return Derivation(
+        "modal",
+        "efforts on the modes",
+        (H, E, E_F),
+        (TAU,),
+        (Equation("e_f + H^T e", TAU.symbol, E_F.symbol + H.symbol.T * E.symbol),),
+        sources=SOURCES,
+    )
+
+
+__all__ = [
+    "absorb", "condense", "displaced", "modal_effort", "prescribed", "rebase", "recover",
+]  # fmt: skip

@@ -1,0 +1,232 @@
+"""Sections of a flexible body as ports: pose, subspace and bias against the floating frame.
+
+The rotation of a section is exp(Psi~) with Psi = theta eta, a rotation vector, in pose, rates and
+virtual power alike.  Its angular velocity is T(Psi) Psid in the section's axes, T(-Psi) Psid in the
+frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functions
+
+    a = sin t / t,   b = (1 - cos t) / t^2,   c = (t - sin t) / t^3,    t^2 = s = Psi . Psi
+
+are taken as their series in s, which at the largest rotation that is accepted are exact to
+rounding; so there is no case of small angles, and a bending plane folds to plain sines and cosines.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..derivation import Derivation, Equation, Quantity, tilde, vector
+from .symbols import ETA, ETAD, N, SOURCES, column, modal, pair, part, stack
+
+eta, etad = ETA.symbol, ETAD.symbol
+
+#: Largest rotation of a section against its frame, rad.
+LARGEST_TURN = sp.Rational(3, 2)
+#: Terms of the series.
+TERMS = 13
+
+POINT = Quantity(vector("r", 3), "m", "section point at rest from o, frame axes")
+PHI = modal("phi", 3, "displacement of the point per mode")
+THETA = modal("theta", 3, "rotation vector of the section per mode")
+SHORTENING = tuple(
+    pair(f"g_{a}", f"displacement of second order along {a}: -1/2 eta^T g eta") for a in "xyz"
+)
+JACOBIAN = modal("Phi", 6, "rates of point and rotation vector per modal speed")
+
+END = Quantity(sp.MatrixSymbol("R_end", 3, 3), "", "rotation, end axes to section axes")
+PLACE = Quantity(vector("x", 3), "m", "section point from o, frame axes")
+TURN = Quantity(vector("Psi", 3), "rad", "rotation vector of the section, frame axes")
+RATE = Quantity(vector("xd", 3), "m/s", "rate of x")
+TURN_RATE = Quantity(vector("Psid", 3), "rad/s", "rate of Psi")
+BIAS = Quantity(vector("xdd", 3), "m/s2", "second rate of x at etadd = 0")
+
+
+def section() -> Derivation:
+    """Place and rotation vector of a section, their rates, and how they follow the modes."""
+    rows = [PHI.symbol[a, :] - eta.T * g.symbol for a, g in enumerate(SHORTENING)]
+    half = sp.Rational(1, 2)
+    linear = JACOBIAN.symbol[:3, :]
+    moved = half * (PHI.symbol * eta) + half * (linear * eta)
+    bent = stack(*(-(etad.T * g.symbol) * etad for g in SHORTENING))
+    return Derivation(
+        "modal",
+        "section of a flexible body",
+        (POINT, PHI, THETA, *SHORTENING, ETA, ETAD),
+        (JACOBIAN, PLACE, TURN, RATE, TURN_RATE, BIAS),
+        (
+            Equation("rates per mode", JACOBIAN.symbol, stack(*rows, THETA.symbol)),
+            Equation("x = r + phi eta - eta^T g eta / 2", PLACE.symbol, POINT.symbol + moved),
+            Equation("Psi", TURN.symbol, THETA.symbol * eta),
+            Equation("xd", RATE.symbol, linear * etad),
+            Equation("Psid", TURN_RATE.symbol, THETA.symbol * etad),
+            Equation("xdd", BIAS.symbol, bent),
+        ),
+        sources=SOURCES,
+    )
+
+
+def series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
+    """sum_k (-s)^k / (2 k + first)!, or its derivative by s, in Horner's form."""
+    signs = [sp.Integer((-1) ** k) / sp.factorial(2 * k + first) for k in range(TERMS)]
+    terms = [k * c for k, c in enumerate(signs)][1:] if derivative else signs
+    value = sp.Integer(0)
+    for coefficient in reversed(terms):
+        value = coefficient + s * value
+    return value
+
+
+SQUARE, COEFFICIENTS = vector("s", 1), vector("abc", 5)
+
+
+def _coefficients() -> tuple[Equation, ...]:
+    psi, psid = part(TURN.symbol, 0), part(TURN_RATE.symbol, 0)
+    s = SQUARE[0, 0]
+    rate = 2 * sum(p * d for p, d in zip(psi, psid, strict=True))
+    values = [series(k, s) for k in (1, 2, 3)]
+    values += [rate * series(k, s, derivative=True) for k in (2, 3)]
+    return (
+        Equation("s = Psi . Psi", SQUARE, sp.ImmutableDenseMatrix([sum(p * p for p in psi)])),
+        Equation("a, b, c, rates of b and c", COEFFICIENTS, sp.ImmutableDenseMatrix(values)),
+    )
+
+
+def _rotation() -> sp.ImmutableDenseMatrix:
+    a, b = COEFFICIENTS[0, 0], COEFFICIENTS[1, 0]
+    turn = tilde(part(TURN.symbol, 0))
+    return sp.ImmutableDenseMatrix(sp.eye(3) + a * turn + b * (turn * turn))
+
+
+def _tangent(sign: int) -> sp.ImmutableDenseMatrix:
+    """T(sign Psi)."""
+    b, c = COEFFICIENTS[1, 0], COEFFICIENTS[2, 0]
+    turn = tilde(part(TURN.symbol, 0))
+    return sp.ImmutableDenseMatrix(sp.eye(3) - sign * b * turn + c * (turn * turn))
+
+
+def _tangent_rate(sign: int) -> sp.ImmutableDenseMatrix:
+    """(d/dt T(sign Psi)) Psid."""
+    c, bd, cd = (COEFFICIENTS[k, 0] for k in (2, 3, 4))
+    turn, rate = tilde(part(TURN.symbol, 0)), tilde(part(TURN_RATE.symbol, 0))
+    crossed = turn * part(TURN_RATE.symbol, 0)
+    return sp.ImmutableDenseMatrix(-sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed))
+
+
+_OUTPUTS = (
+    Quantity(sp.MatrixSymbol("R", 3, 3), "", "rotation, outboard axes to inboard axes"),
+    Quantity(vector("d", 3), "m", "outboard point from the inboard one, inboard axes"),
+    Quantity(sp.MatrixSymbol("H6", 6, 6), "", "subspace by [xd; Psid], rows v then w, outboard axes"),
+    Quantity(vector("v", 3), "m/s", "relative velocity, outboard axes"),
+    Quantity(vector("w", 3), "rad/s", "relative angular velocity, outboard axes"),
+    Quantity(vector("c", 6), "m/s2, rad/s2", "relative acceleration at etadd = 0, outboard axes"),
+)
+
+
+def _motion(title: str, definitions: tuple[Equation, ...]) -> Derivation:
+    return Derivation(
+        "modal",
+        title,
+        (END, PLACE, TURN, RATE, TURN_RATE, BIAS),
+        _OUTPUTS,
+        (*_coefficients(), *definitions),
+        sources=SOURCES,
+    )
+
+
+def _rates(subspace: sp.Basic) -> tuple[Equation, ...]:
+    h6 = _OUTPUTS[2].symbol
+    rates = stack(RATE.symbol, TURN_RATE.symbol)
+    whole = vector("vw", 6)
+    return (
+        Equation("H6", h6, subspace),
+        Equation("relative velocities", whole, h6 * rates),
+        Equation("v", _OUTPUTS[3].symbol, part(whole, 0)),
+        Equation("w", _OUTPUTS[4].symbol, part(whole, 3)),
+    )
+
+
+def outward() -> Derivation:
+    """From the floating frame (inboard) to an end (outboard): as the kernel of a hinge."""
+    rotation, end = _OUTPUTS[0].symbol, END.symbol
+    none = sp.zeros(3, 3)
+    subspace = sp.BlockMatrix([[rotation.T, none], [none, end.T * _tangent(1)]])
+    return _motion(
+        "end of a flexible body against its floating frame",
+        (
+            Equation("rotation", rotation, _rotation() * end),
+            Equation("place", _OUTPUTS[1].symbol, part(PLACE.symbol, 0)),
+            *_rates(subspace),
+            Equation(
+                "bias",
+                _OUTPUTS[5].symbol,
+                stack(rotation.T * BIAS.symbol, end.T * _tangent_rate(1)),
+            ),
+        ),
+    )
+
+
+def inward() -> Derivation:
+    """From the end that is held (inboard) to the floating frame (outboard), the inverse motion.
+
+    w = -W with W = T(-Psi) Psid the spin of the section in frame axes, v = W x x - xd.
+    """
+    rotation, end = _OUTPUTS[0].symbol, END.symbol
+    lever = tilde(part(PLACE.symbol, 0))
+    spin, rate = vector("W", 3), vector("Wd", 3)
+    none = sp.zeros(3, 3)
+    subspace = sp.BlockMatrix(
+        [[-sp.ImmutableDenseMatrix(sp.eye(3)), -lever * _tangent(-1)], [none, -_tangent(-1)]]
+    )
+    turn, x = tilde(part(spin, 0)), part(PLACE.symbol, 0)
+    crossed = turn * x
+    linear = (
+        tilde(part(rate, 0)) * x
+        + 2 * turn * part(RATE.symbol, 0)
+        - part(BIAS.symbol, 0)
+        - turn * crossed
+    )
+    return _motion(
+        "floating frame against the end of the body that is held",
+        (
+            Equation("rotation", rotation, end.T * _rotation().T),
+            Equation("place", _OUTPUTS[1].symbol, -rotation * PLACE.symbol),
+            *_rates(subspace),
+            Equation("spin of the section", spin, -part(_OUTPUTS[4].symbol, 0)),
+            Equation("its rate", rate, _tangent_rate(-1)),
+            Equation("bias", _OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
+        ),
+    )
+
+
+def turn_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
+    """The rotation of a section must stay within the range of the series and of the model."""
+    text = f"a section turns by more than {LARGEST_TURN} rad against its floating frame"
+    return ((SQUARE[0, 0] < LARGEST_TURN**2, 1, text),)
+
+
+def subspace() -> Derivation:
+    """H = H6 Phi: relative velocity of a port per modal speed."""
+    h = modal("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
+    return Derivation(
+        "modal",
+        "subspace of a port",
+        (_OUTPUTS[2], JACOBIAN),
+        (h,),
+        (Equation("H = H6 Phi", h.symbol, _OUTPUTS[2].symbol * JACOBIAN.symbol),),
+        sources=SOURCES,
+    )
+
+
+def imposed() -> Derivation:
+    """Bias of a port when the modal accelerations are prescribed: c + H s."""
+    h = modal("H", 6, "motion subspace of the modes")
+    s = column("s", "prescribed modal accelerations")
+    total = Quantity(vector("c_s", 6), "", "relative acceleration")
+    return Derivation(
+        "modal",
+        "bias of a port with prescribed modal accelerations",
+        (h, s, _OUTPUTS[5]),
+        (total,),
+        (Equation("c + H s", total.symbol, _OUTPUTS[5].symbol + h.symbol * s.symbol),),
+        sources=SOURCES,
+    )
+
+
