@@ -1,0 +1,1 @@
+"""Flexible bodies at run time: from beams and elastic bodies of a scene to numbers."""
