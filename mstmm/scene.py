@@ -1,4 +1,4 @@
-"""A scene: bodies, hinges, loads, events and springs, validated and frozen.
+"""A scene: bodies, hinges, beams, loads, events and springs, validated and frozen.
 
 The same model is read from TOML and JSON (`load_scene`) and built in Python
 (`Scene(gravity=[...], body=[{...}], hinge=[{...}])`).  Everything that does not describe a system
@@ -14,12 +14,15 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, ValidationError, model_validator
 
-from . import scene_checks, scene_errors, scene_text, scene_types
+from . import scene_checks, scene_errors, scene_skeleton, scene_text, scene_types
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .rotations import Vector
+from .scene_beam import Beam, Modes, Section, Shapes
 from .scene_chain import Chain
+from .scene_elastic import Arrays, Box, Elastic, ElasticEnd
 from .scene_file import load_scene, read
+from .scene_flexible import Damping, Start
 from .scene_law import Friction, Law, LawEntry, Limits, SpringLaw
 from .scene_members import Bodies, Hinges
 from .scene_parts import Body, End, Event, Hinge, Initial, Load, Spring
@@ -27,8 +30,9 @@ from .scene_rules import Table, split
 from .spec import ElementSpec
 
 __all__ = [
-    "Body", "Chain", "End", "Event", "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits",
-    "Load", "Scene", "Spring", "SpringLaw", "load_scene", "read", "split",
+    "Arrays", "Beam", "Body", "Box", "Chain", "Damping", "Elastic", "ElasticEnd", "End", "Event",
+    "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits", "Load", "Modes", "Scene",
+    "Section", "Shapes", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip
 
 #: What messages call the scene that is being read.
@@ -45,7 +49,8 @@ class Scene(Table):
     """Everything a simulation needs to know, SI units and radians, frozen.
 
     `gravity` in m/s^2, inertial axes.  Lists keep the order of the file: hinge coordinates appear
-    in q and u in the order of `hinge`, then those of the chains in the order of `chain`.
+    in q and u in the order of `hinge`, then those of the chains in the order of `chain`, then the
+    modal coordinates in the order of `beam` and of `elastic`.
     """
 
     model_config = ConfigDict(title="mstmm scene")
@@ -56,6 +61,8 @@ class Scene(Table):
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     chain: tuple[Chain, ...] = ()
+    beam: tuple[Beam, ...] = ()
+    elastic: tuple[Elastic, ...] = ()
     load: tuple[Load, ...] = ()
     event: tuple[Event, ...] = ()
     spring: tuple[Spring, ...] = ()
@@ -85,6 +92,16 @@ class Scene(Table):
     def hinges(self) -> Hinges:
         """Every hinge: `hinge`, then the members of the chains, made when they are asked for."""
         return Hinges(self.hinge, self.chain)
+
+    @property
+    def skeleton(self) -> Scene:
+        """The same scene with every beam and elastic body as a rigid body with the same ends,
+        behind `body`: what names and the tree are checked on."""
+        return self._skeleton if self.beam or self.elastic else self
+
+    @cached_property
+    def _skeleton(self) -> Scene:
+        return scene_skeleton.skeleton(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -119,6 +136,8 @@ class Scene(Table):
     def _settle(self) -> Scene:
         for table in ("load", "event", "spring"):
             object.__setattr__(self, table, _named(table, getattr(self, table)))
+        for table, elements in scene_skeleton.at_roots(self).items():
+            object.__setattr__(self, table, elements)
         problems = scene_checks.problems(self)
         if problems:
             raise rules.Refused(*problems)

@@ -7,7 +7,7 @@ from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from . import topology
+from . import scene_flexible_checks, topology
 from .expression import Expression
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, problem_with
@@ -21,10 +21,22 @@ if TYPE_CHECKING:
 
 def problems(scene: Scene) -> list[Problem]:
     """Everything in which the elements of a scene do not fit each other."""
-    if not scene.body and not scene.chain:
+    if not (scene.body or scene.chain or scene.beam or scene.elastic):
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
-    found = _first(_duplicates(scene), _references(scene), _inertias(scene))
-    return found or _first(_expressions(scene), topology.problems(scene))
+    found = _first(_duplicates(scene), _references(scene), _inertias(scene),
+                   scene_flexible_checks.problems(scene))  # fmt: skip
+    return found or _first(_expressions(scene), _tree(scene), scene_flexible_checks.spins(scene))
+
+
+def _tree(scene: Scene) -> Iterator[Problem]:
+    """What keeps the hinges from being a tree, each body in the table it comes from."""
+    firsts = (("body", 0), ("beam", len(scene.body)),
+              ("elastic", len(scene.body) + len(scene.beam)))  # fmt: skip
+    for (table, index, *inside), message in topology.problems(scene.skeleton):
+        if table == "body" and isinstance(index, int):
+            table, first = next(one for one in reversed(firsts) if index >= one[1])
+            index -= first
+        yield (table, index, *inside), message
 
 
 def _first(*findings: Iterable[Problem]) -> list[Problem]:
@@ -41,21 +53,30 @@ def _duplicates(scene: Scene) -> Iterator[Problem]:
                     (table, i, "name"),
                     f'"{element.name}" is also the name of {table} number {first + 1}; rename one',
                 )
-    bodies, hinges = ({e.name for e in table} for table in (scene.body, scene.hinge))
-    for i, chain in enumerate(scene.chain):
-        for what, names in (("body", bodies), ("hinge", hinges)):
-            if chain.name in names:
+    taken: dict[str, str] = {}
+    for table in ("body", "hinge", "beam", "elastic", "chain"):
+        word = _WORDS.get(table, f"a {table}")
+        for i, element in enumerate(getattr(scene, table)):
+            other = taken.setdefault(element.name, word)
+            if other != word and {table, other} not in _APART:
                 yield (
-                    ("chain", i, "name"),
-                    f'"{chain.name}" is also the name of a {what}; rename one',
+                    (table, i, "name"),
+                    f'"{element.name}" is also the name of {other}; rename one',
                 )
 
 
+#: What a message calls an element of a table.
+_WORDS = {"elastic": "an elastic body"}
+#: A body and a hinge may have the same name: what is meant is always clear.
+_APART = ({"hinge", "a body"},)
+
+
 def _references(scene: Scene) -> Iterator[Problem]:
+    bodies = scene.skeleton.bodies
     for i, hinge in enumerate(scene.hinge):
         yield from _end(hinge.inboard, scene, ("hinge", i, "inboard"))
         yield from _end(hinge.outboard, scene, ("hinge", i, "outboard"))
-        if scene.bodies.place(hinge.outboard_body) is not None:
+        if bodies.place(hinge.outboard_body) is not None:
             yield (
                 ("hinge", i, "outboard"),
                 f'"{hinge.outboard_body}" is held by the hinge of its chain; '
@@ -85,17 +106,22 @@ def _end(reference: str, scene: Scene, place: Location) -> Iterator[Problem]:
     body, at = split(reference)
     if body == GROUND:
         return
-    ends = scene.bodies.ends(body)
+    bodies = scene.skeleton.bodies
+    ends = bodies.ends(body)
     if ends is None:
-        yield place, scene.bodies.missing(body)
+        yield place, bodies.missing(body)
     elif at and at not in ends:
         way_out = near(at, ends) if ends else f"; give it ends = {{ {at} = [x, y, z] }}"
         yield place, f'body "{body}" has no end "{at}"{way_out}'
+    elif not at and body in {elastic.name for elastic in scene.elastic}:
+        way_out = f'write "{body}.{next(iter(ends))}"' if ends else "give it ends"
+        yield place, f'"{body}" is an elastic body, which is met at its ends alone; {way_out}'
 
 
 def _axes(scene: Scene, i: int) -> Iterator[Problem]:
     load = scene.load[i]
-    known = scene.bodies.find(load.axes) is not None
+    bodies = scene.skeleton.bodies
+    known = bodies.find(load.axes) is not None
     if load.axes in ("inertial", "body"):
         if known and not (load.axes == "body" == split(load.on)[0]):
             yield (
@@ -103,7 +129,7 @@ def _axes(scene: Scene, i: int) -> Iterator[Problem]:
                 f'"{load.axes}" could also mean the body of this name; rename that body',
             )
     elif not known:
-        options = ["inertial", "body", *(body.name for body in scene.body)]
+        options = ["inertial", "body", *(body.name for body in scene.skeleton.body)]
         yield ("load", i, "axes"), f'there is no body "{load.axes}"{near(load.axes, options)}'
 
 
@@ -130,20 +156,21 @@ def _inertias(scene: Scene) -> Iterator[Problem]:
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
-    """What is accepted but worth knowing: inertias that no body can have."""
+    """What is accepted but worth knowing: inertias that no body can have, beams that are asked
+    for what they cannot do well."""
     found = []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
             found.append(f"{name}: inertia: {excess}; accepted as asked")
-    return tuple(found)
+    return (*found, *scene_flexible_checks.warnings(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------
 
 
 def _expressions(scene: Scene) -> Iterator[Problem]:
-    hinges, bodies = scene.hinges, scene.bodies
+    hinges, bodies = scene.hinges, scene.skeleton.bodies
     anywhere = Scope(hinges, bodies)
     in_events = Scope(hinges, bodies, positions=True)
     for i, hinge in enumerate(scene.hinge):

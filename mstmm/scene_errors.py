@@ -19,7 +19,6 @@ MAX_PROBLEMS = 60
 _MAX_OPTIONS = 2000
 #: Keys kept free for coming releases, and what they will hold.
 RESERVED = {
-    "beam": "flexible bodies",
     "loop": "closed loops",
     "loops": "closed loops",
     "closure": "closed loops",
@@ -31,7 +30,7 @@ RESERVED = {
 }
 
 #: The lists of tables of a scene.
-TABLES = ("body", "hinge", "chain", "load", "event", "spring")
+TABLES = ("body", "hinge", "chain", "beam", "elastic", "load", "event", "spring")
 
 Problem = tuple[Location, str]
 

@@ -25,14 +25,21 @@ def load_scene(
 ) -> Scene:
     """Read and validate a scene file (.toml or .json).
 
+    Relative paths in it start from its folder; no file that it names is opened.
+
     `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
     types.  When it is given every type must be built in or in it; without it types that are not
     built in are left to `Scene.check_types`.  Raises SceneError.
     """
     from .scene import Scene
+    from .scene_elastic import FOLDER
 
     where, data = read(path)
-    scene = Scene.from_data(data, where)
+    token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
+    try:
+        scene = Scene.from_data(data, where)
+    finally:
+        FOLDER.reset(token)
     if known_types is not None:
         scene.check_types(known_types, where)
     return scene

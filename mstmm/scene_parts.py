@@ -239,7 +239,10 @@ _ZERO = (number(0), number(0), number(0))
 class Load(Table):
     """A force (N) and a moment (N m) on an end of a body; three expressions each.
 
-    `axes` is "inertial", "body" (the loaded body's own) or the name of another body.
+    On a beam alternatively `force_per_length` (N/m), the same everywhere on `span`, from one x to
+    another in m (None: the whole length).  `axes` is "inertial", "body" (the loaded body's own; of
+    a beam those of the loaded section, for `force_per_length` those of the floating frame) or the
+    name of another body.
     """
 
     name: Annotated[str, texts.name("the load's name")] = ""
@@ -252,6 +255,13 @@ class Load(Table):
         tuple[Expression, Expression, Expression],
         texts.expressions("three numbers or expressions in N m", 3),
     ] = _ZERO
+    force_per_length: Annotated[
+        tuple[Expression, Expression, Expression] | None,
+        texts.expressions("three numbers or expressions in N/m", 3),
+    ] = None
+    span: Annotated[
+        tuple[float, float] | None, rules.numbers("[from, to] along the beam in m", 2, of="m")
+    ] = None
     axes: Annotated[str, texts.body('"inertial", "body" or the name of a body')] = "inertial"
 
 

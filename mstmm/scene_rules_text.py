@@ -85,6 +85,18 @@ def body(expected: str) -> Rule:
     return Rule(expected, check, {"type": "string", "pattern": _pattern(BODY)})
 
 
+def label(expected: str) -> Rule:
+    """A name that another program gave: printable text."""
+
+    def check(value: Any) -> str:
+        checked = text(value, expected)
+        if not 0 < len(checked) <= 64 or not checked.isprintable():
+            raise refuse(f"expected {expected}, found {found(checked)}")
+        return checked
+
+    return Rule(expected, check, {"type": "string", "minLength": 1, "maxLength": 64})
+
+
 def choice(*options: str) -> Rule:
     """One of these words."""
     expected = " or ".join(f'"{option}"' for option in options)

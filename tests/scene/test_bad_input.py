@@ -51,7 +51,6 @@ BAD: list[tuple[Data, str]] = [
     (arm(schema_version=True), "schema_version: expected 1, the only version there is, found true"),
     (arm(grvity=[0, 0, 0]), 'grvity: unknown key; did you mean "gravity"?'),
     (arm(bodies=[]), 'bodies: unknown key; did you mean "body"?'),
-    (arm(beam=[]), "beam: flexible bodies come in a later release"),
     (arm(loop=[]), "loop: closed loops come in a later release"),
     (arm(thermal={}), "thermal: thermal data come in a later release"),
     (arm(imports=[]), "imports: imports come in a later release"),
