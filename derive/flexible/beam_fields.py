@@ -1,0 +1,191 @@
+"""Euler-Bernoulli beam: from its displacement field and its energies to the integrands per length.
+
+A point of the section at x that lies at (y, z) in it moves by
+
+    u = (s, v, w) + theta x (0, y, z),    theta = (psi, -w', v')
+
+s, v, w displacements of the axis, psi twist.  The section's rotation enters the inertia as `turn`:
+theta itself where rotary inertia is kept; its twist, and what the section turns with the floating
+frame, where it is left out.  Strain is that of the axis, s' - y v'' - z w'', and the rate of twist
+psi'.  Bending does not stretch the axis, so that it draws each section towards the root by the
+second-order displacement u2 with u2' = -(v'^2 + w'^2)/2.
+
+The field is linear in the modal coordinates, so that every integral of the mass matrix is
+bilinear in two shapes k and l (Shabana, Dynamics of Multibody Systems, ch. 5).  The integrals over
+the section are done here; those along the beam are left to a quadrature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import sympy as sp
+
+from ..derivation import Derivation, Equation, Quantity, vector
+from ..notation import Matrix
+
+_Y, _Z, _X = sp.symbols("y z x", real=True)
+
+X = Quantity(vector("x", 1), "m", "place along the beam")
+INERTIA = Quantity(
+    vector("inertia", 3), "", "mass per length (kg/m), int rho y^2 dA, int rho z^2 dA (kg m)"
+)
+STIFFNESS = Quantity(
+    vector("stiffness", 4), "", "EA (N), GI_t, EI_y, EI_z (N m^2); EI_y bends along z"
+)
+SOURCES = ("Shabana, Dynamics of Multibody Systems, ch. 5",)
+
+
+def _shape(k: str) -> tuple[Quantity, ...]:
+    """The values of shape k at x: per unit of its modal coordinate."""
+    return (
+        Quantity(vector(f"axis_{k}", 3), "", f"displacement s, v, w of the axis by shape {k}"),
+        Quantity(vector(f"turn_{k}", 3), "", "rotation of the section that carries inertia"),
+        Quantity(vector(f"slope_{k}", 2), "", "v', w'"),
+        Quantity(vector(f"strain_{k}", 4), "", "s', psi', w'', v''"),
+    )
+
+
+SHAPE_K, SHAPE_L = _shape("k"), _shape("l")
+
+
+def _entries(quantity: Quantity) -> Matrix:
+    return Matrix([quantity.symbol[i, 0] for i in range(quantity.rows)])
+
+
+def _over_section(entry: sp.Expr, weights: Mapping[tuple[int, int], sp.Expr]) -> sp.Expr:
+    """int entry dA by the moments of the section about its centre and principal axes."""
+    terms = sp.Poly(entry, _Y, _Z).terms()
+    return sp.Add(*(c * weights.get(powers, sp.Integer(0)) for powers, c in terms))
+
+
+def _mass(matrix: Matrix) -> Matrix:
+    """int rho matrix dA: principal axes through the mass centre, so that odd moments vanish."""
+    m, yy, zz = _entries(INERTIA)
+    return matrix.applyfunc(lambda e: _over_section(e, {(0, 0): m, (2, 0): yy, (0, 2): zz}))
+
+
+def _point() -> Matrix:
+    """The undeformed place r0 of a point, from the root."""
+    return Matrix([X.symbol[0, 0], _Y, _Z])
+
+
+def displacement(axis: Matrix, turn: Matrix) -> Matrix:
+    """u at (y, z) of the section: the axis moves and the section turns about it."""
+    return Matrix(axis) + Matrix(turn).cross(Matrix([0, _Y, _Z]))
+
+
+def _field(shape: tuple[Quantity, ...]) -> Matrix:
+    return displacement(_entries(shape[0]), _entries(shape[1]))
+
+
+def _strain_of_axis() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+    """(axial strain at (y, z), the derivatives s', w'', v'' in it), from the displacement."""
+    s, v, w, psi = (sp.Function(name)(_X) for name in ("s", "v", "w", "psi"))
+    moved = displacement(Matrix([s, v, w]), Matrix([psi, -w.diff(_X), v.diff(_X)]))
+    return moved[0].diff(_X), (s.diff(_X), w.diff(_X, 2), v.diff(_X, 2))
+
+
+def strain_energy(strains: Matrix) -> sp.Expr:
+    """Strain energy per length (J/m) of s', psi', w'', v''."""
+    axial, derivatives = _strain_of_axis()
+    stretch, twist, curved_z, curved_y = strains
+    axial = axial.subs(dict(zip(derivatives, (stretch, curved_z, curved_y), strict=True)))
+    ea, git, eiy, eiz = _entries(STIFFNESS)
+    # E y^2 over the section is EI about z.
+    normal = _over_section(sp.expand(axial**2), {(0, 0): ea, (2, 0): eiz, (0, 2): eiy})
+    return (normal + git * twist**2) / 2
+
+
+def second_order(slopes: Matrix) -> sp.Expr:
+    """u2' of an axis that keeps its length: u2' + (v'^2 + w'^2)/2 = 0 (Green's axial strain)."""
+    rate = sp.Symbol("u2_x")
+    green = rate + (slopes[0] ** 2 + slopes[1] ** 2) / 2
+    return sp.solve(green, rate)[0]
+
+
+def _mixed(function: object, part: int) -> sp.Expr:
+    """d^2 function(eta_k shape_k + eta_l shape_l) / d eta_k d eta_l."""
+    k, l = sp.symbols("eta_k eta_l")  # noqa: E741
+    value = function(k * _entries(SHAPE_K[part]) + l * _entries(SHAPE_L[part]))  # type: ignore[operator]
+    return sp.expand(sp.diff(value, k, l))
+
+
+def rigid() -> Derivation:
+    """Integrands of the mass, of int r0 and of int r0 r0^T."""
+    r = _point()
+    mass, first = sp.MatrixSymbol("mass", 1, 1), vector("first", 3)
+    second = sp.MatrixSymbol("second", 3, 3)
+    return Derivation(
+        "beam",
+        "integrands per length of the rigid beam's mass, first and second moments",
+        (X, INERTIA),
+        (
+            Quantity(mass, "kg/m", "mass"),
+            Quantity(first, "kg", "int rho r0 dA"),
+            Quantity(second, "kg m", "int rho r0 r0^T dA", symmetric=True),
+        ),
+        (
+            Equation("mass", mass, _mass(Matrix([[1]]))),
+            Equation("first moment", first, _mass(r)),
+            Equation("second moment", second, _mass(Matrix(r * r.T)), symmetric=True),
+        ),
+        sources=SOURCES,
+        notes=("principal axes of the section through its mass centre",),
+    )
+
+
+def moments() -> Derivation:
+    """Integrands of C, E, F, of the stiffness and of the shortening, for shapes k and l."""
+    r, uk, ul = _point(), _field(SHAPE_K), _field(SHAPE_L)
+    c = vector("C", 3)
+    e, f = sp.MatrixSymbol("E", 3, 3), sp.MatrixSymbol("F", 3, 3)
+    stiffness, shortening = sp.MatrixSymbol("K", 1, 1), sp.MatrixSymbol("g", 1, 1)
+    return Derivation(
+        "beam",
+        "integrands per length of the moments of two shapes",
+        (X, INERTIA, STIFFNESS, *SHAPE_K, *SHAPE_L),
+        (
+            Quantity(c, "", "int rho u_k dA"),
+            Quantity(e, "", "int rho r0 u_k^T dA"),
+            Quantity(f, "", "int rho u_k u_l^T dA"),
+            Quantity(stiffness, "", "strain energy's second derivative by eta_k, eta_l"),
+            Quantity(shortening, "", "-u2' second derivative by eta_k, eta_l"),
+        ),
+        (
+            Equation("C", c, _mass(uk)),
+            Equation("E", e, _mass(Matrix(r * uk.T))),
+            Equation("F", f, _mass(Matrix(uk * ul.T))),
+            Equation("K", stiffness, Matrix([[_mixed(strain_energy, 3)]])),
+            Equation("g", shortening, Matrix([[_mixed(lambda a: -second_order(a), 2)]])),
+        ),
+        sources=SOURCES,
+        notes=(
+            "displacement u = (s, v, w) + theta x (0, y, z), theta = (psi, -w', v')",
+            "axial strain s' - y v'' - z w'', shear by the rate of twist psi' alone",
+            "second order: u2' = -(v'^2 + w'^2)/2, the axis keeps its length",
+        ),
+    )
+
+
+def section_rotation() -> Derivation:
+    """Displacement and rotation of a section from the values of the shapes at it."""
+    values = Quantity(vector("values", 4), "", "s, v, w, psi")
+    slopes = Quantity(vector("slopes", 2), "", "v', w'")
+    phi, theta = vector("phi", 3), vector("theta", 3)
+    s, v, w, psi = _entries(values)
+    return Derivation(
+        "beam",
+        "displacement and rotation vector of a section by one shape",
+        (values, slopes),
+        (Quantity(phi, "", "displacement of the axis"), Quantity(theta, "", "rotation vector")),
+        (
+            Equation("phi", phi, Matrix([s, v, w])),
+            Equation("theta", theta, Matrix([psi, -slopes.symbol[1, 0], slopes.symbol[0, 0]])),
+        ),
+        sources=SOURCES,
+    )
+
+
+#: Name -> derivation of every kernel of the beam.
+KERNELS = {"rigid": rigid, "moments": moments, "section": section_rotation}
