@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, model_validator
@@ -11,13 +10,10 @@ from . import scene_beam_checks as checks
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .expression import Expression
+from .scene_beam_checks import DIRECTIONS
 from .scene_flexible import AUTO, FlexibleTable, decided, framed
 from .scene_parts import End
 from .scene_rules import NAME, Refused, Shorthand, Table, found, plain, refuse
-
-#: Directions of the shapes in the order of the modal coordinates: deflection along y, along z,
-#: rotation about x, displacement along x.
-DIRECTIONS = ("y", "z", "twist", "axial")
 
 GIVEN = "given"
 BASES = (AUTO, "clamped-free", "free-free", "simply-supported", "static+fixed-interface", GIVEN)
@@ -191,6 +187,7 @@ class Beam(FlexibleTable, SectionTable):
         problems = list(checks.problems(self))
         if problems:
             raise Refused(*problems)
+        object.__setattr__(self, "section", checks.joined(self))
         return self
 
     def _all_ends(self) -> dict[str, End]:
@@ -224,9 +221,3 @@ def _as_end(value: Any) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return {"position": [value, 0.0, 0.0]}
     return value
-
-
-def iter_directions(beam: Beam) -> Iterator[tuple[str, int]]:
-    """(direction, number of shapes) for every direction that has some; none for "auto"."""
-    if beam.modes is not None:
-        yield from (one for one in zip(DIRECTIONS, beam.modes.counts, strict=True) if one[1])

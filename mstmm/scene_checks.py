@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 from . import scene_flexible_checks, topology
 from .expression import Expression
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
-from .scene_names import Scope, problem_with
+from .scene_names import Scope, flexible, problem_with
 from .scene_physics import triangle_excess
 from .scene_rules import GROUND, Location, split
 
@@ -171,29 +172,29 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 def _expressions(scene: Scene) -> Iterator[Problem]:
     hinges, bodies = scene.hinges, scene.skeleton.bodies
-    anywhere = Scope(hinges, bodies)
-    in_events = Scope(hinges, bodies, positions=True)
+    anywhere = Scope(hinges, bodies, flexible=flexible(scene))
+    in_events = replace(anywhere, positions=True)
     for i, hinge in enumerate(scene.hinge):
-        own = Scope(hinges, bodies, own=hinge)
+        own = replace(anywhere, own=hinge)
         for k, effort in enumerate(hinge.law.effort):
             yield from _names(effort, own, ("hinge", i, "law", "effort", k))
         if hinge.release is not None:
-            released = Scope(hinges, bodies, own=hinge, positions=True)
+            released = replace(in_events, own=hinge)
             yield from _names(hinge.release, released, ("hinge", i, "release"))
     for i, chain in enumerate(scene.chain):
         for j, table in enumerate(chain.hinge):
-            member = Scope(hinges, bodies, own=hinges[hinges.starts[i] + j])
+            member = replace(anywhere, own=hinges[hinges.starts[i] + j])
             for k, effort in enumerate(table.law.effort):
                 yield from _names(effort, member, ("chain", i, "hinge", j, "law", "effort", k))
     for i, load in enumerate(scene.load):
-        for key in ("force", "moment"):
-            for k, entry in enumerate(getattr(load, key)):
+        for key in ("force", "moment", "force_per_length"):
+            for k, entry in enumerate(getattr(load, key) or ()):
                 yield from _names(entry, anywhere, ("load", i, key, k))
     for i, event in enumerate(scene.event):
         yield from _names(event.when, in_events, ("event", i, "when"))
     for i, spring in enumerate(scene.spring):
         yield from _names(
-            spring.law.effort, Scope(hinges, bodies, spring=True), ("spring", i, "law", "effort")
+            spring.law.effort, replace(anywhere, spring=True), ("spring", i, "law", "effort")
         )
 
 

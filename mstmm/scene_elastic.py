@@ -10,16 +10,17 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from . import scene_elastic_checks as checks
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .rotations import Matrix, Vector, from_orientation
 from .scene_flexible import AUTO, FlexibleTable, Numbers, decided, framed
-from .scene_rules import Location, Refused, Rule, Table, found, plain, refuse
+from .scene_rules import NAME, Location, Refused, Rule, Shorthand, Table, found, plain, refuse
 
 #: Folder that relative paths start from while a scene file is read; "" leaves them as they are.
 FOLDER: ContextVar[str] = ContextVar("folder", default="")
 
-SOURCES = ("matrices", "arrays", "mesh", "box")
+SOURCES = checks.SOURCES
 REGIONS = ("nodes", "box", "plane", "sphere", "set")
 COUPLINGS = ("rigid", "mean")
 ORDERS = ("node", "component")
@@ -225,6 +226,20 @@ class ElasticEnd(Table):
         return self
 
 
+def _as_ends(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise refuse(f"expected {_ENDS.expected}, found {found(value)}")
+    for key in value:
+        if not isinstance(key, str) or not NAME.fullmatch(key):
+            raise refuse(f"expected the name of an end, found {found(key)}")
+    return value
+
+
+_ENDS = Shorthand(
+    "ends by name, each a table such as { plane = [1, 0, 0, 0.0] }", _as_ends, {"type": "object"}
+)
+
+
 class Elastic(FlexibleTable):
     """A general elastic body; its axes are those of its mesh.
 
@@ -244,9 +259,16 @@ class Elastic(FlexibleTable):
     modes: Annotated[int | None, decided(rules.whole(0, MAX_MODES))] = None
     frame: Annotated[str, framed(AUTO, "tangent", "mean")] = AUTO
     highest_frequency: Annotated[float | None, rules.number("rad/s", above=0)] = None
-    ends: dict[str, ElasticEnd] = Field(default_factory=dict)
+    ends: Annotated[dict[str, ElasticEnd], _ENDS] = Field(default_factory=dict)
 
     @property
     def source(self) -> str:
         """Which key tells what the body is made of: matrices, arrays, mesh or box."""
         return next(key for key in SOURCES if getattr(self, key) is not None)
+
+    @model_validator(mode="after")
+    def _check(self) -> Elastic:
+        problems = list(checks.problems(self))
+        if problems:
+            raise Refused(*problems)
+        return self

@@ -32,6 +32,12 @@ class Damping(Table):
     ] = (0.0,)
     stiffness: Annotated[float, rules.number("s", minimum=0)] = 0.0
 
+    @model_validator(mode="after")
+    def _check(self) -> Damping:
+        if not self.ratio:
+            raise refuse("expected a modal damping ratio or more, found an empty list", "ratio")
+        return self
+
     @property
     def acts(self) -> bool:
         """True when there is any damping."""

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from .expression import Name
 from .scene_errors import near
 
 if TYPE_CHECKING:
+    from .scene import Scene
     from .scene_members import Bodies, Hinges
     from .scene_parts import Hinge
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """What expressions may say of a flexible body: names of its modal coordinates, None where they
+    are not known before it is compiled; whether its bare name is a place."""
+
+    modes: tuple[str, ...] | None
+    is_place: bool
+
+
+def flexible(scene: Scene) -> dict[str, Flexible]:
+    """The flexible bodies of a scene by name."""
+    beams = {
+        beam.name: Flexible(beam.modes.names if beam.modes is not None else None, True)
+        for beam in scene.beam
+    }
+    return beams | {elastic.name: Flexible(None, False) for elastic in scene.elastic}
+
 
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
 
@@ -22,6 +42,7 @@ class Scope:
 
     `own` is the hinge whose `q`, `u` and parameters need no prefix, `spring` means that `q` and
     `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
+    `flexible` are the flexible bodies by name, whose q and u are the modal coordinates.
     """
 
     hinges: Hinges
@@ -29,12 +50,15 @@ class Scope:
     own: Hinge | None = None
     spring: bool = False
     positions: bool = False
+    flexible: Mapping[str, Flexible] = field(default_factory=dict)
 
 
 def problem_with(name: Name, scope: Scope) -> str | None:
     """Why the name means nothing in this scope; None where it means something."""
     if len(name.parts) == 1:
         return _bare(name, scope)
+    if name.owner in scope.flexible and name.quantity not in POSITIONS:
+        return _modal(name, scope.flexible[name.owner])
     if name.quantity in ("q", "u") and (len(name.parts) == 2 or name.is_member):
         hinge = scope.hinges.find(name.hinge)
         if hinge is None:
@@ -64,6 +88,23 @@ def _bare(name: Name, scope: Scope) -> str | None:
     return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
 
 
+def _modal(name: Name, body: Flexible) -> str | None:
+    """A modal coordinate or its rate: blade.q[0], blade.u[0]."""
+    if len(name.parts) == 2 and name.quantity in ("q", "u"):
+        if body.modes is None:
+            if name.index is not None:
+                return None
+            return f"{name.text!r}: say which shape, as in {name.text}[0]"
+        return index_problem(name, name.owner, len(body.modes), "flexible body")
+    if len(name.parts) == 2 and name.quantity in (body.modes or ()):
+        place = (body.modes or ()).index(name.quantity)
+        return f"{name.text!r} is unknown; write {name.owner}.q[{place}]"
+    return (
+        f"{name.text!r} is unknown; of a flexible body there is {name.owner}.q[0], "
+        f"{name.owner}.u[0], and in events x, y, z, vx, vy, vz of its ends"
+    )
+
+
 def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:
     """Does the hinge have this coordinate?  User types are checked with their definition."""
     kind = hinge.builtin
@@ -73,17 +114,17 @@ def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:
     return index_problem(name, called, len(entries))
 
 
-def index_problem(name: Name, hinge: str, count: int) -> str | None:
+def index_problem(name: Name, hinge: str, count: int, word: str = "hinge") -> str | None:
     """Message if a hinge with `count` coordinates has no entry of this index."""
     if count == 0:
-        return f'{name.text!r}: hinge "{hinge}" is fixed and has no coordinates'
+        return f'{name.text!r}: {word} "{hinge}" is fixed and has no coordinates'
     if name.index is None and count > 1:
         return (
-            f'{name.text!r}: hinge "{hinge}" has {count} entries; '
+            f'{name.text!r}: {word} "{hinge}" has {count} entries; '
             f"write {name.text}[0] to {name.text}[{count - 1}]"
         )
     if name.index is not None and name.index >= count:
-        return f'{name.text!r}: the last entry of hinge "{hinge}" is [{count - 1}]'
+        return f'{name.text!r}: the last entry of {word} "{hinge}" is [{count - 1}]'
     return None
 
 
@@ -100,4 +141,8 @@ def _position(name: Name, scope: Scope) -> str | None:
         return scope.bodies.missing(name.owner, repr(name.owner))
     if len(name.parts) == 3 and name.parts[1] not in ends:
         return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], ends)}'
+    body = scope.flexible.get(name.owner)
+    if len(name.parts) == 2 and body is not None and not body.is_place:
+        end = f"{name.owner}.{next(iter(ends), 'tip')}.{name.quantity}"
+        return f"{name.text!r}: an elastic body is met at its ends alone; write {end}"
     return None

@@ -264,6 +264,29 @@ class Load(Table):
     ] = None
     axes: Annotated[str, texts.body('"inertial", "body" or the name of a body')] = "inertial"
 
+    @model_validator(mode="after")
+    def _check(self) -> Load:
+        if self.force_per_length is None:
+            if self.span is not None:
+                raise refuse("only force_per_length acts on a span; leave it out", "span")
+            return self
+        for key in ("force", "moment"):
+            if not all(entry.is_zero for entry in getattr(self, key)):
+                raise refuse(
+                    f"{key} acts on one point, force_per_length on a beam; write two loads", key
+                )
+        if split(self.on)[1]:
+            raise refuse(
+                "expected the name of a beam alone for a load per length, found "
+                f"{found(self.on)}; write {found(split(self.on)[0])}, and span for a part of it",
+                "on",
+            )
+        if self.span is not None and not 0 <= self.span[0] < self.span[1]:
+            raise refuse(
+                f"expected [from, to] in m with 0 <= from < to, found {found(self.span)}", "span"
+            )
+        return self
+
 
 class Event(Table):
     """Something that happens when a comparison begins to hold: stop, or release a hinge."""

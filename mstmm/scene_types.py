@@ -165,8 +165,8 @@ def _all_expressions(scene: Scene) -> Iterator[tuple[Location, Expression, Hinge
         if hinge.release is not None:
             yield ("hinge", i, "release"), hinge.release, hinge
     for i, load in enumerate(scene.load):
-        for key in ("force", "moment"):
-            for k, entry in enumerate(getattr(load, key)):
+        for key in ("force", "moment", "force_per_length"):
+            for k, entry in enumerate(getattr(load, key) or ()):
                 yield ("load", i, key, k), entry, None
     for i, event in enumerate(scene.event):
         yield ("event", i, "when"), event.when, None
