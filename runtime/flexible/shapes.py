@@ -34,8 +34,8 @@ class Shape(Protocol):
         """Places (m) between which the function is smooth, its own ends included."""
 
     @property
-    def waves(self) -> float:
-        """Number of half-waves between two neighbouring breaks, for the choice of Gauss points."""
+    def density(self) -> float:
+        """Half-waves per metre between breaks, 0 for a low polynomial: how many Gauss points."""
 
     def __call__(self, x: Array, d: int = 0) -> Array:
         """Derivative number `d` (0 to 4) at every x (m)."""
@@ -104,8 +104,8 @@ class Eigenfunction:
         return (self.start, self.end)
 
     @property
-    def waves(self) -> float:
-        return self.number + 1.0
+    def density(self) -> float:
+        return (self.number + 1.0) / (self.end - self.start)
 
     @property
     def beta(self) -> float:
@@ -156,8 +156,8 @@ class Sine:
         return (self.start, self.end)
 
     @property
-    def waves(self) -> float:
-        return float(self.number)
+    def density(self) -> float:
+        return self.number / (self.end - self.start)
 
     @property
     def beta(self) -> float:
@@ -176,10 +176,11 @@ class Sine:
 class Piecewise:
     """Polynomials between nodes: `coefficients[i, j]` of (x - nodes[i])^j on piece i."""
 
-    def __init__(self, nodes: Array, coefficients: Array, waves: float = 2.0) -> None:
+    density = 0.0
+
+    def __init__(self, nodes: Array, coefficients: Array) -> None:
         self.nodes = np.asarray(nodes, dtype=float)
         self.coefficients = np.asarray(coefficients, dtype=float)
-        self.waves = waves
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -205,8 +206,8 @@ class Moved:
         return self.shape.breaks
 
     @property
-    def waves(self) -> float:
-        return self.shape.waves
+    def density(self) -> float:
+        return self.shape.density
 
     def __call__(self, x: Array, d: int = 0) -> Array:
         value = self.shape(x, d)
