@@ -15,6 +15,7 @@ from mstmm.ir import (
     Constant,
     Element,
     Guard,
+    Inner,
     KernelIR,
     Operand,
     Port,
@@ -119,19 +120,14 @@ class KernelText:
         return used
 
     def _statement(self, statement: object) -> dict[str, Any]:
-        if isinstance(statement, Assign):
-            return self._assign(statement)
-        if isinstance(statement, Sum):
-            body = [self._assign(a) for a in statement.body]
-            value = self.operand(statement.value)
-            return {"kind": "sum", "number": statement.number, "body": body, "value": value}
+        if isinstance(statement, (Assign, Sum)):
+            return self._inner(statement)
         if isinstance(statement, Store):
             port = self.ports[statement.port]
-            looped = any(isinstance(entry, str) for entry in statement.index)
             return {
                 "kind": "store",
-                "looped": looped,
-                "body": [self._assign(a) for a in statement.body],
+                "loops": statement.loops,
+                "body": [self._inner(a) for a in statement.body],
                 "target": self._entry(port, statement.index),
                 "sign": "+=" if port.accumulate else "=",
                 "value": self.operand(statement.value),
@@ -145,6 +141,17 @@ class KernelText:
             }  # fmt: skip
         assert isinstance(statement, Solve)
         return self._solve(statement)
+
+    def _inner(self, statement: Inner) -> dict[str, Any]:
+        if isinstance(statement, Assign):
+            return self._assign(statement)
+        return {
+            "kind": "sum",
+            "number": statement.number,
+            "over": statement.over,
+            "body": [self._inner(inner) for inner in statement.body],
+            "value": self.operand(statement.value),
+        }
 
     def _assign(self, assign: Assign) -> dict[str, Any]:
         if assign.op in TRUTH_VALUED:
@@ -215,7 +222,7 @@ def _operands(statement: object) -> list[Operand]:
     if isinstance(statement, Assign):
         return list(statement.args)
     if isinstance(statement, (Sum, Store)):
-        inner = [operand for assign in statement.body for operand in assign.args]
+        inner = [operand for line in statement.body for operand in _operands(line)]
         return [*inner, statement.value]
     if isinstance(statement, Guard):
         return [statement.condition]

@@ -8,7 +8,7 @@ definitions are lowered; the premises are what the checks compare the lowered ke
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -18,7 +18,8 @@ import sympy as sp
 class Quantity:
     """A named array: MatrixSymbol `symbol` of shape (rows, columns); columns = 1 for a vector.
 
-    `symmetric` quantities are stored as their upper triangle, row by row.
+    `symmetric` quantities are stored as their upper triangle, row by row.  Either extent may be a
+    symbol, the size that is known at run time; such quantities are stored full, symmetric or not.
     """
 
     symbol: sp.MatrixSymbol
@@ -38,6 +39,17 @@ class Quantity:
     @property
     def columns(self) -> int:
         return int(self.symbol.cols)
+
+    @property
+    def shape(self) -> tuple[int | str, int | str]:
+        """Rows and columns; a size known at run time by its name."""
+        rows, columns = (int(e) if e.is_Integer else str(e) for e in self.symbol.shape)
+        return rows, columns
+
+    @property
+    def sized(self) -> bool:
+        """Whether an extent is known at run time only."""
+        return any(isinstance(extent, str) for extent in self.shape)
 
 
 @dataclass(frozen=True)
@@ -71,6 +83,42 @@ class Derivation:
     premises: tuple[Equation, ...] = ()
     sources: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> sp.Symbol | None:
+        """The size that is known at run time; ValueError where there are two."""
+        symbols = [q.symbol for q in (*self.inputs, *self.outputs)]
+        symbols += [e.left for e in self.definitions]
+        found = {extent for s in symbols for extent in s.shape if not extent.is_Integer}
+        if len(found) > 1 or not all(extent.is_Symbol for extent in found):
+            raise ValueError(
+                f"{self.element}: more than one run-time size: {sorted(map(str, found))}"
+            )
+        return found.pop() if found else None
+
+    def at_size(self, n: int) -> Derivation:
+        """The same derivation with the run-time size replaced by a number."""
+        size = self.size
+        if size is None:
+            return self
+        known = {size: sp.Integer(n)}
+
+        def quantity(q: Quantity) -> Quantity:
+            symbol = q.symbol.xreplace(known)
+            return replace(q, symbol=symbol, symmetric=q.symmetric and not q.sized)
+
+        def equation(e: Equation) -> Equation:
+            computed = None if e.computed is None else e.computed.xreplace(known)
+            left, right = e.left.xreplace(known), e.right.xreplace(known)
+            return replace(e, left=left, right=right, computed=computed)
+
+        return replace(
+            self,
+            inputs=tuple(map(quantity, self.inputs)),
+            outputs=tuple(map(quantity, self.outputs)),
+            definitions=tuple(map(equation, self.definitions)),
+            premises=tuple(map(equation, self.premises)),
+        )
 
     def definition(self, name: str) -> sp.Basic:
         """Right-hand side of the definition of `name`; KeyError if there is none."""

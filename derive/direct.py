@@ -16,6 +16,7 @@ import mpmath
 import sympy as sp
 from sympy.core.relational import Relational
 from sympy.matrices.expressions.matexpr import MatrixElement
+from sympy.matrices.expressions.slice import MatrixSlice
 
 from .derivation import Derivation, Factor, Quantity, Solve, Triangular
 
@@ -48,13 +49,16 @@ def evaluate_equations(
     inputs: Mapping[str, Any],
     guards: Iterable[tuple[sp.Basic, int, str]] = (),
     digits: int = 50,
+    n: int = 0,
 ) -> DirectValue:
     """Outputs of the derivation's definitions at `digits` decimal digits, each a flat list.
 
     `inputs[name]` are the numbers as the kernel takes them (row-major, symmetric quantities as
-    their upper triangle); floats count as the exact numbers they are.  Raises GuardBroken where a
+    their upper triangle); floats count as the exact numbers they are.  `n` replaces the run-time
+    size of a derivation that has one.  Raises GuardBroken where a
     guard does not hold and Undefined where an equation has no finite value.
     """
+    derivation = derivation.at_size(n)
     with mpmath.workdps(digits):
         values = _Values(digits)
         for quantity in derivation.inputs:
@@ -179,6 +183,10 @@ class _Values:
             return self.matrix(e.arg).T
         if isinstance(e, sp.BlockMatrix):
             return self._blocks(e, height, width)
+        if isinstance(e, MatrixSlice):
+            whole = self.matrix(e.parent)
+            rows, columns = (range(*map(int, part)) for part in (e.rowslice, e.colslice))
+            return mpmath.matrix([[whole[i, j] for j in columns] for i in rows])
         if isinstance(e, sp.Identity):
             return mpmath.eye(height)
         if isinstance(e, sp.ZeroMatrix):

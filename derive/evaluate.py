@@ -7,15 +7,20 @@ their real domain give NaN or an infinity as IEEE arithmetic has it, never an ex
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import product
 from typing import Any
 
 import mpmath
 
 from mstmm.errors import NumericalFailure
 from mstmm.ir import (
+    INNER_INDEX,
+    LOOP_INDEX,
+    LOOPS,
     Assign,
     Constant,
     Guard,
+    Inner,
     KernelIR,
     Operand,
     Port,
@@ -86,10 +91,13 @@ class _Run:
     def __init__(self, kernel: KernelIR, arithmetic: Arithmetic, n: int) -> None:
         self.kernel, self.arithmetic, self.n = kernel, arithmetic, n
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
-        self.arrays: dict[str, list[Any]] = {}
         self.temporaries: dict[int, Any] = {}
         zero = arithmetic.number("0")
         self.results = {port.name: [zero] * port.length(n) for port in kernel.outputs}
+        #: What can be read: inputs, and outputs that are complete.
+        self.arrays: dict[str, list[Any]] = dict(self.results)
+        #: Where the loops stand.
+        self._loops = dict.fromkeys(LOOPS, 0)
         self._constants: dict[str, Any] = {}
 
     def read(self, port: Port, values: Values) -> list[Any]:
@@ -102,47 +110,50 @@ class _Run:
         return row
 
     def execute(self, statement: Statement) -> None:
-        if isinstance(statement, Assign):
-            self._assign(statement, 0)
-        elif isinstance(statement, Sum):
-            total = self.arithmetic.number("0")
-            for k in range(self.n):
-                for assign in statement.body:
-                    self._assign(assign, k)
-                total = total + self._value(statement.value, k)
-            self.temporaries[statement.number] = total
+        if isinstance(statement, (Assign, Sum)):
+            self._inner(statement)
         elif isinstance(statement, Store):
-            looped = any(isinstance(entry, str) for entry in statement.index)
-            for k in range(self.n if looped else 1):
-                self._store(statement, k)
+            self._store(statement)
         elif isinstance(statement, Guard):
-            if not self.arithmetic.true(self._value(statement.condition, 0)):
+            if not self.arithmetic.true(self._value(statement.condition)):
                 raise GuardFailure(self.kernel.name, statement.code, statement.message)
         else:
             self._solve(statement)
 
-    def _assign(self, assign: Assign, k: int) -> None:
-        operation: Callable[..., Any] = self.arithmetic.operations[assign.op]
-        self.temporaries[assign.number] = operation(*(self._value(a, k) for a in assign.args))
+    def _inner(self, statement: Inner) -> None:
+        if isinstance(statement, Assign):
+            operation: Callable[..., Any] = self.arithmetic.operations[statement.op]
+            self.temporaries[statement.number] = operation(*map(self._value, statement.args))
+            return
+        total = self.arithmetic.number("0")
+        for place in range(self.n):
+            self._loops[statement.over] = place
+            for inner in statement.body:
+                self._inner(inner)
+            total = total + self._value(statement.value)
+        self.temporaries[statement.number] = total
 
-    def _value(self, operand: Operand, k: int) -> Any:
+    def _value(self, operand: Operand) -> Any:
         if isinstance(operand, Temporary):
             return self.temporaries[operand.number]
         if isinstance(operand, Constant):
             if operand.text not in self._constants:
                 self._constants[operand.text] = self.arithmetic.constant(operand)
             return self._constants[operand.text]
-        place = self.ports[operand.port].offset(operand.index, self.n, k)
-        return self.arrays[operand.port][place]
+        return self.arrays[operand.port][self._place(operand.port, operand.index)]
 
-    def _store(self, store: Store, k: int) -> None:
-        for assign in store.body:
-            self._assign(assign, k)
-        port = self.ports[store.port]
-        place = port.offset(store.index, self.n, k)
-        value = self._value(store.value, k)
-        row = self.results[store.port]
-        row[place] = row[place] + value if port.accumulate else value
+    def _place(self, name: str, index: tuple[int | str, ...]) -> int:
+        at = self._loops
+        return self.ports[name].offset(index, self.n, at[LOOP_INDEX], at[INNER_INDEX])
+
+    def _store(self, store: Store) -> None:
+        accumulate, row = self.ports[store.port].accumulate, self.results[store.port]
+        for places in product(range(self.n), repeat=len(store.loops)):
+            self._loops.update(zip(store.loops, places, strict=True))
+            for inner in store.body:
+                self._inner(inner)
+            place, value = self._place(store.port, store.index), self._value(store.value)
+            row[place] = row[place] + value if accumulate else value
 
     def _solve(self, solve: Solve) -> None:
         """LDL^T without pivoting, in the order of the generated C."""

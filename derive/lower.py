@@ -32,19 +32,24 @@ def lower(
     """KernelIR of the derivation's definitions.
 
     `guards` are (condition, failure code, message) over the derivation's quantities.
+    Quantities with a run-time size are lowered as `lower_sized` says.
     Raises NotImplementedError, naming the expression, for SymPy that has no counterpart in the IR.
     """
-    lowering = _Lowering(derivation.inputs)
+    from .lower_sized import SizedLowering
+
+    size = derivation.size
+    lowering = Lowering(derivation) if size is None else SizedLowering(derivation, size)
     for equation in derivation.definitions:
         lowering.define(equation)
     for condition, code, message in guards:
         lowering.graph.guard(lowering.scalar(condition), code, message)
-    values: dict[str, object] = {q.name: lowering.stored(q) for q in derivation.outputs}
+    values = {q.name: lowering.stored(q) for q in derivation.outputs if not q.sized}
     return lowering.graph.kernel(
         name,
         [port(q) for q in derivation.inputs],
         [port(q) for q in derivation.outputs],
         values,
+        size_symbol=None if size is None else str(size),
         purpose=derivation.title,
         sources=derivation.sources,
     )
@@ -52,23 +57,25 @@ def lower(
 
 def port(quantity: Quantity) -> Port:
     """How a quantity is stored: upper triangle, vector or row-major matrix."""
-    if quantity.symmetric:
-        shape: tuple[int, ...] = (quantity.rows * (quantity.rows + 1) // 2,)
-    elif quantity.columns == 1:
-        shape = (quantity.rows,)
-    else:
-        shape = (quantity.rows, quantity.columns)
+    rows, columns = quantity.shape
+    shape: tuple[int | str, ...] = (rows, columns)
+    if quantity.symmetric and isinstance(rows, int):
+        shape = (rows * (rows + 1) // 2,)
+    elif columns == 1:
+        shape = (rows,)
     return Port(
         quantity.name, shape, quantity.unit, quantity.meaning, accumulate=quantity.accumulate
     )
 
 
-class _Lowering:
+class Lowering:
     """Evaluates SymPy matrix expressions over graph nodes."""
 
-    def __init__(self, inputs: tuple[Quantity, ...]) -> None:
+    def __init__(self, derivation: Derivation) -> None:
         self.graph = Graph()
-        self.known: dict[str, NodeMatrix] = {q.name: self._input(q) for q in inputs}
+        self.known: dict[str, NodeMatrix] = {
+            q.name: self._input(q) for q in derivation.inputs if not q.sized
+        }
         self._scalars: dict[sp.Basic, Node] = {}
 
     def _input(self, quantity: Quantity) -> NodeMatrix:
@@ -108,6 +115,7 @@ class _Lowering:
             (sp.MatMul, self._product),
             (sp.Transpose, lambda e: _transpose(self.matrix(e.arg))),
             (sp.BlockMatrix, self._blocks),
+            (sp.matrices.expressions.slice.MatrixSlice, self._slice),
             (sp.Identity, lambda e: self._explicit(sp.eye(int(e.rows)))),
             (sp.ZeroMatrix, lambda e: self._explicit(sp.zeros(int(e.rows), int(e.cols)))),
             (Solve, self._solve),
@@ -165,6 +173,11 @@ class _Lowering:
             parts = [self.matrix(blocks[i, j]) for j in range(blocks.cols)]
             rows += [sum(pieces, []) for pieces in zip(*parts, strict=True)]
         return rows
+
+    def _slice(self, expression: sp.Basic) -> NodeMatrix:
+        rows, columns = expression.rowslice, expression.colslice
+        whole = self.matrix(expression.parent)
+        return [[whole[i][j] for j in range(*map(int, columns))] for i in range(*map(int, rows))]
 
     def _solve(self, expression: Solve) -> NodeMatrix:
         matrix, right = self.matrix(expression.matrix), self.matrix(expression.right)

@@ -192,7 +192,7 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
     written = {text.names[s.port] for s in kernel.statements if hasattr(s, "port")}
     names = [text.names[port.name] for port in (*kernel.inputs, *kernel.outputs)]
     unused = [name for name in names if name not in used | written]
-    looped = any(s["kind"] in ("sum", "solve") or s.get("looped") for s in statements)
+    looped = any(s["kind"] in ("sum", "solve") or s.get("loops") for s in statements)
     sized = any("n *" in str(s) for s in statements)
     return {
         "name": kernel.name,

@@ -146,7 +146,7 @@ def _quantities(quantities: Iterable[Quantity]) -> Quantities:
             QuantityRow(
                 Name(shown_name(q.name)),
                 q.name,
-                f"{q.rows}" if q.columns == 1 else f"{q.rows} × {q.columns}",
+                " × ".join(map(str, q.shape if q.shape[1] != 1 else q.shape[:1])),
                 q.unit,
                 q.meaning + (" (symmetric, upper triangle)" if q.symmetric else ""),
             )

@@ -19,18 +19,18 @@ def listing(kernel: KernelIR) -> list[str]:
     return lines
 
 
-def _lines(statement: Statement) -> list[str]:
+def _lines(statement: Statement, indent: str = "") -> list[str]:
     if isinstance(statement, Assign):
-        return [_assign(statement)]
+        return [indent + _assign(statement)]
     if isinstance(statement, Sum):
-        body = [f"    {_assign(a)}" for a in statement.body]
-        head = f"t{statement.number} = sum over k < n of {_operand(statement.value)}"
+        over = statement.over
+        head = f"{indent}t{statement.number} = sum over {over} < n of {_operand(statement.value)}"
+        body = _body(statement, indent)
         return [f"{head} with", *body] if body else [head]
     if isinstance(statement, Store):
         place = statement.port + "".join(f"[{i}]" for i in statement.index)
-        looped = "k" in statement.index
-        line = f"{place} = {_operand(statement.value)}" + ("  for k < n" if looped else "")
-        return [*(f"    {_assign(a)}" for a in statement.body), line]
+        looped = f"  for {', '.join(statement.loops)} < n" if statement.loops else ""
+        return [*_body(statement, indent), f"{place} = {_operand(statement.value)}{looped}"]
     if isinstance(statement, Guard):
         condition = _operand(statement.condition)
         return [f"leave with code {statement.code} unless {condition}: {statement.message}"]
@@ -38,6 +38,10 @@ def _lines(statement: Statement) -> list[str]:
         f"{statement.port} = solve({statement.matrix}, {statement.right})  "
         f"else code {statement.code}: {statement.message}"
     ]
+
+
+def _body(statement: Sum | Store, indent: str) -> list[str]:
+    return [line for inner in statement.body for line in _lines(inner, indent + "    ")]
 
 
 def _assign(assign: Assign) -> str:

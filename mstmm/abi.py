@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import textwrap
 
-from .ir import KernelIR, Port, Solve
+from .ir import LOOPS, KernelIR, Port, Solve
 
 #: Number of the layout below; changed with every change of it, and checked when a module opens.
 ABI = 2
@@ -133,12 +133,13 @@ def parameter_names(kernel: KernelIR) -> dict[str, str]:
     ValueError if a port's name has characters C does not know.
     """
     names: dict[str, str] = {}
+    loops = LOOPS if kernel.size_symbol else ()
     taken = {port.name for port in (*kernel.inputs, *kernel.outputs)}
     for port in (*kernel.inputs, *kernel.outputs):
         if not _NAME.fullmatch(port.name):
             raise ValueError(f"{kernel.name}: port {port.name!r} is not a name C accepts")
         name = port.name
-        while name in _RESERVED or _TEMPORARY.fullmatch(name):
+        while name in _RESERVED or name in loops or _TEMPORARY.fullmatch(name):
             name += "_"
         while name != port.name and name in taken:
             name += "_"

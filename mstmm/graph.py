@@ -9,14 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from .ir import (
+    INNER_INDEX,
     LOOP_INDEX,
+    LOOPS,
     OPERATIONS,
     Assign,
     Constant,
     Element,
     Guard,
+    Inner,
     KernelIR,
     Operand,
     Port,
@@ -31,6 +35,9 @@ Number = int | float | Fraction
 _COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
 
 
+#: Loop variable -> its bit in `Node.loops`.
+_BITS = {LOOP_INDEX: 1, INNER_INDEX: 2}
+
 #: What folding asks of a constant, answered once: comparing fractions is slow.
 _ZERO, _ONE, _MINUS_ONE, _POSITIVE, _NEGATIVE = 1, 2, 3, 4, 5
 
@@ -44,7 +51,7 @@ def _kind(value: Fraction) -> int:
 class Node:
     """One value of a `Graph`.  Made by the graph's methods and by + - * / ** on other nodes."""
 
-    __slots__ = ("args", "graph", "kind", "leaf", "looped", "number", "op", "value")
+    __slots__ = ("args", "graph", "kind", "leaf", "loops", "number", "op", "value")
 
     def __init__(
         self,
@@ -53,10 +60,12 @@ class Node:
         op: str,
         args: tuple[Node, ...],
         leaf: Fraction | Element | str | None,
-        looped: bool,
+        loops: int,
     ) -> None:
         self.graph, self.number, self.op, self.args = graph, number, op, args
-        self.leaf, self.looped = leaf, looped
+        self.leaf = leaf
+        #: Loop variables that the value depends on, as bits.
+        self.loops = loops
         #: The exact number if this node is a rational constant, else None.
         self.value: Fraction | None = leaf if isinstance(leaf, Fraction) else None
         self.kind = 0 if self.value is None else _kind(self.value)
@@ -99,6 +108,12 @@ class _GuardRequest:
     message: str
 
 
+@dataclass(frozen=True)
+class _StoreRequest:
+    port: Port
+    value: object
+
+
 class Graph:
     """Hash-consed expression graph of one kernel."""
 
@@ -106,9 +121,9 @@ class Graph:
         self._nodes: dict[tuple[object, ...], Node] = {}
         self._whole: dict[int, Node] = {}
         self._count = 0
-        self._guards: list[_GuardRequest] = []
-        self._solves: list[Solve] = []
-        self._solve_inputs: set[str] = set()
+        self._swapped: dict[int, Node] = {}
+        #: Guards, solves and stores in the order in which they were asked for.
+        self._requests: list[_GuardRequest | Solve | _StoreRequest] = []
 
     # --- leaves ---------------------------------------------------------------------------
 
@@ -118,10 +133,7 @@ class Graph:
         key = (op, leaf, *(a.number for a in args))
         found = self._nodes.get(key)
         if found is None:
-            looped = any(a.looped for a in args) and op != "sum"
-            if isinstance(leaf, Element):
-                looped = LOOP_INDEX in leaf.index
-            found = Node(self, self._count, op, args, leaf, looped)
+            found = Node(self, self._count, op, args, leaf, _loops(op, args, leaf))
             self._count += 1
             self._nodes[key] = found
         return found
@@ -146,7 +158,7 @@ class Graph:
         return value if isinstance(value, Node) else self.constant(value)
 
     def element(self, port: str, *index: int | str) -> Node:
-        """Entry of an input array; `LOOP_INDEX` marks the loop variable."""
+        """Entry of an array; `LOOP_INDEX` and `INNER_INDEX` mark loop variables."""
         return self._make("element", leaf=Element(port, index))
 
     def vector(self, port: str, length: int) -> list[Node]:
@@ -298,22 +310,54 @@ class Graph:
     def select(self, condition: Node, yes: Node | Number, no: Node | Number) -> Node:
         return self.call("select", condition, yes, no)
 
-    def sum_over_modes(self, term: Node) -> Node:
-        """Sum of `term` (which contains `LOOP_INDEX`) over k < n."""
-        return self._make("sum", (term,))
+    def sum_over_modes(self, term: Node, over: str = LOOP_INDEX) -> Node:
+        """Sum of `term` over the loop variable `over` < n.
+
+        A sum that depends on no other loop runs over `LOOP_INDEX`, whatever its letter was, so
+        that equal sums are one node.
+        """
+        if term.kind == _ZERO:
+            return term
+        if over != LOOP_INDEX and not term.loops & _BITS[LOOP_INDEX]:
+            return self._make("sum", (self._swap(term),), LOOP_INDEX)
+        return self._make("sum", (term,), over)
+
+    def _swap(self, node: Node) -> Node:
+        """The same value with the two loop variables exchanged."""
+        if not node.loops:
+            return node
+        found = self._swapped.get(node.number)
+        if found is None:
+            if isinstance(node.leaf, Element):
+                index = [_other(e) if isinstance(e, str) else e for e in node.leaf.index]
+                found = self.element(node.leaf.port, *index)
+            elif node.op == "sum":
+                found = self._make("sum", (self._swap(node.args[0]),), _other(str(node.leaf)))
+            else:
+                found = self.call(node.op, *(self._swap(a) for a in node.args))
+            self._swapped[node.number] = found
+        return found
 
     # --- requests that are not values ---------------------------------------------------------
 
     def guard(self, condition: Node, code: int, message: str) -> None:
         """Leave with `code` unless `condition` holds."""
         if condition.value is None:
-            self._guards.append(_GuardRequest(condition, code, message))
+            self._requests.append(_GuardRequest(condition, code, message))
         elif condition.value == 0:
             raise ValueError(f"this can never be computed: {message}")
 
     def solve(self, output: str, matrix: str, right: str, code: int, message: str) -> None:
-        """Run-time sized solve between input arrays; the result is the named output."""
-        self._solves.append(Solve(output, matrix, right, code, message))
+        """Run-time sized solve between readable arrays; the result is the named output."""
+        self._requests.append(Solve(output, matrix, right, code, message))
+
+    def store(self, port: Port, value: object) -> None:
+        """Write an output now (kernels with run-time size), so that it can be read afterwards.
+
+        `value` is what `kernel` takes as `values[port]`.  With a store asked for, guards, solves
+        and stores keep the order in which they were asked for.
+        """
+        self._requests.append(_StoreRequest(port, value))
 
     # --- linearisation: graph -> KernelIR -------------------------------------------------------
 
@@ -336,19 +380,21 @@ class Graph:
 
         `values[port]` is a node, or a nested list of nodes in the port's shape; an entry None is
         not stored.  An axis of the size symbol has no list: one value, which may contain
-        `LOOP_INDEX`, stands for all k < n.
+        `LOOP_INDEX` (for a second such axis `INNER_INDEX`), stands for all k < n.
         """
         writer = _Writer(self)
         if as_made:
-            writer.as_made(self._guards, outputs, values)
+            guards = [r for r in self._requests if isinstance(r, _GuardRequest)]
+            writer.as_made(guards, outputs, values)
             return KernelIR(
                 name, tuple(inputs), tuple(outputs), tuple(writer.statements), None, purpose,
                 tuple(sources),
             )  # fmt: skip
-        writer.statements.extend(self._solves)
-        for request in self._guards:
-            condition = writer.operand(request.condition)
-            writer.statements.append(Guard(condition, request.code, request.message))
+        requests = self._requests
+        if not any(isinstance(r, _StoreRequest) for r in requests):
+            requests = sorted(requests, key=lambda r: not isinstance(r, Solve))  # solves first
+        for request in requests:
+            writer.request(request)
         for port in outputs:
             if port.name in values:
                 writer.store(port, values[port.name])
@@ -365,13 +411,28 @@ _ARITHMETIC: dict[str, Callable[..., Node]] = {
 }  # fmt: skip
 
 
+class _Level:
+    """What stands inside the same loops: statements, and operands known there."""
+
+    def __init__(self, loops: int, outer: _Level | None, statements: list[Any]) -> None:
+        self.loops, self.outer, self.statements = loops, outer, statements
+        self.known: dict[int, Operand] = {}
+
+    def home(self, node: Node) -> _Level:
+        """The outermost level that runs through every loop which `node` depends on."""
+        level = self
+        while level.outer is not None and not node.loops & ~level.outer.loops:
+            level = level.outer
+        return level
+
+
 class _Writer:
     """Emits nodes in dependency order, each once, with temporaries numbered densely."""
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.statements: list[Statement] = []
-        self._operands: dict[int, Operand] = {}
+        self._outside = _Level(0, None, self.statements)
         self._next = 0
 
     def _number(self) -> int:
@@ -379,7 +440,16 @@ class _Writer:
         return self._next - 1
 
     def operand(self, node: Node) -> Operand:
-        return self._emit(node, self.statements, self._operands)
+        return self._emit(node, self._outside)
+
+    def request(self, request: _GuardRequest | Solve | _StoreRequest) -> None:
+        if isinstance(request, Solve):
+            self.statements.append(request)
+        elif isinstance(request, _StoreRequest):
+            self.store(request.port, request.value)
+        else:
+            condition = self.operand(request.condition)
+            self.statements.append(Guard(condition, request.code, request.message))
 
     def as_made(
         self, guards: Iterable[_GuardRequest], outputs: Iterable[Port], values: dict[str, object]
@@ -409,42 +479,42 @@ class _Writer:
             return node.leaf
         return Constant("pi") if node.op == "pi" else None
 
-    def _emit(self, root: Node, into: list[Statement], known: dict[int, Operand]) -> Operand:
+    def _emit(self, root: Node, level: _Level) -> Operand:
+        """What depends on a loop goes inside; what does not is computed before the loop."""
         stack = [root]
         while stack:
             node = stack[-1]
-            if node.number in known:
+            home = level.home(node)
+            if node.number in home.known:
                 stack.pop()
                 continue
             leaf = self._leaf(node)
             if leaf is not None:
-                known[node.number] = leaf
+                home.known[node.number] = leaf
                 continue
             if node.op == "sum":
-                known[node.number] = self._emit_sum(node)
+                home.known[node.number] = self._emit_sum(node, home)
                 continue
-            missing = [a for a in node.args if a.number not in known]
+            missing = [a for a in node.args if a.number not in level.home(a).known]
             if missing:
                 stack.extend(reversed(missing))
                 continue
             number = self._number()
-            into.append(Assign(number, node.op, tuple(known[a.number] for a in node.args)))
-            known[node.number] = Temporary(number)
-        return known[root.number]
+            operands = tuple([level.home(a).known[a.number] for a in node.args])
+            home.statements.append(Assign(number, node.op, operands))
+            home.known[node.number] = Temporary(number)
+        return level.home(root).known[root.number]
 
-    def _loop_body(self, term: Node) -> tuple[tuple[Assign, ...], Operand]:
-        """What depends on k goes inside; what does not is computed before the loop."""
-        for node in _walk(term):
-            if not node.looped:
-                self.operand(node)
-        body: list[Statement] = []
-        value = self._emit(term, body, dict(self._operands))
-        return tuple(s for s in body if isinstance(s, Assign)), value
-
-    def _emit_sum(self, node: Node) -> Operand:
-        body, value = self._loop_body(node.args[0])
+    def _emit_sum(self, node: Node, home: _Level) -> Operand:
+        over = str(node.leaf)
+        if home.loops & _BITS[over]:
+            raise ValueError(
+                "loops are nested more than two deep; store an inner product as an output first"
+            )
+        inner = _Level(home.loops | _BITS[over], home, [])
+        value = self._emit(node.args[0], inner)
         number = self._number()
-        self.statements.append(Sum(number, body, value))
+        home.statements.append(Sum(number, tuple(inner.statements), value, over))
         return Temporary(number)
 
     def store(self, port: Port, value: object) -> None:
@@ -452,8 +522,11 @@ class _Writer:
             if entry is None:
                 continue
             node = self.graph.node(entry)
-            if LOOP_INDEX in index:
-                body, operand = self._loop_body(node)
+            loops = sum(_BITS[letter] for letter in LOOPS if letter in index)
+            if loops:
+                level = _Level(loops, self._outside, [])
+                operand = self._emit(node, level)
+                body: tuple[Inner, ...] = tuple(level.statements)
                 self.statements.append(Store(port.name, index, operand, body))
             else:
                 self.statements.append(Store(port.name, index, self.operand(node)))
@@ -471,28 +544,37 @@ def _behind(roots: Iterable[Node]) -> list[Node]:
     return list(found.values())
 
 
-def _walk(root: Node) -> list[Node]:
-    """Maximal loop-free sub-terms of `root`, in a fixed order."""
-    found: dict[int, Node] = {}
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if not node.looped:
-            found.setdefault(node.number, node)
-        else:
-            stack.extend(reversed(node.args))
-    return list(found.values())
-
-
 def _flatten(
-    value: object, shape: tuple[int | str, ...]
+    value: object, shape: tuple[int | str, ...], letters: tuple[str, ...] = LOOPS
 ) -> list[tuple[tuple[int | str, ...], Node | Number | None]]:
-    """Entries with their indices; along the run-time size one value stands for all k < n."""
+    """Entries with their indices; along a run-time size one value stands for all k (l) < n."""
     if not shape:
         return [((), value)]  # type: ignore[list-item]
     if isinstance(shape[0], str):
-        return [((LOOP_INDEX, *rest), v) for rest, v in _flatten(value, shape[1:])]
+        inside = _flatten(value, shape[1:], letters[1:])
+        return [((letters[0], *rest), v) for rest, v in inside]
     if not isinstance(value, (list, tuple)) or len(value) != shape[0]:
         raise ValueError(f"{value!r} does not fill the shape {shape}")
-    entries = enumerate(value)
-    return [((i, *rest), v) for i, entry in entries for rest, v in _flatten(entry, shape[1:])]
+    return [
+        ((i, *rest), v)
+        for i, entry in enumerate(value)
+        for rest, v in _flatten(entry, shape[1:], letters)
+    ]
+
+
+def _loops(op: str, args: tuple[Node, ...], leaf: Fraction | Element | str | None) -> int:
+    """Loop variables that a node depends on, as bits."""
+    if isinstance(leaf, Element):
+        found = 0
+        for entry in leaf.index:
+            if isinstance(entry, str):
+                found |= _BITS[entry]
+        return found
+    found = 0
+    for a in args:
+        found |= a.loops
+    return found & ~_BITS[str(leaf)] if op == "sum" else found
+
+
+def _other(letter: str) -> str:
+    return INNER_INDEX if letter == LOOP_INDEX else LOOP_INDEX

@@ -4,8 +4,12 @@ A kernel is a list of scalar statements in single-assignment order over typed in
 It holds plain text and whole numbers only (no SymPy), is frozen, hashable, and stored as JSON.
 
 Shapes are whole numbers, or one declared size symbol `n` (modal sizes).  With `n` present there
-are three loops and no others: an indexed sum over k < n, an indexed store over k < n and the
-primitive `solve`.  There are no branches except `select` and guards.
+are three loops and no others: an indexed sum over k < n or l < n, a store over k, l or both, and
+the primitive `solve`.  A sum may stand inside another loop over the other letter, so that loops are
+at most two deep.  There are no branches except `select` and guards.
+
+With `n` present an output that is complete (every entry stored, or solved for) and does not
+accumulate may be read by the statements behind.
 """
 
 from __future__ import annotations
@@ -13,13 +17,16 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 #: Index that stands for the loop variable of an indexed sum or store.
 LOOP_INDEX = "k"
+#: That of a second loop, inside the first.
+INNER_INDEX = "l"
+LOOPS = (LOOP_INDEX, INNER_INDEX)
 
 #: Operation name -> number of operands.  The C printer, the tape and the evaluator read this table.
 OPERATIONS: dict[str, int] = {
@@ -51,12 +58,14 @@ class Port:
             total *= n if isinstance(extent, str) else extent
         return total
 
-    def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0) -> int:
-        """Row-major place of an entry; `LOOP_INDEX` in the index stands for `k`."""
+    def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0, inner: int = 0) -> int:
+        """Row-major place of an entry; in it `LOOP_INDEX` is `k`, `INNER_INDEX` is `inner`."""
         place = 0
         for entry, extent in zip(index, self.shape, strict=True):
             width = n if isinstance(extent, str) else extent
-            place = place * width + (k if isinstance(entry, str) else entry)
+            if isinstance(entry, str):
+                entry = k if entry == LOOP_INDEX else inner
+            place = place * width + entry
         return place
 
 
@@ -79,7 +88,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Element:
-    """Entry of an input or of a solved array; the index is one entry per axis, or `k` in a loop."""
+    """Entry of an input or of a complete output; one entry per axis, `k` or `l` in a loop."""
 
     port: str
     index: tuple[int | str, ...] = ()
@@ -106,21 +115,31 @@ class Assign:
 
 @dataclass(frozen=True)
 class Sum:
-    """t[number] = sum over k < n of the value of the last statement of `body`."""
+    """t[number] = sum over k < n (or the letter `over`) of `value`, once `body` has been run."""
 
     number: int
-    body: tuple[Assign, ...]
+    body: tuple[Assign | Sum, ...]
     value: Operand
+    over: str = LOOP_INDEX
+
+
+#: What stands inside a loop.
+Inner = Assign | Sum
 
 
 @dataclass(frozen=True)
 class Store:
-    """output[index] = value; with `k` in the index, `body` is run for every k < n."""
+    """output[index] = value; with `k` or `l` in the index, `body` is run for every k, l < n."""
 
     port: str
     index: tuple[int | str, ...]
     value: Operand
-    body: tuple[Assign, ...] = ()
+    body: tuple[Inner, ...] = ()
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Letters that are run through, the outermost first."""
+        return tuple(letter for letter in LOOPS if letter in self.index)
 
 
 @dataclass(frozen=True)
@@ -185,11 +204,15 @@ class KernelIR:
 
 def assignments(kernel: KernelIR) -> Iterator[Assign]:
     """Every assignment, those inside loops too, in order."""
-    for statement in kernel.statements:
+    yield from _assignments(kernel.statements)
+
+
+def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
+    for statement in statements:
         if isinstance(statement, Assign):
             yield statement
         elif isinstance(statement, (Sum, Store)):
-            yield from statement.body
+            yield from _assignments(statement.body)
 
 
 def check(kernel: KernelIR) -> None:
@@ -209,6 +232,7 @@ class _Check:
         self.kernel = kernel
         self.readable = {port.name: port for port in kernel.inputs}
         self.writable = {port.name: port for port in kernel.outputs}
+        self.stored: dict[str, set[tuple[int | str, ...]]] = {}
         self.defined: set[int] = set()
         self.ever: set[int] = set()
         self.constants: set[str] = set()
@@ -228,36 +252,57 @@ class _Check:
             self.statement(statement)
 
     def statement(self, statement: Statement) -> None:
-        if isinstance(statement, Assign):
-            self.assign(statement, False)
-        elif isinstance(statement, Sum):
-            self.body(statement.body, statement.value, True)
-            self.define(statement.number)
+        if isinstance(statement, (Assign, Sum)):
+            self.inner(statement, ())
         elif isinstance(statement, Store):
-            looped = LOOP_INDEX in statement.index
-            self.body(statement.body, statement.value, looped)
-            self.index(statement.port, statement.index, self.writable, looped)
+            self.store(statement)
         else:
             if statement.code == 0:
                 self.fail(f"code 0 means success, not {statement.message!r}")
             if isinstance(statement, Guard):
-                self.use(statement.condition, False)
+                self.use(statement.condition, ())
             else:
                 self.solve(statement)
 
-    def body(self, body: tuple[Assign, ...], value: Operand, looped: bool) -> None:
-        if looped and self.kernel.size_symbol is None:
-            self.fail("a loop without a size symbol")
-        for assign in body:
-            self.assign(assign, looped)
-        self.use(value, looped)
-        self.defined.difference_update(assign.number for assign in body)
+    def inner(self, statement: Inner, loops: tuple[str, ...]) -> None:
+        if isinstance(statement, Assign):
+            self.assign(statement, loops)
+            return
+        if statement.over not in LOOPS or statement.over in loops:
+            self.fail(f"a sum over {statement.over!r} inside loops over {list(loops)}")
+        self.body(statement.body, statement.value, (*loops, statement.over))
+        self.define(statement.number)
 
-    def assign(self, assign: Assign, looped: bool) -> None:
+    def store(self, store: Store) -> None:
+        letters = [entry for entry in store.index if isinstance(entry, str)]
+        if len(set(letters)) != len(letters):
+            self.fail(f"{store.port}{list(store.index)} stores a diagonal alone")
+        self.body(store.body, store.value, store.loops)
+        self.index(store.port, store.index, self.writable, store.loops)
+        if self.kernel.size_symbol is None:
+            return
+        if store.port in self.readable:
+            self.fail(f"{store.port} is stored again where it is complete")
+        places = self.stored.setdefault(store.port, set())
+        places.add(tuple("" if isinstance(entry, str) else entry for entry in store.index))
+        port = self.writable[store.port]
+        extents = [extent for extent in port.shape if isinstance(extent, int)]
+        if len(places) == math.prod(extents) and not port.accumulate:
+            self.readable[port.name] = port
+
+    def body(self, body: tuple[Inner, ...], value: Operand, loops: tuple[str, ...]) -> None:
+        if loops and self.kernel.size_symbol is None:
+            self.fail("a loop without a size symbol")
+        for statement in body:
+            self.inner(statement, loops)
+        self.use(value, loops)
+        self.defined.difference_update(statement.number for statement in body)
+
+    def assign(self, assign: Assign, loops: tuple[str, ...]) -> None:
         if OPERATIONS.get(assign.op) != len(assign.args):
             self.fail(f"{assign.op} with {len(assign.args)} operands")
         for operand in assign.args:
-            self.use(operand, looped)
+            self.use(operand, loops)
         self.define(assign.number)
 
     def define(self, number: int) -> None:
@@ -266,12 +311,12 @@ class _Check:
         self.ever.add(number)
         self.defined.add(number)
 
-    def use(self, operand: Operand, looped: bool) -> None:
+    def use(self, operand: Operand, loops: tuple[str, ...]) -> None:
         if isinstance(operand, Temporary):
             if operand.number not in self.defined:
                 self.fail(f"t{operand.number} is used before it is defined")
         elif isinstance(operand, Element):
-            self.index(operand.port, operand.index, self.readable, looped)
+            self.index(operand.port, operand.index, self.readable, loops)
         elif operand.text not in self.constants:
             try:
                 _ = operand.number
@@ -280,7 +325,11 @@ class _Check:
             self.constants.add(operand.text)
 
     def index(
-        self, name: str, index: tuple[int | str, ...], ports: dict[str, Port], looped: bool
+        self,
+        name: str,
+        index: tuple[int | str, ...],
+        ports: dict[str, Port],
+        loops: tuple[str, ...],
     ) -> None:
         if name not in ports:
             self.fail(f"no port named {name!r}")
@@ -288,7 +337,7 @@ class _Check:
         if len(index) != len(shape):
             self.fail(f"{name}{list(index)} does not fit {shape}")
         for entry, extent in zip(index, shape, strict=True):
-            if isinstance(entry, str) and not (looped and entry == LOOP_INDEX):
+            if isinstance(entry, str) and entry not in loops:
                 self.fail(f"{name}{list(index)} outside a loop")
             # A loop runs over the run-time size and nothing else does.
             if isinstance(entry, str) != isinstance(extent, str):
@@ -345,11 +394,16 @@ def _statement_to_data(statement: Statement) -> Any:
     if isinstance(statement, Assign):
         return _assign_to_list(statement)
     if isinstance(statement, Sum):
-        body = [_assign_to_list(a) for a in statement.body]
-        return {"sum": statement.number, "body": body, "value": _operand_to_list(statement.value)}
-    if isinstance(statement, Store):
-        body = [_assign_to_list(a) for a in statement.body]
+        body = [_statement_to_data(a) for a in statement.body]
         data: dict[str, Any] = {
+            "sum": statement.number,
+            "body": body,
+            "value": _operand_to_list(statement.value),
+        }
+        return data | ({"over": statement.over} if statement.over != LOOP_INDEX else {})
+    if isinstance(statement, Store):
+        body = [_statement_to_data(a) for a in statement.body]
+        data = {
             "store": [statement.port, *statement.index],
             "value": _operand_to_list(statement.value),
         }
@@ -368,9 +422,10 @@ def _statement_to_data(statement: Statement) -> Any:
 def _statement_from_data(data: Any) -> Statement:
     if isinstance(data, list):
         return _assign_from_list(data)
-    body = tuple(_assign_from_list(a) for a in data.get("body", ()))
+    body = tuple(_statement_from_data(a) for a in data.get("body", ()))
     if "sum" in data:
-        return Sum(data["sum"], body, _operand_from_list(data["value"]))
+        over = data.get("over", LOOP_INDEX)
+        return Sum(data["sum"], body, _operand_from_list(data["value"]), over)
     if "store" in data:
         port, *index = data["store"]
         return Store(port, tuple(index), _operand_from_list(data["value"]), body)

@@ -123,7 +123,7 @@ _RULES: dict[str, Rule] = {
     "min": _lesser,
     "max": _greater,
     "select": lambda g, y, d: g.select(y.args[0], d[1], d[2]),
-    "sum": lambda g, y, d: g.sum_over_modes(d[0]),
+    "sum": lambda g, y, d: g.sum_over_modes(d[0], str(y.leaf)),
 }
 
 
