@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .modal_body import Array
 
@@ -24,6 +25,7 @@ class BeamSections:
     EI_y: Array  #: about y, for deflection along z, N m^2
     EI_z: Array  #: about z, for deflection along y, N m^2
     rho_I: Array  #: (3, m) polar, about y, about z; kg m
+    drag: Array  #: viscous drag per length, N s/m^2
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class BeamData:
         """kg."""
         return float(self.inertia[0] @ np.diff(self.breaks))
 
-    def piece(self, x: Array) -> NDIndex:
+    def piece(self, x: Array) -> NDArray[np.intp]:
         """Which piece every x lies in; at a break the one behind it."""
         found = np.searchsorted(np.asarray(self.breaks), x, side="right") - 1
         return np.clip(found, 0, len(self.breaks) - 2)
@@ -66,10 +68,9 @@ class BeamData:
         at = self.piece(x)
         m, yy, zz = self.inertia[:, at]
         ea, git, eiy, eiz = self.stiffness[:, at]
-        return BeamSections(m, ea, git, eiy, eiz, np.array([yy + zz, zz, yy]))
-
-
-NDIndex = np.ndarray
+        return BeamSections(
+            m, ea, git, eiy, eiz, np.array([yy + zz, zz, yy]), np.full(m.shape, self.drag)
+        )
 
 
 def beam_data(beam: Beam) -> BeamData:
@@ -82,16 +83,23 @@ def beam_data(beam: Beam) -> BeamData:
         inertia.append((s.mass_per_length or 0.0, about_z, about_y))
         bending = s.bending_stiffness or (0.0, 0.0)
         stiffness.append((s.axial_stiffness or 0.0, s.torsional_stiffness or 0.0, *bending))
+    breaks = (*(float(s.from_) for s in pieces), float(beam.length))
     ends = {
-        name: (float(end.position[0]), np.array(end.rotation, dtype=float))
+        name: (_snapped(end.position[0], breaks), np.array(end.rotation, dtype=float))
         for name, end in beam.ends.items()
     }
     return BeamData(
         beam.name,
-        (*(float(s.from_) for s in pieces), float(beam.length)),
+        breaks,
         np.array(inertia, dtype=float).T,
         np.array(stiffness, dtype=float).T,
         all(s.rotary_inertia is not None for s in pieces),
         float(beam.viscous_drag),
         ends,
     )
+
+
+def _snapped(x: float, breaks: tuple[float, ...]) -> float:
+    """The break that an end lies at but for rounding, or its own place on the beam."""
+    near = min(breaks, key=lambda b: abs(b - x))
+    return near if abs(near - x) <= 1e-9 * breaks[-1] else float(min(max(x, 0.0), breaks[-1]))

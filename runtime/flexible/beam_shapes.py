@@ -99,6 +99,11 @@ class BeamShapes:
         """Where the section changes, 0 and the length included (m)."""
         return self.data.breaks
 
+    @property
+    def rotary(self) -> bool:
+        """True when the sections' rotary inertia takes part in bending."""
+        return self.data.rotary
+
     def sections(self, x: Array) -> BeamSections:
         """Section data at every x."""
         return self.data.sections(np.asarray(x, dtype=float))

@@ -52,7 +52,9 @@ def in_frame(
     Raises SceneError for shapes that cannot be told apart.
     """
     x, weight, inertia = _rule(data, direction, shapes)
-    modes, kept, notes = [], [], []
+    modes: list[Mode] = []
+    kept: list[Array] = []
+    notes: list[str] = []
     basis: list[Array] = []
     for k, shape in enumerate(shapes, 1):
         name = f"{direction}{k}"
