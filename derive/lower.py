@@ -43,7 +43,9 @@ def lower(
         lowering.define(equation)
     for condition, code, message in guards:
         lowering.graph.guard(lowering.scalar(condition), code, message)
-    values = {q.name: lowering.stored(q) for q in derivation.outputs if not q.sized}
+    values: dict[str, object] = {
+        q.name: lowering.stored(q) for q in derivation.outputs if not q.sized
+    }
     return lowering.graph.kernel(
         name,
         [port(q) for q in derivation.inputs],

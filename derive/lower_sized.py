@@ -95,8 +95,9 @@ class SizedLowering(Lowering):
                     f"that is defined before and does not accumulate, not {array}"
                 )
             arrays.append(str(array.name))
-        message = f"a pivot of {arrays[0]} vanishes: a motion of the modes is undetermined"
-        self.graph.solve(name, *arrays, SINGULAR, message)
+        matrix, right = arrays
+        message = f"a pivot of {matrix} vanishes: a motion of the modes is undetermined"
+        self.graph.solve(name, matrix, right, SINGULAR, message)
         self._remember(port(output))
 
     # --- matrices of fixed shape ----------------------------------------------------------------

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 from mstmm.graph import Graph, Node
 
 NodeMatrix = list[list[Node]]
+#: Takes the condition that a pivot must meet, and its number from zero.
+PivotGuard = Callable[[Node, int], None]
 
 #: Failure code of a vanishing pivot, known to the sweep driver.
 SINGULAR = 1
@@ -14,8 +17,16 @@ SINGULAR = 1
 RELATIVE_PIVOT = Fraction(1, 10**13)
 
 
-def ldl(graph: Graph, matrix: NodeMatrix) -> tuple[NodeMatrix, list[Node]]:
+def ldl(
+    graph: Graph,
+    matrix: NodeMatrix,
+    guard: PivotGuard | None = None,
+    relative_pivot: Fraction = RELATIVE_PIVOT,
+) -> tuple[NodeMatrix, list[Node]]:
     """A = L diag(d) L^T row by row: (rows of L left of its diagonal of ones, 1 / d).
+
+    The upper half of A is read.  `guard` takes the conditions on pivots; without it they become
+    guards of the graph.
 
     A division for each pivot: sharing one between two pivots (by the minor a c - b^2) is no less
     accurate, but its products cost what the division saves (measured on balls).
@@ -34,7 +45,11 @@ def ldl(graph: Graph, matrix: NodeMatrix) -> tuple[NodeMatrix, list[Node]]:
         pivot = matrix[i][i]
         for k in range(i):
             pivot = pivot - products[i][k] * lower[i][k]
-        _guard_pivot(graph, pivot, matrix[i][i], i, n)
+        condition = _pivot_condition(graph, pivot, matrix[i][i], relative_pivot)
+        if guard is None:
+            _guard(graph, condition, i, n)
+        else:
+            guard(condition, i)
         reciprocal.append(1 / pivot)
     return lower, reciprocal
 
@@ -56,9 +71,15 @@ def backward(lower: NodeMatrix, column: list[Node]) -> list[Node]:
     return column
 
 
-def solve_symmetric(graph: Graph, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
-    """A^-1 B by LDL^T."""
-    lower, reciprocal = ldl(graph, matrix)
+def solve_symmetric(
+    graph: Graph,
+    matrix: NodeMatrix,
+    right: NodeMatrix,
+    guard: PivotGuard | None = None,
+    relative_pivot: Fraction = RELATIVE_PIVOT,
+) -> NodeMatrix:
+    """A^-1 B by LDL^T; arguments of `ldl`."""
+    lower, reciprocal = ldl(graph, matrix, guard, relative_pivot)
     columns = []
     for column in zip(*right, strict=True):
         scaled = forward(lower, list(column))
@@ -74,7 +95,8 @@ def solve_by_rows(graph: Graph, matrix: NodeMatrix, right: NodeMatrix) -> NodeMa
     reciprocal: list[Node] = []
     for i in range(n):
         _largest_first(graph, rows, i)
-        _guard_pivot(graph, graph.call("abs", rows[i][i]), rows[i][width], i, n)
+        condition = _pivot_condition(graph, graph.call("abs", rows[i][i]), rows[i][width])
+        _guard(graph, condition, i, n)
         reciprocal.append(1 / rows[i][i])
         for k in range(i + 1, n):
             factor = rows[k][i] * reciprocal[i]
@@ -107,12 +129,18 @@ def _largest_first(graph: Graph, rows: NodeMatrix, i: int) -> None:
         rows[i] = upper
 
 
-def _guard_pivot(graph: Graph, pivot: Node, diagonal: Node, i: int, n: int) -> None:
-    limit = graph.constant(RELATIVE_PIVOT) * diagonal
+def _pivot_condition(
+    graph: Graph, pivot: Node, diagonal: Node, relative_pivot: Fraction = RELATIVE_PIVOT
+) -> Node:
+    limit = graph.constant(relative_pivot) * diagonal
     if pivot is diagonal:  # a first pivot is compared with nothing but zero
         limit = graph.constant(0)
+    return graph.call("lt", limit, pivot)
+
+
+def _guard(graph: Graph, condition: Node, i: int, n: int) -> None:
     graph.guard(
-        graph.call("lt", limit, pivot),
+        condition,
         SINGULAR,
         f"pivot {i + 1} of {n} vanishes: a motion of the hinge is undetermined",
     )

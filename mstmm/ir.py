@@ -419,15 +419,21 @@ def _statement_to_data(statement: Statement) -> Any:
     }
 
 
+def _inner_from_data(data: Any) -> Inner:
+    if isinstance(data, list):
+        return _assign_from_list(data)
+    body = tuple(_inner_from_data(a) for a in data["body"])
+    return Sum(data["sum"], body, _operand_from_list(data["value"]), data.get("over", LOOP_INDEX))
+
+
 def _statement_from_data(data: Any) -> Statement:
     if isinstance(data, list):
         return _assign_from_list(data)
-    body = tuple(_statement_from_data(a) for a in data.get("body", ()))
     if "sum" in data:
-        over = data.get("over", LOOP_INDEX)
-        return Sum(data["sum"], body, _operand_from_list(data["value"]), over)
+        return _inner_from_data(data)
     if "store" in data:
         port, *index = data["store"]
+        body = tuple(_inner_from_data(a) for a in data.get("body", ()))
         return Store(port, tuple(index), _operand_from_list(data["value"]), body)
     if "guard" in data:
         return Guard(_operand_from_list(data["guard"]), data["code"], data["message"])
