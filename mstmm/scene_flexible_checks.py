@@ -61,13 +61,16 @@ def problems(scene: Scene) -> Iterator[Problem]:
 def spins(scene: Scene) -> Iterator[Problem]:
     """Beams without inertia about their axis where a hinge lets them spin about it."""
     carriers = {name for name, _ in _carried(scene)}
+    released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
+    released |= {event.hinge for event in scene.event if event.hinge is not None}
     for i, beam, hinge in _held(scene):
         if any(piece.polar_inertia_per_length is not None for piece in beam.sections):
             continue
         rotor = any(hinge.law.inertia)
         if beam.name in carriers or rotor:
             continue
-        if hinge.type != "screw" and _share(beam, hinge, _ALONG) > 1 - 1e-9:
+        free = _share(beam, hinge, _ALONG, hinge.name in released) > 1 - 1e-9
+        if free and hinge.type != "screw":
             yield (
                 ("beam", i, "polar_inertia_per_length"),
                 f'missing; hinge "{hinge.name}" lets the beam spin about its axis and nothing '
@@ -92,9 +95,12 @@ def _carried(scene: Scene) -> Iterator[tuple[str, str]]:
         yield split(chain.inboard)
 
 
-def free_axes(hinge: Hinge) -> tuple[Vector, ...]:
+def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
     """Unit axes, in the axes of the outboard end at q = 0, about which a hinge of a built-in type
-    turns and is not driven; none for a user's type."""
+    turns and is not driven, or, with `released`, turns once it is let go; none for a user's type.
+    """
+    if released and hinge.type == "fixed":
+        return _AXES
     axis, axis2 = hinge.unit_axis, hinge.unit_axis2
     turns: dict[str, dict[int, Vector]] = {
         "pin": {0: axis}, "screw": {0: axis}, "cylindrical": {1: axis}, "planar": {2: axis},
@@ -102,7 +108,7 @@ def free_axes(hinge: Hinge) -> tuple[Vector, ...]:
         "ball": dict(enumerate(_AXES)), "free": dict(enumerate(_AXES)),
         "elastic": dict(enumerate(_AXES)),
     }  # fmt: skip
-    drive = hinge.drive or ()
+    drive = () if released else hinge.drive or ()
     return tuple(
         direction
         for k, direction in turns.get(hinge.type, {}).items()
@@ -110,10 +116,10 @@ def free_axes(hinge: Hinge) -> tuple[Vector, ...]:
     )
 
 
-def _share(beam: Beam, hinge: Hinge, direction: Vector) -> float:
+def _share(beam: Beam, hinge: Hinge, direction: Vector, released: bool = False) -> float:
     """How much of a direction of the beam its hinge leaves free to turn about: 0 to 1."""
     turn = beam.ends[hinge.outboard_end].rotation
-    return _within(direction, [apply(turn, axis) for axis in free_axes(hinge)])
+    return _within(direction, [apply(turn, axis) for axis in free_axes(hinge, released)])
 
 
 def _within(direction: Vector, axes: list[Vector]) -> float:

@@ -51,3 +51,21 @@ def changed(data: Data, *path: str | int, to: Any) -> Data:
     else:
         inside[path[-1]] = to
     return copied
+
+
+def beam(name: str = "blade", **changes: Any) -> Data:
+    """A beam of 10 m; `...` removes a key."""
+    table = {
+        "name": name,
+        "length": 10.0,
+        "mass_per_length": 1.2,
+        "bending_stiffness": 1.4e4,
+        "modes": 3,
+    } | changes
+    return {key: value for key, value in table.items() if value is not ...}
+
+
+def bladed(**changes: Any) -> Data:
+    """One beam on a fixed hinge; `changes` are to the beam."""
+    held = {"name": "hub", "type": "fixed", "inboard": "ground", "outboard": "blade"}
+    return {"gravity": [0, 0, -9.81], "beam": [beam(**changes)], "hinge": [held]}

@@ -14,12 +14,14 @@ from reference.random_scenes import random_scene
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
-from scene.scenes import arm
+from scene.scenes import arm, beam, bladed, hinge
+from scene.test_elastic import arrays, linked
 
 KEYS = (
     "name type mass inertia ends tip axis axis2 lead normal initial q u law drive release "
     "effort friction limits lower upper stiffness parameters position orientation inboard "
-    "outboard on when do hinge body from to gravity beam \x00 é"
+    "outboard on when do hinge body from to gravity beam elastic modes frame section shapes "
+    "damping eta mass_per_length force_per_length span nodes plane box arrays \x00 é"
 ).split(" ")
 LEAVES = st.one_of(
     st.none(),
@@ -30,7 +32,7 @@ LEAVES = st.one_of(
     st.text(max_size=8),
     st.sampled_from(
         "free ground rod1 rod1.tip t sin(t) q[0] rod1.x<1 nan ball universal planar gimbal screw "
-        "fixed t^2 shoulder.q release stop".split()
+        "blade blade.tip tail x^2 static auto tangent@tip fixed t^2 shoulder.q release stop".split()
     ),
 )
 VALUES = st.recursive(
@@ -91,6 +93,37 @@ SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_s
 @given(st.data())
 def test_damaged_scenes(draw: st.DataObject) -> None:
     data = damaged(arm(), draw)
+    check(lambda: Scene(**data))
+
+
+def flexible() -> dict[str, Any]:
+    """Two beams and an elastic body, with most of their keys."""
+    piece = {"mass_per_length": 1.0, "bending_stiffness": [1.0, 2.0], "rotary_inertia": 1e-3}
+    pieces = [piece | {"from": 0, "to": 4}, piece | {"from": 4, "to": 10}]
+    divided = beam(mass_per_length=..., bending_stiffness=..., section=pieces, damping=[0.1] * 6,
+                   frame="tangent@mid", ends={"mid": 5.0}, initial={"eta": [0.1] * 6})  # fmt: skip
+    shaped = beam("flap", shapes={"y": ["(x/L)^2"]}, modes=..., rotary_inertia=1e-3)
+    link = linked(arrays(), name="tail", frame="tangent")["elastic"][0]
+    return bladed() | {
+        "beam": [divided, shaped], "elastic": [link],
+        "hinge": [
+            hinge("hub", outboard="blade"),
+            hinge("wrist", type="ball", inboard="blade.tip", outboard="flap"),
+            hinge("end", type="fixed", inboard="blade.mid", outboard="tail.root"),
+        ],
+        "load": [{"on": "blade", "force_per_length": [0, "t", 1], "span": [1, 2]}],
+        "event": [{"when": "blade.q[1] > flap.tip.x", "do": "stop"}],
+    }  # fmt: skip
+
+
+def test_the_flexible_scene_is_one() -> None:
+    assert Scene(**flexible()).warnings == ()
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=SLOW)
+@given(st.data())
+def test_damaged_flexible_scenes(draw: st.DataObject) -> None:
+    data = damaged(flexible(), draw)
     check(lambda: Scene(**data))
 
 
