@@ -18,6 +18,7 @@ from .shapes import Eigenfunction, Shape, Sine
 from .static_shapes import (
     bending_eigenfunctions,
     bending_statics,
+    end_slope,
     rod_eigenfunctions,
     rod_statics,
 )
@@ -73,19 +74,13 @@ def _bending(data: BeamData, direction: str, basis: Basis, count: int) -> list[S
         if data.uniform:
             return [Eigenfunction(FREE_FREE, k, 0.0, length) for k in range(1, count + 1)]
         return list(bending_eigenfunctions(data, direction, count, skip=2))
-    slopes = [_end_slope(data, direction, x) for x in basis.slopes][:count]
+    slopes = [end_slope(data, direction, x) for x in basis.slopes][:count]
     rest = count - len(slopes)
     if data.uniform:
         sines = [Eigenfunction(SIMPLY_SUPPORTED, k, 0.0, length) for k in range(1, rest + 1)]
         return [*slopes, *sines]
     supports = (0.0, length)
     return [*slopes, *bending_eigenfunctions(data, direction, rest, supported=supports)]
-
-
-def _end_slope(data: BeamData, direction: str, x: float) -> Shape:
-    """Unit slope times the length at one end; no deflection at either, no slope at the other."""
-    base = data.length if x == 0.0 else 0.0
-    return bending_statics(data, direction, base, [x])[1]
 
 
 def _parts(data: BeamData, direction: str, base: float, count: int) -> list[Shape]:

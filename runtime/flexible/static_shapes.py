@@ -38,19 +38,33 @@ def bending_statics(
     All interfaces (x in m) are otherwise held in place and direction; so is `base`.
     """
     nodes = np.array(sorted({*data.breaks, base, *others}))
-    held = [int(np.argmin(np.abs(nodes - x))) for x in (base, *others)]
+    held = [_at(nodes, x) for x in (base, *others)]
     fixed = [dof for i in held for dof in (2 * i, 2 * i + 1)]
     k, _ = _bending_matrices(data, direction, nodes)
-    free = [i for i in range(2 * len(nodes)) if i not in fixed]
-    shapes = []
-    for i in held[1:]:
-        for dof, size in ((2 * i, 1.0), (2 * i + 1, 1.0 / data.length)):
-            u = np.zeros(2 * len(nodes))
-            u[dof] = size
-            if free:
-                u[free] = np.linalg.solve(k[np.ix_(free, free)], -k[free, dof] * size)
-            shapes.append(_cubic(nodes, u))
-    return shapes
+    return [
+        _cubic(nodes, _displaced(k, fixed, dof, size))
+        for i in held[1:]
+        for dof, size in ((2 * i, 1.0), (2 * i + 1, 1.0 / data.length))
+    ]
+
+
+def end_slope(data: BeamData, direction: str, x: float) -> Piecewise:
+    """Unit rotation times the length at the end x; both ends supported, the other free to turn."""
+    nodes = np.array(data.breaks)
+    turned = 2 * _at(nodes, x) + 1
+    k, _ = _bending_matrices(data, direction, nodes)
+    fixed = [0, len(k) - 2, turned]
+    return _cubic(nodes, _displaced(k, fixed, turned, 1.0 / data.length))
+
+
+def _displaced(k: Array, fixed: list[int], dof: int, size: float) -> Array:
+    """Static displacements with one of the `fixed` coordinates at `size` and the others at zero."""
+    u = np.zeros(len(k))
+    u[dof] = size
+    free = np.setdiff1d(np.arange(len(k)), fixed)
+    if free.size:
+        u[free] = np.linalg.solve(k[np.ix_(free, free)], -k[free, dof] * size)
+    return u
 
 
 def bending_eigenfunctions(
