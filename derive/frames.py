@@ -158,6 +158,31 @@ def power() -> Derivation:
     )
 
 
+def carried_momentum() -> Derivation:
+    """Momentum about P, body axes, carried to the inertial origin."""
+    own = Quantity(vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about P, body axes")
+    push, turn = _symbol("p", 3), _symbol("L", 3)
+    moved = _symbol("p_0", 3)
+    return Derivation(
+        "frames",
+        "momentum about the inertial origin",
+        (A, X, own),
+        (
+            Quantity(push, "N*s", "momentum, inertial axes", accumulate=True),
+            Quantity(turn, "N*m*s", "angular momentum about the inertial origin", accumulate=True),
+        ),
+        (
+            Equation("momentum, inertial axes", moved, A.symbol * _rows(own.symbol, 0)),
+            Equation("momentum", push, moved),
+            Equation(
+                "angular momentum",
+                turn,
+                A.symbol * _rows(own.symbol, 3) + tilde(_rows(X.symbol, 0)) * moved,
+            ),
+        ),
+    )
+
+
 def gravity_energy() -> Derivation:
     """Potential of uniform gravity, zero at the inertial origin, from the body's mass matrix."""
     mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)

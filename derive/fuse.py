@@ -25,6 +25,7 @@ from mstmm.structure import (
 
 from .balance import balance
 from .fused_loads import LoadPass
+from .fused_modal import ModalPass
 from .inline import Inliner, Nodes
 from .transport import Stage, stages_of
 
@@ -90,6 +91,7 @@ class _Fusion:
         self.efforts = self.graph.vector("efforts", structure.nu)
         self.memory = self.graph.vector("memory", structure.n_memory)
         self.bodies: list[BodyNodes] = []
+        self.modal = ModalPass(self)
         self.power, self.potential = self.zero, self.zero
 
     # --- small tools ---------------------------------------------------------------------------
@@ -149,12 +151,18 @@ class _Fusion:
             nodes = self._forward(index, body, imposed, ground)
             self.bodies.append(nodes)
             qdot[body.q : body.q + body.nq] = nodes.hinge["qdot"]
+            if body.modal is not None:
+                first, n = body.modal.u, body.modal.n
+                qdot[body.modal.q : body.modal.q + n] = self.u[first : first + n]
         LoadPass(self).run()
         for index in reversed(range(len(self.bodies))):
             self._condense(index)
         for index, body in enumerate(self.structure.bodies):
             self._recover(index)
             udot[body.u : body.u + body.nu] = self.bodies[index].udot
+            if body.modal is not None:
+                accelerations = self.modal.modes[index].etadd
+                udot[body.modal.u : body.modal.u + body.modal.n] = accelerations
         self._drive_power()
         return self._kernels(qdot, udot)
 
@@ -187,16 +195,25 @@ class _Fusion:
         motion = stages[-1].motion_behind_hinge(motion, hinge, s)
         if not any(body.imposed) and not any(self._moves(x) for x in body.rotor):
             self._stop_free_directions(hinge["H"], motion, s)
-        p = self.entries(body.body_p)
-        own = self.inline.run(self.kernels(body.body, "inertia"), {"p": p})["S"]
-        load = self.inline.run(self.kernels(body.body, "bias_load"), {"p": p, "motion": motion})
+        own, load = self._own(index, body, motion)
         tau = self.efforts[body.u : body.u + body.nu]
         none: Nodes = []
         axial = stages[-1].keeps(hinge["H"])
-        return BodyNodes(stages, axial, hinge, s, motion, own, load["e"], own, tau, {}, none, none)
+        return BodyNodes(stages, axial, hinge, s, motion, own, load, own, tau, {}, none, none)
+
+    def _own(self, index: int, body: BodyStructure, motion: Nodes) -> tuple[Nodes, Nodes]:
+        """S and e of the body alone at its bias motion."""
+        if body.modal is not None:
+            return self.modal.own(index, body.modal, motion)
+        p = self.entries(body.body_p)
+        own = self.inline.run(self.kernels(body.body, "inertia"), {"p": p})["S"]
+        load = self.inline.run(self.kernels(body.body, "bias_load"), {"p": p, "motion": motion})
+        return own, load["e"]
 
     def _hinge(self, index: int, body: BodyStructure) -> dict[str, Nodes]:
         """Outputs of the hinge kernel; behind a link the constant part of its screw included."""
+        if body.section is not None:
+            return self.modal.hinge(index, body.section)
 
         def run(q: Nodes) -> dict[str, Nodes]:
             return self.inline.run(
@@ -250,7 +267,14 @@ class _Fusion:
     def _condense(self, index: int) -> None:
         """Eliminate the free speeds, then carry S and e to the parent."""
         body, nodes = self.structure.bodies[index], self.bodies[index]
+        if body.idle:
+            return
+        if body.modal is not None:
+            nodes.inertia, nodes.load = self.modal.condense(index, nodes.inertia, nodes.load)
         inertia, load = nodes.inertia, nodes.load
+        if body.section is not None and not body.section.inward:
+            stage = nodes.stages[-1]
+            self.modal.absorb(index, body.parent, stage.rotation, stage.position)
         if nodes.axial:
             inertia, load = nodes.stages[-1].condense(inertia, load)
         if self.free(index):
@@ -331,6 +355,10 @@ class _Fusion:
             nodes.delta = last.delta(delta)
         else:
             rates, nodes.delta = last.delta_behind_hinge(delta, *known)
+        if body.modal is not None:
+            nodes.delta = self.modal.recover(index, nodes.delta)
+        elif body.section is not None:
+            nodes.delta = self.modal.follow(index, body.section.frame, nodes.delta)
         nodes.udot = list(nodes.s)
         for k, rate in zip(free, rates, strict=True):
             nodes.udot[k] = nodes.s[k] + rate
@@ -361,7 +389,7 @@ class _Fusion:
         values: dict[str, object] = {"qdot": qdot, "udot": udot}
         power: dict[str, object] = {"power": [self.power], "potential": [self.potential]}
         found = [self.graph.kernel("accelerations", inputs, outputs, values, as_made=True)]
-        if s.laws or s.driven or s.loads or s.forces:
+        if s.laws or s.driven or s.loads or s.forces or self.modal.modes:
             wide = self.graph.kernel(
                 "accelerations_power", inputs, [*outputs, *sums], values | power, as_made=True
             )

@@ -46,6 +46,9 @@ class LoadPass:
             self.values = f.expression(f.structure.values)
         for law in f.structure.laws:
             self._law(law)
+        for index, body in enumerate(f.structure.bodies):
+            if body.modal is not None and body.modal.drag:
+                f.modal.drag(index, body.modal, self._pose(index).v)
         for load in f.structure.loads:
             self._load(load)
         for index, force in enumerate(f.structure.forces):

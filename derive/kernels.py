@@ -18,6 +18,7 @@ from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
 from .elements.body_rigid import RigidBody
 from .factored import eliminate_factored, recover_factored
+from .flexible import beam_fields, modal, modal_sweep, section
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from .lower import lower
 from .registry import Element, builtin_elements, kind_of
@@ -27,7 +28,8 @@ Guards = tuple[tuple[sp.Basic, int, str], ...]
 
 FRAME_DERIVATIONS = (
     frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
-    frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.gravity_energy,
+    frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.carried_momentum,
+    frames.gravity_energy,
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.length, frames.turned, frames.classical_body, frames.state_deviation,
 )  # fmt: skip
@@ -159,6 +161,27 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
     )
 
 
+def modal_kernels() -> tuple[Kernel, ...]:
+    """Flexible bodies: residual, sections, condensation; n modes, known at run time."""
+    turning = section.turn_guards()
+    return (
+        Kernel("residual", modal.residual()),
+        Kernel("momentum", modal.momentum()),
+        Kernel("strain_energy", modal.strain_energy()),
+        Kernel("section", section.section()),
+        Kernel("outward", section.outward(), turning),
+        Kernel("inward", section.inward(), turning),
+        Kernel("subspace", section.subspace()),
+        Kernel("imposed", section.imposed()),
+        *(Kernel(step.__name__, step()) for step in modal_sweep.STEPS),
+    )
+
+
+def beam_kernels() -> tuple[Kernel, ...]:
+    """Beams: integrands per length, integrated along the beam when a scene is packed."""
+    return tuple(Kernel(name, make()) for name, make in beam_fields.KERNELS.items())
+
+
 def classical_kernel(name: str) -> Kernel:
     """The classical transfer matrix `name`."""
     derivation = CLASSICAL[name]()
@@ -174,6 +197,8 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "frames"] = frame_kernels
     table["sweep", "laws"] = law_kernels
     table["sweep", "screw"] = screw_kernels
+    table["sweep", "modal"] = modal_kernels
+    table["sweep", "beam"] = beam_kernels
     for name in links():
         table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]
     for nu in range(MAX_SPEEDS + 1):

@@ -15,12 +15,14 @@ from .kernels import (
     FRAME_DERIVATIONS,
     MAX_SPEEDS,
     Kernel,
+    beam_kernels,
     frame_kernels,
     generic_kernels,
     kernels_of,
     law_kernels,
     link_kernels,
     links,
+    modal_kernels,
     screw_kernels,
 )
 from .registry import Element, builtin_elements, kind_of
@@ -76,6 +78,8 @@ def shared_specs() -> list[ElementSpec]:
     return [
         plain(name="frames", title="poses, points and loads", kernels=frames),
         plain(name="laws", title="laws on hinge coordinates", kernels=laws),
+        plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
+        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
             plain(

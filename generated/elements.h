@@ -30,15 +30,258 @@ extern const mstmm_element mstmm_classical_ball;
 int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
     const real *restrict tau_n, real *restrict U_h, real *restrict margin);
 
+extern const mstmm_element mstmm_classical_beam_planar_discrete;
+int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict I_0, const real *restrict s, const real *restrict S_c,
+    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
+    const real *restrict L, const real *restrict phi_O, const real *restrict Theta_O,
+    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
+    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
+    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
+    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
+    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
+    const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_beam_planar_discrete_1;
+int mstmm_classical_beam_planar_discrete_1_transfer(const real *restrict m,
+    const real *restrict S_0, const real *restrict I_0, const real *restrict s,
+    const real *restrict S_c, const real *restrict M_f, const real *restrict K_f,
+    const real *restrict D_f, const real *restrict L, const real *restrict phi_O,
+    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
+    const real *restrict D_theta, const real *restrict B_eta, const real *restrict D_eta,
+    const real *restrict r_p, const real *restrict theta_p, const real *restrict eta_p,
+    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_beam_planar_discrete_2;
+int mstmm_classical_beam_planar_discrete_2_transfer(const real *restrict m,
+    const real *restrict S_0, const real *restrict I_0, const real *restrict s,
+    const real *restrict S_c, const real *restrict M_f, const real *restrict K_f,
+    const real *restrict D_f, const real *restrict L, const real *restrict phi_O,
+    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
+    const real *restrict D_theta, const real *restrict B_eta, const real *restrict D_eta,
+    const real *restrict r_p, const real *restrict theta_p, const real *restrict eta_p,
+    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_beam_spatial_discrete;
+int mstmm_classical_beam_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict J_0, const real *restrict s, const real *restrict e,
+    const real *restrict M_phi, const real *restrict K_f, const real *restrict D_f,
+    const real *restrict r_e, const real *restrict Phi_O, const real *restrict Theta_O,
+    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
+    const real *restrict B_r, const real *restrict B_w, const real *restrict D_w,
+    const real *restrict T, const real *restrict B_eta, const real *restrict D_eta,
+    const real *restrict r_p, const real *restrict R_p, const real *restrict eta_p,
+    const real *restrict q_p, const real *restrict m_p, const real *restrict m_pI,
+    const real *restrict K_g, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
+
 extern const mstmm_element mstmm_classical_body_planar;
 int mstmm_classical_body_planar_transfer(const real *restrict M, const real *restrict r_IO,
     const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
     const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
 
+extern const mstmm_element mstmm_classical_body_planar_discrete;
+int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict I_0, const real *restrict r_e, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
+    const real *restrict D_theta, const real *restrict r_p, const real *restrict theta_p,
+    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, real *restrict U);
+
 extern const mstmm_element mstmm_classical_body_spatial;
 int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
     const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
     const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
+
+extern const mstmm_element mstmm_classical_body_spatial_discrete;
+int mstmm_classical_body_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict J_0, const real *restrict r_e, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_w,
+    const real *restrict D_w, const real *restrict T, const real *restrict r_p,
+    const real *restrict R_p, const real *restrict q_p, const real *restrict g,
+    const real *restrict f_r, const real *restrict f_m, real *restrict U);
+
+extern const mstmm_element mstmm_classical_elastic_planar_discrete;
+int mstmm_classical_elastic_planar_discrete_transfer(const real *restrict m,
+    const real *restrict S_0, const real *restrict I_0, const real *restrict S_t,
+    const real *restrict S_r, const real *restrict S_c, const real *restrict G_f,
+    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
+    const real *restrict r_e, const real *restrict Phi_O, const real *restrict Theta_O,
+    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
+    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
+    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
+    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
+    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
+    const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_elastic_spatial_discrete;
+int mstmm_classical_elastic_spatial_discrete_transfer(const real *restrict m,
+    const real *restrict S_0, const real *restrict J_0, const real *restrict S_t,
+    const real *restrict E, const real *restrict F, const real *restrict K_f,
+    const real *restrict D_f, const real *restrict r_e, const real *restrict Phi_O,
+    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_w,
+    const real *restrict D_w, const real *restrict T, const real *restrict B_eta,
+    const real *restrict D_eta, const real *restrict r_p, const real *restrict R_p,
+    const real *restrict eta_p, const real *restrict q_p, const real *restrict m_p,
+    const real *restrict m_pI, const real *restrict K_g, const real *restrict g,
+    const real *restrict f_r, const real *restrict f_m, const real *restrict f_eta,
+    real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_beam;
+int mstmm_classical_hinge_ball_spatial_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_rigid;
+int mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_beam;
+int mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_rigid;
+int mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_beam;
+int mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(const real *restrict W,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
+    const real *restrict eta_pO, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
+    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_rigid;
+int mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(const real *restrict S_I,
+    const real *restrict eta_pI, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
+    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_beam;
+int mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(const real *restrict W,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
+    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
+    const real *restrict m_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_rigid;
+int mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
+    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
+    const real *restrict m_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_beam;
+int mstmm_classical_hinge_fixed_planar_beam_beam_transfer(const real *restrict W,
+    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict gamma,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_rigid;
+int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(const real *restrict Theta_I,
+    const real *restrict gamma, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_beam;
+int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(const real *restrict W,
+    const real *restrict Theta_O, const real *restrict gamma, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_rigid;
+int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(const real *restrict gamma,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_beam;
+int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict W,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
+    const real *restrict eta_pO, const real *restrict beta, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_rigid;
+int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(const real *restrict S_I,
+    const real *restrict eta_pI, const real *restrict beta, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_beam;
+int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(const real *restrict W,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict beta,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_rigid;
+int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(const real *restrict beta,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_beam;
+int mstmm_classical_hinge_pin_spatial_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict S_I, const real *restrict eta_pI,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict a,
+    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
+    const real *restrict tau_n, const real *restrict S_N, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_rigid;
+int mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(const real *restrict U,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict a,
+    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_beam;
+int mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict S_O, const real *restrict eta_pO,
+    const real *restrict a, const real *restrict beta, const real *restrict a_n,
+    const real *restrict m_n, const real *restrict tau_n, const real *restrict S_N,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_rigid;
+int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict a, const real *restrict beta, const real *restrict a_n,
+    const real *restrict m_n, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_beam;
+int mstmm_classical_hinge_smooth_planar_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_rigid;
+int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_beam;
+int mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_rigid;
+int mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_beam;
+int mstmm_classical_hinge_spring_planar_beam_beam_transfer(const real *restrict W,
+    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
+    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
+    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
+    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_rigid;
+int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict Theta_I,
+    const real *restrict k_t, const real *restrict c_t, const real *restrict k_1,
+    const real *restrict k_3, const real *restrict c_r, const real *restrict C,
+    const real *restrict D_phi, const real *restrict phi_0, const real *restrict phi_s,
+    const real *restrict theta_s, const real *restrict d_s, const real *restrict q_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_beam;
+int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict W,
+    const real *restrict Theta_O, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_1, const real *restrict k_3, const real *restrict c_r,
+    const real *restrict C, const real *restrict D_phi, const real *restrict phi_0,
+    const real *restrict phi_s, const real *restrict theta_s, const real *restrict d_s,
+    const real *restrict q_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_rigid;
+int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
+    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
+    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
+    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
 
 extern const mstmm_element mstmm_classical_pin_planar;
 int mstmm_classical_pin_planar_transfer(const real *restrict U, const real *restrict F_scale,
@@ -254,6 +497,17 @@ int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict
     real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
     real *restrict D_ii);
 
+extern const mstmm_element mstmm_sweep_beam;
+int mstmm_sweep_beam_rigid(const real *restrict x, const real *restrict inertia,
+    real *restrict mass, real *restrict first, real *restrict second);
+int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inertia,
+    const real *restrict stiffness, const real *restrict axis_k, const real *restrict turn_k,
+    const real *restrict slope_k, const real *restrict strain_k, const real *restrict axis_l,
+    const real *restrict turn_l, const real *restrict slope_l, const real *restrict strain_l,
+    real *restrict C, real *restrict E, real *restrict F, real *restrict K, real *restrict g);
+int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
+    real *restrict phi, real *restrict theta);
+
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
@@ -276,6 +530,8 @@ int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
 int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict v, const real *restrict w, real *restrict L,
     real *restrict K);
+int mstmm_sweep_frames_carried_momentum(const real *restrict A, const real *restrict x,
+    const real *restrict h, real *restrict p, real *restrict L);
 int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict gravity, real *restrict V);
 int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_);
@@ -535,6 +791,63 @@ int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restr
 int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_modal;
+int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
+    real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f);
+int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
+    real *restrict h, real *restrict h_f, real *restrict T);
+int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d);
+int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
+    real *restrict Psid, real *restrict xdd);
+int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
+    real *restrict v, real *restrict w, real *restrict c);
+int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
+    real *restrict v, real *restrict w, real *restrict c);
+int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
+    real *restrict H);
+int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, real *restrict c_s);
+int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
+    real *restrict S_rf, real *restrict S_ff, real *restrict e_f);
+int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
+    const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
+    real *restrict e_f);
+int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restrict e,
+    const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
+    real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
+    real *restrict work);
+int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict etadd);
+int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+    const real *restrict delta_I, real *restrict delta);
+int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+    const real *restrict s, real *restrict e, real *restrict e_f);
+int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
+    const real *restrict e_f, real *restrict tau);
 
 extern const mstmm_element mstmm_sweep_screw;
 int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,

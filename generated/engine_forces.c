@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "elements.h"
+#include "engine_modal.h"
 #include "engine_sweep.h"
 
 typedef int (*coordinate_law)(const real *p, const real *q, const real *u, const real *effort,
@@ -26,6 +27,7 @@ void mstmm_pose_pass(mstmm_state *state, int hinges_known)
         const mstmm_body *body = &model->bodies[i];
         real *block = state->workspace + body->block;
         const real *parent = mstmm_block(model, state->workspace, body->parent);
+        if (mstmm_idle(state, body)) continue;
         if (!body->generic && !hinges_known) mstmm_hinge_motion(state, i, qdot + body->q);
         mstmm_sweep_frames_pose(parent + MSTMM_BLOCK_A, parent + MSTMM_BLOCK_X, block,
                                 block + MSTMM_BLOCK_SHIFT, block + MSTMM_BLOCK_A,
@@ -136,6 +138,7 @@ int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance)
 {
     static const real identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const mstmm_model *model = state->model;
+    mstmm_modal_drag(state, balance);
     point_loads(state, balance);
     for (int k = 0; k < model->n_forces; k++) {
         const mstmm_force *element = &model->forces[k];

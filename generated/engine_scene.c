@@ -5,6 +5,7 @@
 
 #include "elements.h"
 #include "engine_compiled.h"
+#include "engine_modal.h"
 
 typedef int (*energy_kernel)(const real *p, const real *v, const real *w, real *energy);
 typedef int (*inertia_kernel)(const real *p, real *inertia);
@@ -16,7 +17,7 @@ static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, c
                             mstmm_failure *failure)
 {
     return (mstmm_state){.model = model, .workspace = workspace, .t = t, .memory = memory,
-                         .failure = failure};
+                         .observed = 1, .failure = failure};
 }
 
 /* State as `mstmm_accelerations` left it: coordinates filled, hinges known, poses computed. */
@@ -30,7 +31,9 @@ static int complete(mstmm_state *state, const real *q, const real *u)
     state->slots = state->values + model->n_values + 3 * model->n_drives;
     real *qdot = state->slots + model->tape_slots;
     for (int i = 0; i < model->n_bodies; i++) {
-        int code = mstmm_hinge_motion(state, i, qdot + model->bodies[i].q);
+        const mstmm_body *body = &model->bodies[i];
+        int code = body->section ? mstmm_section_motion(state, i)
+                                 : mstmm_hinge_motion(state, i, qdot + body->q);
         if (code) return code;
     }
     mstmm_pose_pass(state, 1);
@@ -83,9 +86,15 @@ static void observe_sums(const mstmm_state *state, const mstmm_balance *balance,
         const real *block = state->workspace + body->block;
         const real *a = block + MSTMM_BLOCK_A, *x = block + MSTMM_BLOCK_X;
         const real *v = block + MSTMM_BLOCK_V, *w = block + MSTMM_BLOCK_MOTION;
-        real inertia[21], energy;
-        ((inertia_kernel)body->inertia)(body->body_p, inertia);
-        ((energy_kernel)body->energy)(body->body_p, v, w, &energy);
+        real inertia[21], momentum[6], energy;
+        if (body->modal) {
+            mstmm_modal_momentum(state, i, inertia, momentum, &energy);
+            mstmm_sweep_frames_carried_momentum(a, x, momentum, sums + 4, sums + 7);
+        } else {
+            ((inertia_kernel)body->inertia)(body->body_p, inertia);
+            ((energy_kernel)body->energy)(body->body_p, v, w, &energy);
+            mstmm_sweep_frames_momentum(inertia, a, x, v, w, sums + 4, sums + 7);
+        }
         sums[0] += energy;
         for (int j = 0; j < body->nu; j++) {
             mstmm_sweep_frames_rotor_energy(body->rotor + j, state->u + body->u + j, &energy);
@@ -93,7 +102,6 @@ static void observe_sums(const mstmm_state *state, const mstmm_balance *balance,
         }
         mstmm_sweep_frames_gravity_energy(inertia, a, x, model->gravity, &energy);
         sums[1] += energy;
-        mstmm_sweep_frames_momentum(inertia, a, x, v, w, sums + 4, sums + 7);
     }
     sums[2] = balance->potential;
     sums[3] = balance->power;

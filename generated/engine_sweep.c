@@ -5,6 +5,7 @@
 
 #include "elements.h"
 #include "engine_links.h"
+#include "engine_modal.h"
 #include "engine_sweep.h"
 
 typedef int (*forward_kernel)(const real *rt, const real *ro, const real *p, const real *q,
@@ -206,8 +207,10 @@ int mstmm_forward_body(mstmm_state *state, int i, const real *parent_motion, rea
     const real *rt = body->connection, *ro = body->connection + 9;
     real *s = mstmm_s(block, body->nu), *motion = block + MSTMM_BLOCK_MOTION;
     int code;
+    if (mstmm_idle(state, body)) return 0;
     if (body->generic) {
-        code = mstmm_hinge_motion(state, i, qdot + body->q);
+        code = body->section ? mstmm_section_motion(state, i)
+                             : mstmm_hinge_motion(state, i, qdot + body->q);
         if (code) return code;
         code = generic_forward[body->nu](
             rt, ro, block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_D,
@@ -220,9 +223,14 @@ int mstmm_forward_body(mstmm_state *state, int i, const real *parent_motion, rea
                                                block + MSTMM_BLOCK_SHIFT, motion, qdot + body->q);
     }
     if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, i, code);
-    ((inertia_kernel)body->inertia)(body->body_p, block + MSTMM_BLOCK_S);
+    if (body->modal) {
+        code = mstmm_modal_forward(state, i, qdot);
+        if (code) return code;
+    } else {
+        ((inertia_kernel)body->inertia)(body->body_p, block + MSTMM_BLOCK_S);
+        ((bias_load_kernel)body->bias_load)(body->body_p, motion, block + MSTMM_BLOCK_E);
+    }
     mstmm_sweep_frames_pivot_floor(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_FLOOR);
-    ((bias_load_kernel)body->bias_load)(body->body_p, motion, block + MSTMM_BLOCK_E);
     return 0;
 }
 
@@ -265,6 +273,12 @@ int mstmm_condense_body(mstmm_state *state, int i)
     real *parent = mstmm_block(model, state->workspace, body->parent);
     real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
     int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (body->modal) {
+        code = mstmm_modal_condense(state, i);
+        if (code) return code;
+    }
+    if (body->section && !body->section->inward) mstmm_section_absorb(state, i);
     if (body->generic) {
         real tau[6], rotor[6];
         int n = pack_free(state, body, block, tau, rotor);
@@ -286,10 +300,12 @@ void mstmm_recover_body(mstmm_state *state, int i, const real *parent_delta, rea
     const mstmm_body *body = &state->model->bodies[i];
     real *block = state->workspace + body->block;
     const real *gain = mstmm_gain(block, body->nu), *offset = mstmm_g(block, body->nu);
+    if (mstmm_idle(state, body)) return;
     if (!body->generic) {
         ((recover_kernel)body->recover)(block, block + MSTMM_BLOCK_SHIFT, body->hinge_p,
                                         state->q + body->q, gain, offset, parent_delta,
                                         udot + body->u, block + MSTMM_BLOCK_DELTA);
+        if (body->modal) mstmm_modal_recover(state, i, udot);
         return;
     }
     const int imposed = mstmm_imposed(body, state->memory);
@@ -301,6 +317,10 @@ void mstmm_recover_body(mstmm_state *state, int i, const real *parent_delta, rea
                        offset, parent_delta, free_rates, block + MSTMM_BLOCK_DELTA);
     for (int j = 0, k = 0; j < body->nu; j++)
         udot[body->u + j] = imposed && body->imposed_mask[j] ? s[j] : free_rates[k++];
+    if (body->modal)
+        mstmm_modal_recover(state, i, udot);
+    else if (body->section)
+        mstmm_section_follow(state, i);
 }
 
 /* S and e of every subtree, tips to root; accelerations, root to tips. */
@@ -403,7 +423,9 @@ static int load_bodies(mstmm_state *state, const real *efforts, real *qdot, real
     if (balance) balance->power = balance->potential = 0;
     set_efforts(state, efforts, balance);
     code = mstmm_law_pass(state, balance);
-    if (code || !(model->needs_pose || model->product)) return code;
+    if (code) return code;
+    if (balance) mstmm_modal_balance(state, balance);
+    if (!(model->needs_pose || model->product)) return 0;
     mstmm_pose_pass(state, 0);
     return load_pass(state, balance, applied);
 }
@@ -447,7 +469,7 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
                              mstmm_balance *balance, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model, .workspace = workspace, .t = t, .memory = memory,
-                         .failure = failure};
+                         .observed = 1, .failure = failure};
     return sweep(&state, q, u, NULL, qdot, udot, balance);
 }
 
@@ -474,6 +496,9 @@ int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, co
         const mstmm_body *body = &model->bodies[i];
         real *block = workspace + body->block, *load = block + MSTMM_BLOCK_E;
         const real *tau = mstmm_tau(block, body->nu);
+        if (mstmm_idle(&state, body)) continue;
+        if (body->section && !body->section->inward) mstmm_section_effort(&state, i);
+        if (body->modal) mstmm_modal_effort(&state, i, efforts);
         if (!body->generic) {
             code = mstmm_hinge_motion(&state, i, qdot + body->q);
             if (code) return code;

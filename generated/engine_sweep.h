@@ -37,6 +37,30 @@
 #define MSTMM_FAILED_HINGE 4
 #define MSTMM_FAILED_PRODUCT_PIVOT 5
 #define MSTMM_FAILED_PRODUCT_ERROR 6
+#define MSTMM_FAILED_SECTION 7
+#define MSTMM_FAILED_MODES 8
+
+/* Moments of the fields of a flexible body under one density; see derive/flexible/symbols.py. */
+typedef struct {
+    const real *rigid, *c, *p, *b, *z[6], *y[3], *g[3], *m;
+} mstmm_moments;
+
+/* A flexible body: internal coordinates of the body that is its floating frame. */
+typedef struct {
+    int n, q, u; /* modes, their places in the state */
+    mstmm_moments moments;
+    const mstmm_moments *drag; /* NULL: none */
+    const real *stiffness, *damping;
+    int64_t place; /* of its numbers in the workspace, see mstmm_modal_numbers */
+} mstmm_modal;
+
+/* A section of a flexible body, and which way it is passed. */
+typedef struct {
+    const mstmm_modal *modal;
+    int inward; /* 1: from the section that is held to the floating frame; 0: outward, to an end */
+    const real *point, *phi, *theta, *shortening[3], *end;
+    int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
+} mstmm_section;
 
 /* One body with its inboard hinge, in depth-first order. */
 typedef struct {
@@ -53,6 +77,9 @@ typedef struct {
     const real *hinge_p, *body_p;
     const real *rotor;       /* reflected inertia per speed */
     const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
+    const mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
+    const mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
+    int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
     void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
@@ -167,6 +194,9 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
                            const real *u, const real *memory, const real *udot, real *efforts,
                            mstmm_failure *failure);
+/* Numbers that a flexible body of n modes, and one of its sections, keep in the workspace. */
+int64_t mstmm_modal_numbers(int n);
+int64_t mstmm_section_numbers(int n);
 /* cdef end */
 
 /* The rest is for the other engine files. */
@@ -199,6 +229,7 @@ typedef struct mstmm_state {
     real *values, *slots;
     int imposed_all; /* every speed follows `udot` (inverse dynamics) */
     int linked;      /* runs with numbers are swept as links */
+    int observed;    /* idle ends are swept too */
     const real *udot, *efforts;
     mstmm_failure *failure;
 } mstmm_state;

@@ -29,6 +29,8 @@ int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
 int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict v, const real *restrict w, real *restrict L,
     real *restrict K);
+int mstmm_sweep_frames_carried_momentum(const real *restrict A, const real *restrict x,
+    const real *restrict h, real *restrict p, real *restrict L);
 int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
     const real *restrict x, const real *restrict gravity, real *restrict V);
 int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_);
@@ -972,6 +974,84 @@ static const mstmm_port mstmm_sweep_frames_momentum_outputs[] = {
     {"K", 3, "kg*m2/s", 1, 0},
 };
 
+/* momentum about the inertial origin
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  x[3] (m) P of the body, inertial axes
+ * in  h[6] (N*s, N*m*s) momentum, moment of momentum about P, body axes
+ * out p[3] (N*s) momentum, inertial axes, added to what is there
+ * out L[3] (N*m*s) angular momentum about the inertial origin, added to what is there
+ */
+int mstmm_sweep_frames_carried_momentum(const real *restrict A, const real *restrict x,
+    const real *restrict h, real *restrict p, real *restrict L)
+{
+    const real t0 = A[0] * h[0];
+    const real t1 = A[1] * h[1];
+    const real t2 = t0 + t1;
+    const real t3 = A[2] * h[2];
+    const real t4 = t2 + t3;
+    p[0] += t4;
+    const real t5 = A[3] * h[0];
+    const real t6 = A[4] * h[1];
+    const real t7 = t5 + t6;
+    const real t8 = A[5] * h[2];
+    const real t9 = t7 + t8;
+    p[1] += t9;
+    const real t10 = A[6] * h[0];
+    const real t11 = A[7] * h[1];
+    const real t12 = t10 + t11;
+    const real t13 = A[8] * h[2];
+    const real t14 = t12 + t13;
+    p[2] += t14;
+    const real t15 = x[1] * t14;
+    const real t16 = x[2] * t9;
+    const real t17 = t15 - t16;
+    const real t18 = A[0] * h[3];
+    const real t19 = A[1] * h[4];
+    const real t20 = t18 + t19;
+    const real t21 = A[2] * h[5];
+    const real t22 = t20 + t21;
+    const real t23 = t17 + t22;
+    L[0] += t23;
+    const real t24 = x[2] * t4;
+    const real t25 = x[0] * t14;
+    const real t26 = t24 - t25;
+    const real t27 = A[3] * h[3];
+    const real t28 = A[4] * h[4];
+    const real t29 = t27 + t28;
+    const real t30 = A[5] * h[5];
+    const real t31 = t29 + t30;
+    const real t32 = t26 + t31;
+    L[1] += t32;
+    const real t33 = x[0] * t9;
+    const real t34 = x[1] * t4;
+    const real t35 = t33 - t34;
+    const real t36 = A[6] * h[3];
+    const real t37 = A[7] * h[4];
+    const real t38 = t36 + t37;
+    const real t39 = A[8] * h[5];
+    const real t40 = t38 + t39;
+    const real t41 = t35 + t40;
+    L[2] += t41;
+    return 0;
+}
+
+static int mstmm_sweep_frames_carried_momentum_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_carried_momentum(in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_carried_momentum_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"x", 3, "m", 0, 0},
+    {"h", 6, "N*s, N*m*s", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_carried_momentum_outputs[] = {
+    {"p", 3, "N*s", 1, 0},
+    {"L", 3, "N*m*s", 1, 0},
+};
+
 /* potential energy of gravity
  * in  S[21] mass matrix at P
  * in  A[3][3] rotation, body axes to inertial axes
@@ -1888,6 +1968,18 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "carried_momentum",
+        .function = (void (*)(void))mstmm_sweep_frames_carried_momentum,
+        .call = mstmm_sweep_frames_carried_momentum_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_carried_momentum_inputs,
+        .outputs = mstmm_sweep_frames_carried_momentum_outputs,
+        .ir_hash = "1f1532e7555a73995fe2cb0edcd51e3778770dde948f50170477951d6ff1eaf0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "gravity_energy",
         .function = (void (*)(void))mstmm_sweep_frames_gravity_energy,
         .call = mstmm_sweep_frames_gravity_energy_call,
@@ -2013,7 +2105,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "96a8a80bba97d4bb0e5f69442fc56261cbbd1499a05515e1f165b8ac806aa697",
+    .hash = "ea7ff599a6321a93807f7d11f01080ad098c520e042f3b230c39a822d63050b0",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2023,6 +2115,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 19,
+    .n_kernels = 20,
     .kernels = mstmm_sweep_frames_kernels,
 };

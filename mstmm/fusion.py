@@ -46,8 +46,9 @@ PRINTERS = {
     ),
     "mstmm.derive": (
         "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fused_c.py", "fused_loads.py",
+        "fused_modal.py",
         "fused_sincos.py", "inline.py", "straight_c.py", "streams.py", "thrift.py",
-        "transport.py",
+        "transport.py", "unrolled.py",
     ),
 }  # fmt: skip
 

@@ -33,6 +33,37 @@ class ExpressionStructure:
 
 
 @dataclass(frozen=True)
+class ModalStructure:
+    """Internal coordinates of a flexible body whose floating frame is this body.
+
+    `moments` and `drag` (empty: none) are the inputs of the kernel "momentum" of ("sweep", "modal")
+    from p to M, by name; stiffness and damping (n x n) row by row.
+    """
+
+    n: int
+    q: int
+    u: int
+    moments: tuple[tuple[str, Entries], ...]
+    drag: tuple[tuple[str, Entries], ...]
+    stiffness: Entries
+    damping: Entries
+
+
+@dataclass(frozen=True)
+class SectionStructure:
+    """A section of the flexible body with floating frame `frame`, which a connection passes:
+    outward from the frame to an end, or inward from the end that is held.
+
+    `numbers` are the inputs r, phi, theta, g_x, g_y, g_z of the kernel "section", by name.
+    """
+
+    frame: int
+    inward: bool
+    numbers: tuple[tuple[str, Entries], ...]
+    end: Entries
+
+
+@dataclass(frozen=True)
 class BodyStructure:
     """One body with its inboard hinge, in the engine's internal frames.
 
@@ -56,6 +87,9 @@ class BodyStructure:
     rotor: Entries
     link: Entries
     imposed: tuple[int, ...]
+    modal: ModalStructure | None = None
+    section: SectionStructure | None = None
+    idle: bool = False  #: an end that nothing hangs on or acts on
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from mstmm.topology import Run, Topology
 
 from . import alignment, placement, prebuilt
 from .alignment import connection_of
+from .flexible.expansion import Expanded
+from .flexible.records import ModalRecords, in_frame, section_in
 from .layout import Group, HingeSlots, Layout
 from .placement import GROUND, KERNEL_OF, Placement, rigid_parameters
 from .prebuilt import Element
@@ -51,8 +53,11 @@ class Elements:
         return found
 
 
-def layout_of(scene: Scene, releases: Mapping[str, int], elements: Elements, ffi: Any) -> Layout:
-    """Places of all hinges in q and u: the scene's hinges, then those of its chains."""
+def layout_of(
+    expanded: Expanded, releases: Mapping[str, int], elements: Elements, ffi: Any
+) -> Layout:
+    """Places of all hinges in q and u: the scene's hinges, those of its chains, then the modes."""
+    scene = expanded.scene
     groups: list[Group] = []
     q = u = 0
     starts = [*range(len(scene.hinge)), *scene.hinges.starts[:-1]]
@@ -67,7 +72,15 @@ def layout_of(scene: Scene, releases: Mapping[str, int], elements: Elements, ffi
         repeats, rest = divmod(count, pattern)
         q += repeats * nq + sum(s.nq for s in slots[:rest])
         u += repeats * nu + sum(s.nu for s in slots[:rest])
-    return Layout(scene, tuple(groups), q, u)
+    modal = {}
+    for name, body in expanded.bodies.items():
+        n = len(body.modes)
+        units = tuple("rad" if mode.startswith("twist") else "m" for mode in body.modes)
+        rates = tuple(f"{unit}/s" for unit in units)
+        modal[name] = HingeSlots(name, "modes", q, u, body.modes, units, body.modes, rates, None)
+        q, u = q + n, u + n
+    internal = range(len(expanded.described.hinge), len(scene.hinge))
+    return Layout(scene, tuple(groups), q, u, modal, internal)
 
 
 def _slots(
@@ -111,7 +124,12 @@ class BodyRecords:
         kept: list[Any],
         c_tape: Callable[[Tape], Any],
         align: bool,
+        expanded: Expanded,
     ) -> None:
+        self.expanded = expanded
+        self.modal = ModalRecords(ffi, lib, kept)
+        #: C records of the flexible bodies by their names.
+        self._modal: dict[str, Any] = {}
         self.scene, self.topology, self.layout, self.elements = scene, topology, layout, elements
         self.releases, self.ffi, self.lib, self.kept = releases, ffi, lib, kept
         self.c_tape, self.align = c_tape, align
@@ -194,7 +212,8 @@ class BodyRecords:
         kernel = self.elements.get("hinge", kernel_type(hinge, self.releases), hinge.name)
         inboard, outboard, numbers = placement.alignment(hinge)
         own = placement.place(body, run.outboard_end, outboard)
-        child = self._child(run, k) if self.align else None
+        flexible = self.expanded.is_node(body.name)
+        child = self._child(run, k) if self.align and not flexible else None
         place = alignment.aligned(own, body, hinge, child)
         self._placements.setdefault(run.body, []).append(place)
         record.nq, record.nu = slots.nq, slots.nu
@@ -202,17 +221,54 @@ class BodyRecords:
         self._hinge_functions(record, kernel)
         rigid = self._body_functions(record, body, place)
         self._imposed(record, hinge, slots)
-        self._connection(record, run, k, inboard, place, rigid)
+        self._connection(record, run, k, inboard, place, rigid, flexible)
+        if flexible:
+            self._flexible(record, body.name, place)
+
+    def _flexible(self, record: Any, name: str, place: Placement) -> None:
+        """Modes and sections of a node of a flexible body."""
+        passage = self.expanded.passages.get(name)
+        body = self.expanded.bodies.get(passage.body if passage else name)
+        if body is None:
+            return  # the massless node of the section that is held
+        if name in self.expanded.bodies:
+            turned = in_frame(body, np.array(place.rotation), np.array(place.origin))
+            slots = self.layout.modal[name]
+            record.modal = self._modal[name] = self.modal.modal(turned, slots.q, slots.u)
+        if passage is None:
+            return
+        port = passage.port
+        if not passage.inward:
+            frame = self.placement_of(passage.body)
+            port = section_in(port, np.array(frame.rotation), np.array(frame.origin))
+        record.section = self.modal.section(port, self._modal[passage.body], passage.inward)
+        record.idle = int(name in self.expanded.idle)
+        record.generic = 1
+        if not passage.inward:
+            record.connection = self.reals((1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0, 0, 0, 0))
+
+    def placement_of(self, body: str) -> Placement:
+        """Internal frame of the body of this name."""
+        number = self.scene.bodies.find(body)
+        assert number is not None
+        return self.placement(number)
 
     def _connection(
-        self, record: Any, run: Run, k: int, inboard: Matrix, own: Placement, rigid: Numbers
+        self,
+        record: Any,
+        run: Run,
+        k: int,
+        inboard: Matrix,
+        own: Placement,
+        rigid: Numbers,
+        flexible: bool,
     ) -> None:
         """Way from the parent's frame; as a link where it is one.  `rigid`: the body's numbers."""
         hinge = self.scene.hinges[run.hinge + k]
         parent, parent_place = self._parent(run, k)
         turned, point = placement.connection(parent_place, parent, hinge, inboard, own)
         numbers = (*turned[0], *turned[1], *turned[2], *point)
-        axial = self.align and alignment.is_axial(hinge)
+        axial = self.align and not flexible and alignment.is_axial(hinge)
         link = alignment.link_of(turned, point) if axial else None
         record.held[2] = -own.height
         record.connection = self.reals(numbers if link is None else connection_of(link))

@@ -165,7 +165,7 @@ def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
     found: list[SingularDistance] = []
     for group in model.layout.groups:
         for k in range(min(group.count, len(group.hinges))):
-            function = _measure(model, model.scene.hinges[group.first + k])
+            function = _measure(model, model._engine.packed.scene.hinges[group.first + k])
             if function is None:
                 continue
             for number in range(group.first + k, group.first + group.count, len(group.hinges)):
@@ -179,7 +179,7 @@ def _smallest(model: Model, run: Trajectory, number: int, measures: Array) -> Si
     k = int(np.abs(measures).argmin())
     changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
     k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
-    return SingularDistance(value, model.scene.hinges.name(number), float(run.t[k]))
+    return SingularDistance(value, model._engine.packed.scene.hinges.name(number), float(run.t[k]))
 
 
 def _measure(model: Model, hinge: Hinge) -> Any:

@@ -16,7 +16,7 @@ from .pack import Packed
 
 Array = NDArray[np.float64]
 
-UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT = 1, 2, 3, 4, 5, 6
+UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT, _SECTION, _MODES = range(1, 9)
 
 
 @dataclass(frozen=True)
@@ -194,6 +194,11 @@ class Engine:
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
+    def body_name(self, position: int) -> str:
+        """Name of the body at this place of the topology."""
+        packed = self.packed
+        return packed.scene.bodies.name(packed.topology.at(position)[0])
+
     def failure_text(self, failure: Any, t: float) -> str:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
@@ -209,6 +214,18 @@ class Engine:
             return f'spring "{name}" {at}: its direction is undefined because its ends coincide'
         if reason == _HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
+        if reason == _SECTION:
+            name = self.hinge_name(element).replace("/", ".")
+            return (
+                f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, '
+                "far beyond small deflections; split the body into several that are welded together"
+            )
+        if reason == _MODES:
+            name = self.body_name(element)
+            return (
+                f'flexible body "{name}" {at}: its modal mass matrix is not positive definite; '
+                'use fewer shapes, frame = "chord" or "mean", or quadrature = true'
+            )
         if reason == _PIVOT:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '

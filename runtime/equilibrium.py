@@ -66,11 +66,13 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
 def _free_speeds(model: Model) -> list[int]:
     """Speeds that no drive prescribes."""
     free = []
-    for number, hinge in enumerate(model.scene.hinges):
+    for number, hinge in enumerate(model._engine.packed.scene.hinges):
         slots = model.layout.slots(number)
         drive = hinge.drive or (None,) * slots.nu
         held = hinge.type == "fixed"
         free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not held]
+    for slots in model.layout.modal.values():
+        free += range(slots.u, slots.u + slots.nu)
     return free
 
 

@@ -112,8 +112,20 @@ class Layout:
     `hinges` gives the slots of a hinge by its name; of chains they are made when asked for.
     """
 
-    def __init__(self, scene: Scene, groups: tuple[Group, ...], nq: int, nu: int) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        groups: tuple[Group, ...],
+        nq: int,
+        nu: int,
+        modal: Mapping[str, HingeSlots] | None = None,
+        internal: range = range(0),
+    ) -> None:
         self.groups, self.nq, self.nu = groups, nq, nu
+        #: Slots of the modal coordinates of flexible bodies, behind those of all hinges.
+        self.modal: Mapping[str, HingeSlots] = modal or {}
+        #: Numbers of hinges that stand for sections of flexible bodies.
+        self.internal = internal
         self._numbers = scene.hinges
         self.hinges: Mapping[str, HingeSlots] = _ByName(self)
 
@@ -151,16 +163,31 @@ class Layout:
     @property
     def q_names(self) -> list[str]:
         """`hinge.coordinate` for every entry of q."""
-        return [f"{h.name}.{n}" for h in self.hinges.values() for n in h.q_names]
+        return [f"{h.name}.{n}" for h in self.owners for n in h.q_names]
 
     @property
     def u_names(self) -> list[str]:
         """`hinge.speed` for every entry of u."""
-        return [f"{h.name}.{n}" for h in self.hinges.values() for n in h.u_names]
+        return [f"{h.name}.{n}" for h in self.owners for n in h.u_names]
+
+    @property
+    def owners(self) -> Iterator[HingeSlots]:
+        """Slots of everything that has coordinates: hinges, then flexible bodies."""
+        yield from self.hinges.values()
+        yield from self.modal.values()
+
+    def _modal_at(self, entry: int, letter: str) -> HingeSlots | None:
+        """The flexible body to which an entry of q or u belongs."""
+        for slots in self.modal.values():
+            if 0 <= entry - getattr(slots, letter) < slots.nq:
+                return slots
+        return None
 
     def q_name(self, entry: int) -> str:
         """`hinge.coordinate` of one entry of q."""
-        slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
+        slots = self._modal_at(entry, "q")
+        if slots is None:
+            slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
         return f"{slots.name}.{slots.q_names[entry - slots.q]}"
 
     def u_name(self, entry: int) -> str:
@@ -169,8 +196,10 @@ class Layout:
         return f"{slots.name}.{slots.u_names[entry - slots.u]}"
 
     def hinge_of_speed(self, entry: int) -> HingeSlots:
-        """The hinge to which an entry of u belongs."""
-        return self.slots(int(np.searchsorted(self.u_places, entry, side="right")) - 1)
+        """The hinge, or flexible body, to which an entry of u belongs."""
+        return self._modal_at(entry, "u") or self.slots(
+            int(np.searchsorted(self.u_places, entry, side="right")) - 1
+        )
 
     @cached_property
     def quaternions(self) -> Integers:
@@ -207,22 +236,25 @@ class StateNames(Sequence[str]):
 
 
 class _ByName(Mapping[str, HingeSlots]):
-    """Slots by the hinge's name."""
+    """Slots by the hinge's name; those of a flexible body by its name, though not listed."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
 
     def __getitem__(self, name: str) -> HingeSlots:
         number = self.layout._numbers.find(name)
-        if number is None:
-            raise KeyError(name)
-        return self.layout.slots(number)
+        if number is not None and number not in self.layout.internal:
+            return self.layout.slots(number)
+        return self.layout.modal[name]
 
     def __iter__(self) -> Iterator[str]:
-        return self.layout._numbers.names()
+        internal = self.layout.internal
+        for number, name in enumerate(self.layout._numbers.names()):
+            if number not in internal:
+                yield name
 
     def __len__(self) -> int:
-        return len(self.layout)
+        return len(self.layout) - len(self.layout.internal)
 
     def values(self) -> ValuesView[HingeSlots]:
         """All slots; faster than by their names."""
@@ -237,4 +269,8 @@ class _Values(ValuesView[HingeSlots]):
         self.layout = slots.layout
 
     def __iter__(self) -> Iterator[HingeSlots]:
-        return map(self.layout.slots, range(len(self.layout)))
+        layout = self.layout
+        for number in range(layout.internal.start):
+            yield layout.slots(number)
+        for number in range(layout.internal.stop, len(layout)):
+            yield layout.slots(number)

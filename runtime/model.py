@@ -24,6 +24,7 @@ from .start import start_values
 
 if TYPE_CHECKING:
     from .derivatives import Derivatives, Differentiation
+    from .flexible.modal_body import ModalBody
     from .result import Result
     from .simulate_batch import BatchResult
 
@@ -71,6 +72,11 @@ class Model:
         return self._engine.packed.layout
 
     @property
+    def flexible(self) -> Mapping[str, ModalBody]:
+        """Numbers of the flexible bodies by their names: modes, moments, stiffness, ports."""
+        return self._engine.packed.flexible
+
+    @property
     def nq(self) -> int:
         return self._engine.nq
 
@@ -88,9 +94,23 @@ class Model:
         """What `initial_state` gives, computed once: a scene does not change."""
         from .simulate import SceneSystem
 
-        q, u = start_values(self.scene, self.layout)
+        packed = self._engine.packed
+        q, u = start_values(packed.scene, self.layout, packed.flexible)
         y = SceneSystem(self._engine).start(0.0, q, u)
-        return y[: self.nq], y[self.nq : self.nq + self.nu]
+        q, u = y[: self.nq], y[self.nq : self.nq + self.nu]
+        described = (*packed.described.beam, *packed.described.elastic)
+        still = [b.name for b in described if b.name in packed.flexible and b.initial.static]
+        return (self._settled(q, u, still), u) if still else (q, u)
+
+    def _settled(self, q: Array, u: Array, names: Sequence[str]) -> Array:
+        """q with these flexible bodies in their static shapes under the loads at t = 0."""
+        from .flexible.static_start import settle
+
+        engine, memory = self._engine, self._engine.start_memory()
+        return settle(
+            lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
+            q, u, [self.layout.modal[name] for name in names],
+        )  # fmt: skip
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinge if the masses leave a motion of the start undetermined."""
@@ -161,8 +181,9 @@ class Model:
         engine, still = self._static, np.zeros(self.nu)
         coordinates = engine.batch("q", q, self.nq)[0].copy()
         memory = engine.start_memory()
+        strained = engine.inverse_dynamics(0.0, coordinates, still, still, memory)
         columns = [
-            engine.inverse_dynamics(0.0, coordinates, still, unit, memory)
+            engine.inverse_dynamics(0.0, coordinates, still, unit, memory) - strained
             for unit in np.eye(self.nu)
         ]
         matrix = np.array(columns).reshape(self.nu, self.nu).T

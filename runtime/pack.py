@@ -15,6 +15,8 @@ from mstmm.topology import GROUND_INDEX, Topology, build
 
 from . import prebuilt, values
 from .bodies import BodyRecords, Elements, Known, kernel_type, layout_of, user_parameters
+from .flexible.expansion import Expanded, expand
+from .flexible.modal_body import ModalBody
 from .laws import pack_laws
 from .layout import Layout
 from .links import attach_runs
@@ -29,7 +31,7 @@ __all__ = ["Known", "Packed", "kernel_type", "pack", "releasable", "resize"]
 class Packed:
     """A scene in the engine's arrays.  `kept` holds what C points to."""
 
-    scene: Scene
+    scene: Scene  #: of nodes: flexible bodies are replaced by theirs
     topology: Topology
     layout: Layout
     ffi: Any
@@ -46,9 +48,22 @@ class Packed:
     #: kernels of the scene's expressions: "values", "drives", and "effort k" of spring k
     expressions: dict[str, KernelIR] = field(default_factory=dict)
     kept: list[Any] = field(default_factory=list)
+    expanded: Expanded | None = None
+
+    @property
+    def described(self) -> Scene:
+        """The scene as the user describes it."""
+        return self.scene if self.expanded is None else self.expanded.described
+
+    @property
+    def flexible(self) -> Mapping[str, ModalBody]:
+        """Numbers of the flexible bodies."""
+        return {} if self.expanded is None else self.expanded.bodies
 
     def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """(body position, axes (9), offset (3)) of "body" or "body.end", internal axes."""
+        if self.expanded is not None:
+            reference = self.expanded.nodes.get(reference, reference)
         name, at = split(reference)
         if name == "ground":
             return GROUND_INDEX, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
@@ -60,6 +75,15 @@ class Packed:
             (*axes[0], *axes[1], *axes[2]),
             place.point(body.end_position(at)),
         )
+
+
+def expansion_of(scene: Scene) -> Expanded:
+    """The scene of nodes; scenes without flexible bodies are their own."""
+    if not (scene.beam or scene.elastic):
+        return Expanded(scene, scene, {})
+    from .flexible.bodies import modal_bodies
+
+    return expand(scene, modal_bodies(scene))
 
 
 def releasable(scene: Scene) -> list[str]:
@@ -97,12 +121,13 @@ class _Packing:
     """One pass over a scene; every method fills one part of the model."""
 
     def __init__(self, scene: Scene, known: Known, align: bool) -> None:
-        self.scene, self.elements, self.align = scene, Elements(known), align
+        self.expanded = expanded = expansion_of(scene)
+        self.scene, self.elements, self.align = expanded.scene, Elements(known), align
         self.ffi, self.lib = prebuilt.module()
         self.kept: list[Any] = []
-        self.topology = build(scene)
+        self.topology = build(self.scene)
         self.releases = {name: i for i, name in enumerate(releasable(scene))}
-        self.layout = layout_of(scene, self.releases, self.elements, self.ffi)
+        self.layout = layout_of(expanded, self.releases, self.elements, self.ffi)
         self.values = values.Values(self.layout)
         self.slots = 0
 
@@ -111,14 +136,16 @@ class _Packing:
         tree, scene = self.topology, self.scene
         bodies = BodyRecords(
             scene, tree, self.layout, self.elements, self.releases, self.ffi, self.lib, self.kept,
-            self._c_tape, self.align,
+            self._c_tape, self.align, self.expanded,
         )  # fmt: skip
-        records, model.scratch = bodies.fill()
+        records, behind = bodies.fill()
+        model.scratch = bodies.modal.begin(behind)
         packed = Packed(
             scene, tree, self.layout, self.ffi, self.lib, model, records, bodies.placements,
             Lookup(scene.bodies, tree.place_of_body), Lookup(scene.hinges, tree.place_of_hinge),
-            self.releases, 0, (), kept=self.kept,
+            self.releases, 0, (), kept=self.kept, expanded=self.expanded,
         )  # fmt: skip
+        packed.warnings += [w for body in packed.flexible.values() for w in body.warnings]
         self.kept.append(model)
         model.bodies, model.n_bodies = records.array, records.count
         for k in range(3):
@@ -189,8 +216,14 @@ class _Packing:
             name = split(load.on)[0] if load.axes == "body" else load.axes
             reference = "ground" if load.axes == "inertial" else name
             record.axes, own, _ = packed.end(reference)
-            record.axes_own = list(own)
+            record.axes_own = list(self._section_axes(reference) or own)
         packed.model.loads, packed.model.n_loads = records, len(self.scene.load)
+
+    def _section_axes(self, reference: str) -> tuple[float, ...]:
+        """Axes of a section of a flexible body (turned with it) in those of its end; else none."""
+        node = self.expanded.nodes.get(reference)
+        passage = self.expanded.passages.get(node or "")
+        return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())
 
     def _forces(self, packed: Packed) -> None:
         records = self.ffi.new("mstmm_force[]", max(1, len(self.scene.spring)))
@@ -217,7 +250,8 @@ class _Packing:
                 given = user_parameters(element, spring.parameters, f'spring "{spring.name}"')
                 record.p = self.reals(given)
         packed.model.forces, packed.model.n_forces = records, len(self.scene.spring)
-        packed.model.needs_pose = int(bool(self.scene.spring or self.scene.load))
+        dragged = any(body.drag is not None for body in packed.flexible.values())
+        packed.model.needs_pose = int(bool(self.scene.spring or self.scene.load or dragged))
 
     # --- sizes ------------------------------------------------------------------------------
 

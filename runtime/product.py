@@ -36,6 +36,9 @@ def _refuse(packed: Packed) -> None:
     """Name what the classical product has no matrix for."""
     scene = packed.scene
     way_out = 'use sweep = "riccati"'
+    if packed.flexible:
+        name = next(iter(packed.flexible))
+        raise SceneError(f'"{name}" is flexible; the product runs rigid chains only; {way_out}')
     if not packed.topology.is_chain:
         raise SceneError(f"the product of transfer matrices needs an unbranched chain; {way_out}")
     types = [scene.hinges[link.hinge].type for link in packed.topology.links]

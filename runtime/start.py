@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,10 +13,15 @@ from mstmm.scene import Hinge, Scene
 
 from .layout import HingeSlots, Layout
 
+if TYPE_CHECKING:
+    from .flexible.modal_body import ModalBody
+
 Array = NDArray[np.float64]
 
 
-def start_values(scene: Scene, layout: Layout) -> tuple[Array, Array]:
+def start_values(
+    scene: Scene, layout: Layout, flexible: Mapping[str, ModalBody] | None = None
+) -> tuple[Array, Array]:
     """(q, u) of the scene; driven coordinates still as `initial` has them."""
     q, u = np.zeros(layout.nq), np.zeros(layout.nu)
     for group in layout.groups:
@@ -28,6 +36,12 @@ def start_values(scene: Scene, layout: Layout) -> tuple[Array, Array]:
                 if len(values):
                     mine = first[k :: len(group.hinges)]
                     target[mine[:, None] + np.arange(len(values))] = values
+    for name, body in (flexible or {}).items():
+        slots = layout.modal[name]
+        if len(body.eta):
+            q[slots.q_slice] = body.eta
+        if len(body.etad):
+            u[slots.u_slice] = body.etad
     return q, u
 
 

@@ -30,6 +30,8 @@ from mstmm.structure import (
     Key,
     LawStructure,
     LoadStructure,
+    ModalStructure,
+    SectionStructure,
     Structure,
 )
 
@@ -167,6 +169,61 @@ def _body(reader: _Reader, index: int) -> BodyStructure:
         (*reader.entries(own[:count]), *reader.entries(own[count:], axes=True)),
         reader.entries(reader.unpack(record.rotor, record.nu)), link,
         tuple(reader.unpack(record.imposed_mask, record.nu)),
+        _modal(reader, record.modal), _section(reader, record), bool(record.idle),
+    )  # fmt: skip
+
+
+#: Fields of `mstmm_moments` in the order of the kernels' inputs: name, field, rows (n: modes).
+_MOMENTS = (
+    ("p", "rigid", None), ("C", "c", 3), ("P", "p", 3), ("B", "b", 6),
+    *((f"Z_{ab}", ("z", k), "n") for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))),
+    *((f"Y_{a}", ("y", k), "n") for k, a in enumerate("xyz")),
+    *((f"G_{a}", ("g", k), "n") for k, a in enumerate("xyz")),
+    ("M", "m", "n"),
+)  # fmt: skip
+
+
+def _moments(reader: _Reader, record: Any, n: int) -> tuple[tuple[str, Entries], ...]:
+    found = []
+    for name, field, rows in _MOMENTS:
+        pointer = (
+            getattr(record, field)
+            if isinstance(field, str)
+            else getattr(record, field[0])[field[1]]
+        )
+        count = 10 if rows is None else n * (n if rows == "n" else int(rows))
+        found.append((name, reader.entries(reader.unpack(pointer, count))))
+    return tuple(found)
+
+
+def _modal(reader: _Reader, record: Any) -> ModalStructure | None:
+    """Modes of a flexible body; None for a body without."""
+    if record == reader.ffi.NULL:
+        return None
+    n = int(record.n)
+    drag = () if record.drag == reader.ffi.NULL else _moments(reader, record.drag, n)
+    return ModalStructure(
+        n, int(record.q), int(record.u), _moments(reader, record.moments, n), drag,
+        reader.entries(reader.unpack(record.stiffness, n * n)),
+        reader.entries(reader.unpack(record.damping, n * n)),
+    )  # fmt: skip
+
+
+def _section(reader: _Reader, body: Any) -> SectionStructure | None:
+    """Section that a body's connection passes; None where it passes none."""
+    record = body.section
+    if record == reader.ffi.NULL:
+        return None
+    n, model = int(record.modal.n), reader.packed.model
+    frame = next(i for i in range(model.n_bodies) if model.bodies[i].modal == record.modal)
+    arrays = [
+        ("r", record.point, 3), ("phi", record.phi, 3 * n), ("theta", record.theta, 3 * n),
+        *((f"g_{a}", record.shortening[k], n * n) for k, a in enumerate("xyz")),
+    ]  # fmt: skip
+    return SectionStructure(
+        frame, bool(record.inward),
+        tuple((name, reader.entries(reader.unpack(x, count))) for name, x, count in arrays),
+        reader.entries(reader.unpack(record.end, 9), axes=True),
     )  # fmt: skip
 
 

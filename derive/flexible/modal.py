@@ -22,13 +22,13 @@ from .symbols import (
     ETAD,
     MASS,
     MOMENTS,
-    N,
     RIGID,
     SOURCES,
     STIFFNESS,
     B,
     C,
     G,
+    N,
     P,
     Y,
     Z,
@@ -160,12 +160,8 @@ def momentum() -> Derivation:
         (
             *_geometry(),
             _mass(),
-            Equation(
-                "momentum of the frame", total.symbol, S.symbol * twist + S_RF.symbol * etad
-            ),
-            Equation(
-                "modal momentum", own.symbol, S_RF.symbol.T * twist + MASS.symbol * etad
-            ),
+            Equation("momentum of the frame", total.symbol, S.symbol * twist + S_RF.symbol * etad),
+            Equation("modal momentum", own.symbol, S_RF.symbol.T * twist + MASS.symbol * etad),
             Equation("T", energy.symbol, HALF * twice),
         ),
         sources=SOURCES,

@@ -71,23 +71,21 @@ def rebase() -> Derivation:
 
 
 def condense() -> Derivation:
-    """Modes eliminated: S - S_rf S_ff^-1 S_fr and e - S_rf S_ff^-1 (e_f - tau)."""
-    right = Quantity(sp.MatrixSymbol("right", N, 7), "", "S_fr, e_f - tau")
+    """Modes eliminated: S - S_rf S_ff^-1 S_fr and e - S_rf S_ff^-1 e_f (efforts are in e_f)."""
+    right = Quantity(sp.MatrixSymbol("right", N, 7), "", "S_fr, e_f")
     reduced = Quantity(sp.MatrixSymbol("S_c", 6, 6), "", "S without modes", symmetric=True)
     load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
-    both = sp.BlockMatrix([[S_RF.symbol.T, E_F.symbol - TAU.symbol]])
+    both = sp.BlockMatrix([[S_RF.symbol.T, E_F.symbol]])
     gain = GAIN.symbol
     return Derivation(
         "modal",
         "modes of a flexible body condensed",
-        (S, E, S_RF, S_FF, E_F, TAU),
+        (S, E, S_RF, S_FF, E_F),
         (right, GAIN, reduced, load),
         (
-            Equation("[S_fr, e_f - tau]", right.symbol, both),
-            Equation("S_ff^-1 [S_fr, e_f - tau]", gain, Solve(S_FF.symbol, right.symbol, True)),
-            Equation(
-                "S_c", reduced.symbol, S.symbol - S_RF.symbol * gain[:, :6], symmetric=True
-            ),
+            Equation("[S_fr, e_f]", right.symbol, both),
+            Equation("S_ff^-1 [S_fr, e_f]", gain, Solve(S_FF.symbol, right.symbol, True)),
+            Equation("S_c", reduced.symbol, S.symbol - S_RF.symbol * gain[:, :6], symmetric=True),
             Equation("e_c", load.symbol, E.symbol - S_RF.symbol * gain[:, 6:]),
         ),
         sources=SOURCES,
@@ -155,6 +153,4 @@ def modal_effort() -> Derivation:
     )
 
 
-__all__ = [
-    "absorb", "condense", "displaced", "modal_effort", "prescribed", "rebase", "recover",
-]  # fmt: skip
+STEPS = (absorb, rebase, condense, recover, displaced, prescribed, modal_effort)

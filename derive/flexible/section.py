@@ -15,7 +15,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..derivation import Derivation, Equation, Quantity, tilde, vector
-from .symbols import ETA, ETAD, N, SOURCES, column, modal, pair, part, stack
+from .symbols import ETA, ETAD, SOURCES, column, modal, pair, part, stack
 
 eta, etad = ETA.symbol, ETAD.symbol
 
@@ -107,13 +107,17 @@ def _tangent_rate(sign: int) -> sp.ImmutableDenseMatrix:
     c, bd, cd = (COEFFICIENTS[k, 0] for k in (2, 3, 4))
     turn, rate = tilde(part(TURN.symbol, 0)), tilde(part(TURN_RATE.symbol, 0))
     crossed = turn * part(TURN_RATE.symbol, 0)
-    return sp.ImmutableDenseMatrix(-sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed))
+    return sp.ImmutableDenseMatrix(
+        -sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed)
+    )
 
 
 _OUTPUTS = (
     Quantity(sp.MatrixSymbol("R", 3, 3), "", "rotation, outboard axes to inboard axes"),
     Quantity(vector("d", 3), "m", "outboard point from the inboard one, inboard axes"),
-    Quantity(sp.MatrixSymbol("H6", 6, 6), "", "subspace by [xd; Psid], rows v then w, outboard axes"),
+    Quantity(
+        sp.MatrixSymbol("H6", 6, 6), "", "subspace by [xd; Psid], rows v then w, outboard axes"
+    ),
     Quantity(vector("v", 3), "m/s", "relative velocity, outboard axes"),
     Quantity(vector("w", 3), "rad/s", "relative angular velocity, outboard axes"),
     Quantity(vector("c", 6), "m/s2, rad/s2", "relative acceleration at etadd = 0, outboard axes"),
@@ -228,5 +232,3 @@ def imposed() -> Derivation:
         (Equation("c + H s", total.symbol, _OUTPUTS[5].symbol + h.symbol * s.symbol),),
         sources=SOURCES,
     )
-
-

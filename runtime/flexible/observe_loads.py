@@ -1,0 +1,192 @@
+"""Loads within a beam from equilibrium: what holds the part beyond a section in its motion.
+
+The part of the beam between a section and the side that is not held feels its inertia, gravity,
+distributed loads, drag, what hangs on its ends, and the load of the rest of the beam, by which all
+this is balanced (d'Alembert).  Unlike EI v'', which sees only the curvature that the shapes can
+take, this contains what the shapes cannot bend for: concentrated loads, and the axial force of an
+axis that does not stretch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .observe import Motion, bilinear, section_rotations, tilde
+
+Array = NDArray[np.float64]
+
+#: Gauss points of a panel and fewest panels of a beam: exact for products of cubics at a panel's
+#: size, and fine enough for the shapes that can be told apart.
+_POINTS, _PANELS = 5, 8
+
+#: Numbers of one batch of samples, about 30 MB an array.
+_BATCH = 2**22
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """What acts on the beam at x (m): force (n, 3) N and moment (n, 3) N*m about the axis point
+    there, inertial axes."""
+
+    x: float
+    force: Array
+    moment: Array
+
+
+@dataclass(frozen=True)
+class LineLoad:
+    """Force (n, 3) N and moment (n, 3) N*m, spread evenly over first <= x <= last, inertial axes."""
+
+    first: float
+    last: float
+    force: Array
+    moment: Array
+
+
+def section_loads(
+    motion: Motion,
+    places: Array,
+    gravity: Array,
+    held: float,
+    points: Sequence[PointLoad] = (),
+    lines: Sequence[LineLoad] = (),
+) -> tuple[Array, Array]:
+    """Force (n, m, 3) in N and moment (n, m, 3) in N*m of the part beyond x on the part before it.
+
+    In the axes of the section, turned with it: axial force (tension positive) and shear along y
+    and z; torque and bending moments about y and z.  Moments are about the deflected axis.
+    `gravity` in m/s2, inertial axes.  `held` is the x of the section through which the beam hangs
+    on the tree: loads there are not needed, because the free side is added up.  Where a load stands
+    at x itself, the values are those on the held side of it.
+    """
+    edges = _edges(motion, places, points, lines)
+    rows = max(1, _BATCH // (3 * _POINTS * len(edges)))
+    force, moment = (np.empty((len(motion.t), len(places), 3)) for _ in range(2))
+    for first in range(0, len(motion.t), rows):
+        some = slice(first, first + rows)
+        on = [PointLoad(p.x, p.force[some], p.moment[some]) for p in points]
+        along = [LineLoad(p.first, p.last, p.force[some], p.moment[some]) for p in lines]
+        piece = _Sums(motion.some(some), edges, gravity, on, along)
+        force[some], moment[some] = piece.at(places, held)
+    return force, moment
+
+
+def _edges(
+    motion: Motion, places: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
+) -> Array:
+    """Ends of the panels: nothing jumps within one."""
+    shapes = motion.body.shapes
+    count = max(_PANELS, 2 * motion.eta.shape[1])
+    known = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.breaks)]
+    known += [np.array([p.x]) for p in points]
+    known += [np.array([p.first, p.last]) for p in lines]
+    return np.unique(np.clip(np.concatenate(known), 0.0, shapes.length))
+
+
+class _Sums:
+    """Sums of loads per panel, frame axes, moments about the frame's origin."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        edges: Array,
+        gravity: Array,
+        points: Sequence[PointLoad],
+        lines: Sequence[LineLoad],
+    ) -> None:
+        self.motion, self.edges = motion, edges
+        nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+        half = np.diff(edges) / 2
+        x = (edges[:-1, None] + half[:, None] * (1 + nodes)).ravel()
+        self.weights = (half[:, None] * weights).ravel()
+        place, force, moment = _densities(motion, x, gravity)
+        for line in lines:
+            share = ((x > line.first) & (x < line.last)) / max(line.last - line.first, 1e-300)
+            force = force + motion.inward(line.force)[:, None] * share[:, None]
+            moment = moment + motion.inward(line.moment)[:, None] * share[:, None]
+        moment = moment + np.cross(place, force)
+        self.panels = np.concatenate([self._per_panel(force), self._per_panel(moment)], axis=2)
+        self.points = [(p.x, self._wrench(p)) for p in points]
+
+    def _per_panel(self, density: Array) -> Array:
+        weighted = density * self.weights[:, None]
+        return weighted.reshape(len(density), -1, _POINTS, 3).sum(axis=2)
+
+    def _wrench(self, load: PointLoad) -> Array:
+        """(n, 6) of a load, about the frame's origin."""
+        force, moment = self.motion.inward(load.force), self.motion.inward(load.moment)
+        place = _places(self.motion, np.array([load.x]))[:, 0]
+        return np.concatenate([force, moment + np.cross(place, force)], axis=1)
+
+    def at(self, places: Array, held: float) -> tuple[Array, Array]:
+        """Force and moment at the sections, section axes."""
+        zero = np.zeros((len(self.panels), 1, 6))
+        before = np.concatenate([zero, np.cumsum(self.panels, axis=1)], axis=1)
+        behind = np.concatenate([np.cumsum(self.panels[:, ::-1], axis=1)[:, ::-1], zero], axis=1)
+        where = np.searchsorted(self.edges, places)
+        outer = places >= held
+        total = np.where(outer[:, None], behind[:, where], -before[:, where])
+        for x, wrench in self.points:
+            beyond = outer & (x >= places) & (x != held)
+            below = ~outer & (x <= places) & (x != held)
+            total = total + wrench[:, None] * (beyond.astype(float) - below)[:, None]
+        force = total[:, :, :3]
+        moment = total[:, :, 3:] - np.cross(_places(self.motion, places), force)
+        turned = np.einsum("mak,tk->tma", self.motion.body.shapes.at(places).theta, self.motion.eta)
+        back = section_rotations(turned)
+        return np.einsum("tmji,tmj->tmi", back, force), np.einsum("tmji,tmj->tmi", back, moment)
+
+
+def _places(motion: Motion, x: Array) -> Array:
+    """(n, m, 3) places of the deflected axis, frame axes."""
+    from .observe import deflection
+
+    at_rest = np.zeros((len(x), 3))
+    at_rest[:, 0] = x
+    return at_rest + deflection(motion, x)
+
+
+def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
+    """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
+    body, at = motion.body, motion.body.shapes.at(x)
+    sections = body.shapes.sections(x)
+    place = _places(motion, x)
+    moving = np.einsum("mak,tk->tma", at.phi, motion.etad)
+    pushed = np.einsum("mak,tk->tma", at.phi, motion.etadd)
+    if body.shapes.stiffening:
+        moving[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etad)
+        pushed[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etadd)
+        pushed[:, :, 0] -= bilinear(at.shortening, motion.etad, motion.etad)
+    w = motion.frame_spin[:, None]
+    wd = motion.frame_spin_rate[:, None]
+    turning = np.cross(w, place)
+    acceleration = motion.frame_acceleration[:, None] + np.cross(wd, place) + np.cross(w, turning)
+    acceleration += 2 * np.cross(w, moving) + pushed
+    weight = motion.inward(np.broadcast_to(gravity, motion.velocity.shape))[:, None]
+    density = weight - acceleration
+    if body.drag:
+        density -= body.drag * (motion.frame_velocity[:, None] + turning + moving)
+    force = density * sections.mass_per_length[:, None]
+    return place, force, -_rotary(motion, at, sections.rho_I)
+
+
+def _rotary(motion: Motion, at: object, per_length: Array) -> Array:
+    """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
+
+    The sections turn with Psi (of the first order in rates: Psi is small where this matters).
+    """
+    if not per_length.any():
+        return np.zeros((len(motion.t), len(per_length), 3))
+    theta = at.theta_inertial  # type: ignore[attr-defined]
+    turned, rate, growth = (
+        np.einsum("mak,tk->tma", theta, modal) for modal in (motion.eta, motion.etad, motion.etadd)
+    )
+    w = motion.frame_spin[:, None] + rate
+    wd = motion.frame_spin_rate[:, None] + growth + np.cross(motion.frame_spin[:, None], rate)
+    turn = section_rotations(turned)
+    inertia = turn @ (per_length[:, :, None] * np.eye(3)) @ np.swapaxes(turn, -1, -2)
+    return (inertia @ wd[..., None] + tilde(w) @ (inertia @ w[..., None]))[..., 0]
