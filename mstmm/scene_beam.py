@@ -173,6 +173,20 @@ class Beam(FlexibleTable, SectionTable):
         """The whole mass in kg."""
         return sum((s.mass_per_length or 0.0) * (s.to - s.from_) for s in self.sections)
 
+    @property
+    def mode_names(self) -> tuple[str, ...] | None:
+        """Names of the modal coordinates, None where the model decides how many there are.
+
+        That is so for "auto", and for a tangent frame at an inner section, where clamped-free
+        shapes stand on either side of it.
+        """
+        inner = [name for name in self.ends if 0 < self.end_x(name) < self.length]
+        either_side = self.frame_end in inner if self.frame_end else bool(inner)
+        clamped = self.basis in (AUTO, "clamped-free") and self.frame_kind in (AUTO, "tangent")
+        if self.modes is None or (clamped and either_side):
+            return None
+        return self.modes.names
+
     def end_x(self, at: str) -> float:
         """Place of the end `at` along the beam in m; "" is the root."""
         return self.ends[at or ROOT].position[0]

@@ -235,13 +235,14 @@ def _lists(beam: Beam) -> Iterator[Problem]:
     for place, values in lists:
         if values is None:
             continue
+        names = beam.mode_names
         if beam.modes is None:
             yield place, 'modes = "auto" chooses how many shapes there are; write modes as numbers'
-        elif len(values) != beam.modes.total:
+        elif names is not None and len(values) != len(names):
             yield (
                 place,
-                f"expected {counted(beam.modes.total)}, one per shape: "
-                f"{_named(beam.modes.names)}, found {len(values)}",
+                f"expected {counted(len(names))}, one per shape: {_named(names)}, "
+                f"found {len(values)}",
             )
 
 

@@ -195,7 +195,7 @@ def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[str]:
             yield (
                 f'beam "{beam.name}": frame: a tangent frame at "{at}", which hinge '
                 f'"{hinge.name}" leaves free to turn, keeps little inertia there: the more shapes, '
-                'the smaller the steps; write frame = "chord" or "auto"'
+                'the smaller the steps; write frame = "auto"'
             )
             return
 

@@ -26,10 +26,7 @@ class Flexible:
 
 def flexible(scene: Scene) -> dict[str, Flexible]:
     """The flexible bodies of a scene by name."""
-    beams = {
-        beam.name: Flexible(beam.modes.names if beam.modes is not None else None, True)
-        for beam in scene.beam
-    }
+    beams = {beam.name: Flexible(beam.mode_names, True) for beam in scene.beam}
     return beams | {elastic.name: Flexible(None, False) for elastic in scene.elastic}
 
 

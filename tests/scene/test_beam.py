@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from mstmm import topology
+from mstmm.errors import SceneError
 from mstmm.expression import parse
 from mstmm.scene import Scene, load_scene
 from mstmm.scene_shapes import ShapeFunction, shape_at
@@ -223,6 +224,33 @@ def test_shapes_say_how_many_modes_there_are() -> None:
 )  # fmt: skip
 def test_smooth_shapes_are_accepted_whatever_their_waves_and_units(shape: str) -> None:
     assert Scene(**bladed(shapes={"y": [shape]}, modes=...)).beam[0].shapes is not None
+
+
+@pytest.mark.parametrize(
+    ("changes", "known"),
+    [
+        ({}, True),
+        ({"ends": {"mid": 5.0}}, False),
+        ({"ends": {"mid": 5.0}, "frame": "chord"}, True),
+        ({"ends": {"mid": 5.0}, "frame": "tangent@root"}, True),
+        ({"ends": {"mid": 5.0}, "frame": "tangent@mid"}, False),
+        ({"ends": {"mid": 5.0}, "basis": "static+fixed-interface"}, True),
+        ({"ends": {"end": 10.0}}, True),
+    ],
+)
+def test_how_many_shapes_there_are_is_known_unless_a_frame_may_double_them(
+    changes: Data, known: bool
+) -> None:
+    """Clamped-free shapes stand on either side of an inner section: 2 n of them."""
+    data = bladed(**changes, initial={"eta": [0.1] * 6})
+    blade = Scene(**data).beam[0]
+    assert (blade.mode_names is not None) is known
+    data["beam"][0]["initial"] = {"eta": [0.1] * 12}
+    if known:
+        with pytest.raises(SceneError, match="expected 6 entries"):
+            Scene(**data)
+    else:
+        assert len(Scene(**data).beam[0].initial.eta or ()) == 12
 
 
 # --- warnings -------------------------------------------------------------------------------------
