@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 #: Fixed-interface modes where the scene leaves their number open.
 AUTO_MODES = 4
 #: Entries below this part of the largest of their kind are rounding, and become exact zeros.
-_ROUNDING = 1e-13
+_ROUNDING = 1e-10
 
 
 def elastic_bodies(scene: Scene) -> dict[str, ModalBody]:

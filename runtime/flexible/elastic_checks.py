@@ -138,11 +138,17 @@ def _rigid_motions(model: ElasticModel) -> None:
 def _scalar_mass(model: ElasticModel) -> None:
     if model.scalar_mass is None:
         return
-    mass = float(model.inertia[0, 0])
-    found = float(model.scalar_mass.sum())
-    if abs(found - mass) > RIGID * mass:
+    if model.unknowns == 6:
         raise model.refuse(
-            f"scalar_mass: expected entries that sum up to the body's mass {mass:.6g} kg, found "
-            f"{found:.6g} kg; leave it out, or give the mass matrix of one direction"
+            "scalar_mass: expected with 3 unknowns per node, found 6, whose rotations have a mass "
+            "of their own; leave it out"
         )
-    _definite(model, "scalar_mass", model.scalar_mass, "kg")
+    largest = float(abs(model.scalar_mass).max())
+    one = model.mass[0::3][:, 0::3]
+    worst = float(abs(one - model.scalar_mass).max())
+    if worst > RIGID * largest:
+        raise model.refuse(
+            f"scalar_mass: expected the mass matrix of the unknowns along x, found entries that "
+            f"differ by {worst:.3g} of {largest:.3g} kg; leave it out, or check the order of the "
+            "nodes"
+        )

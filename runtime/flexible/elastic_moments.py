@@ -38,12 +38,10 @@ class FieldMoments:
 
 def moments(model: ElasticModel, shapes: Array) -> FieldMoments:
     """Moments of a model's shapes (u, n)."""
-    scalar, how = model.scalar_mass, "scalar mass matrix: all moments exact"
-    if scalar is None:
-        scalar, same = averaged_mass(model)
-        if same:
-            how = "mass matrix of one scalar kind: all moments exact"
-    exact = how.endswith("exact")
+    scalar, exact, how = model.scalar_mass, True, "scalar mass matrix: all moments exact"
+    if scalar is None or model.unknowns == 6:
+        scalar, exact = averaged_mass(model)
+        how = "mass matrix of one scalar kind: all moments exact"
     points, fields = model.nodes.T, model.components(shapes)
     weighted = np.stack([scalar @ fields[b] for b in range(3)])
     C = weighted.sum(axis=1)

@@ -86,15 +86,29 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         )
     mesh = from_meshio(read, ignore_orientation=True)
     assert isinstance(mesh, skfem.Mesh)
+    if (
+        not _curved(skfem, mesh) and len(np.unique(mesh.t)) < mesh.nvertices
+    ):  # such as the centres of arcs
+        mesh = mesh.remove_unused_nodes()
     return mesh.scaled(scale) if scale != 1.0 else mesh
+
+
+def _curved(skfem: Any, mesh: Any) -> bool:
+    """Cells with nodes between their corners."""
+    return isinstance(mesh, (skfem.MeshTet2, skfem.MeshHex2))
 
 
 def mesh_model(mesh: Any, material: Material, order: int, where: str) -> ElasticModel:
     """Matrices of a mesh of solid elements with displacements of degree `order` (1 or 2).
 
-    Raises SceneError for nodes that belong to no element and elements that are turned inside out.
+    Raises SceneError for elements without volume, and for degree 1 on cells of degree 2, where
+    rotations of the body would strain it.
     """
     skfem = _library("an elastic mesh")
+    if order == 1 and _curved(skfem, mesh):
+        raise SceneError(
+            f"{where}: order: expected 2 on cells of degree 2, found 1; leave order out"
+        )
     element = _element(skfem, mesh, order)
     vector = skfem.Basis(mesh, skfem.ElementVector(element), intorder=2 * order)
     scalar = vector.with_element(element)

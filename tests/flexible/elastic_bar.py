@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from typing import Any
 
@@ -50,8 +51,13 @@ def scene(elastic: dict[str, Any], hinge: str = "fixed", **more: Any) -> mstmm.S
 
 
 def body(elastic: dict[str, Any], hinge: str = "fixed", **more: Any) -> ModalBody:
-    """The modal body of the bar."""
-    return elastic_bodies(scene(elastic, hinge, **more))["bar"]
+    """The modal body of the bar; made once for each description."""
+    return _body(json.dumps(elastic), hinge, json.dumps(more))
+
+
+@cache
+def _body(elastic: str, hinge: str, more: str) -> ModalBody:
+    return elastic_bodies(scene(json.loads(elastic), hinge, **json.loads(more)))["bar"]
 
 
 def frequencies(found: ModalBody) -> Array:
@@ -60,12 +66,18 @@ def frequencies(found: ModalBody) -> Array:
     return np.asarray(np.sqrt(squares))
 
 
+def short(elements: int = 5) -> dict[str, Any]:
+    """The box of a coarse mesh, for what does not ask for accuracy."""
+    return table()["box"] | {"divisions": [elements, 1, 1]}
+
+
 @cache
-def model(poisson: float = 0.3) -> ElasticModel:
-    """20 quadratic hexahedra."""
-    return model_of(scene(table(poisson=poisson)).elastic[0])
+def model(poisson: float = 0.3, elements: int = 20) -> ElasticModel:
+    """Quadratic hexahedra in one row."""
+    return model_of(scene(table(poisson=poisson, box=short(elements))).elastic[0])
 
 
+@cache
 def reduced(poisson: float, modes: int, frame: str = "tangent") -> Reduction:
     """The bar's shapes, with both ends loaded."""
     found, ends = model(poisson), scene(table()).elastic[0].ends

@@ -1,0 +1,112 @@
+"""Elastic bodies from mesh files, and the extra they need."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flexible import elastic_bar as bar
+
+import mstmm
+from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.runtime.flexible.elastic import elastic_bodies
+
+meshio = pytest.importorskip("meshio", reason="comes with the extra test")
+skfem = pytest.importorskip("skfem", reason="comes with the extra test")
+
+
+def bar_mesh() -> Any:
+    """Tetrahedra in mm, with named surfaces, and one point that belongs to no cell."""
+    lines = (np.linspace(0, 1000, 11), np.linspace(-25, 25, 2), np.linspace(-10, 10, 2))
+    mesh = skfem.MeshTet.init_tensor(*lines)
+    faces = [mesh.facets_satisfying(lambda x, at=at: np.isclose(x[0], at)) for at in (0, 1000)]
+    triangles = np.vstack([mesh.facets[:, face].T for face in faces]) + 1
+    groups = np.repeat([1, 2], [len(face) for face in faces])
+    tags = [groups, np.full(mesh.nelements, 3)]
+    return meshio.Mesh(
+        np.vstack([[[5e3, 0, 0]], mesh.p.T]),
+        [("triangle", triangles), ("tetra", mesh.t.T + 1)],
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={"clamp": np.array([1, 2]), "free": np.array([2, 2]), "all": np.array([3, 3])},
+    )
+
+
+def written(path: Path, mesh: Any, **how: Any) -> Path:
+    meshio.write(path, mesh, **how)
+    return path
+
+
+def table(path: Path, **changes: Any) -> dict[str, Any]:
+    ends = {"root": {"set": "clamp"}, "tip": {"set": "free"}}
+    return bar.table(**{"box": None, "mesh": str(path), "scale": 1e-3, "ends": ends} | changes)
+
+
+def test_gmsh_file_with_named_surfaces(tmp_path: Path) -> None:
+    path = written(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
+    found = bar.body(table(path))
+    assert found.mass == pytest.approx(bar.MASS, rel=1e-12)
+    assert np.allclose(found.first, [bar.MASS / 2, 0, 0], atol=1e-12)
+    assert np.allclose(bar.frequencies(found)[:2], [103.36, 258.40], rtol=0.03)
+    assert np.allclose(found.ports["tip"].position, [1.0, 0, 0], atol=1e-12)
+
+
+def test_curved_cells(tmp_path: Path) -> None:
+    """Cells of degree 2 bring their own degree; rotations stay free of strain."""
+    curved = skfem.MeshTet2.from_mesh(
+        skfem.MeshTet.init_tensor(
+            *(np.linspace(0, s, n) for s, n in ((1, 7), (0.05, 2), (0.02, 2)))
+        )
+    )
+    points = curved.doflocs.copy()
+    points[1] += 0.2 * points[0] ** 2
+    bent = type(curved)(points, curved.t)
+    path = written(tmp_path / "bar.vtu", skfem.io.meshio.to_meshio(bent))
+    ends = {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 1.0]}}
+    found = bar.body(table(path, scale=None, ends=ends))
+    assert found.mass == pytest.approx(bar.MASS, rel=1e-12)
+    assert found.first[1] == pytest.approx(bar.MASS * (0.025 + 0.2 / 3), rel=1e-12)
+    with pytest.raises(SceneError, match="order: expected 2 on cells of degree 2, found 1"):
+        bar.body(table(path, scale=None, ends=ends, order=1))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mesh": "absent.msh"}, "there is no file"),
+        ({"ends": {"root": {"set": "clmp"}}}, 'no named boundary .clmp. .* did you mean "clamp"'),
+        ({"ends": {"root": {"plane": [1, 0, 0, 0.5e-3]}}}, "the plane holds no node"),
+        ({"ends": {"root": {"nodes": [4000]}}}, "expected numbers from 0 to"),
+    ],
+)
+def test_refused(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    path = written(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
+    elastic = table(path, **changes)
+    with pytest.raises(SceneError, match=words) as caught:
+        elastic_bodies(mstmm.Scene(
+            gravity=[0, 0, 0], elastic=[elastic],
+            hinge=[{"name": "h", "type": "fixed", "inboard": "ground", "outboard": "bar.root"}],
+        ))  # fmt: skip
+    assert str(caught.value).startswith('elastic "bar"')
+
+
+def test_files_that_are_no_solid_meshes(tmp_path: Path) -> None:
+    text = tmp_path / "text.msh"
+    text.write_text("nothing")
+    with pytest.raises(SceneError, match=r'elastic "bar": text.msh is no mesh that meshio reads'):
+        bar.body(table(text))
+    flat = meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])])
+    with pytest.raises(SceneError, match=r"expected solid cells of one kind .* found none"):
+        bar.body(table(written(tmp_path / "flat.vtu", flat)))
+
+
+@pytest.mark.parametrize("package", ["skfem", "meshio"])
+def test_missing_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    path = written(tmp_path / "bar.vtu", bar_mesh())
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(EnvironmentFailure, match=rf"needs the package {package}.*mstmm\[fem\]"):
+        bar.body(table(path))
