@@ -15,6 +15,7 @@ from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.expressions.matexpr import MatrixElement
+from sympy.matrices.expressions.slice import MatrixSlice
 
 from .derivation import Factor, Solve, Triangular
 from .notation import Perp, Tilde
@@ -259,6 +260,17 @@ class _Layout:
                 spans.append(f"{first + 1}…{last}" if count != 1 else f"{last}")
         return Name(shown_name(e.symbol.name), "", ",".join(spans)), _ATOM
 
+    def slice_of(self, e: MatrixSlice) -> tuple[Node, int]:
+        """Rows or columns of a matrix; an axis that is whole is not written unless the other is."""
+        spans = []
+        for bounds, whole in zip((e.rowslice, e.colslice), e.parent.shape, strict=True):
+            first, last, _ = bounds
+            spans.append("·" if (first, last) == (0, whole) else _span(first, last))
+        index = ",".join(spans if e.parent.shape[1] != 1 else spans[:1])
+        if isinstance(e.parent, sp.MatrixSymbol):
+            return Name(shown_name(e.parent.name), "", index), _ATOM
+        return Row((Fence("(", self.node(e.parent), ")"), Word(f"[{index}]"))), _ATOM
+
     # --- functions and logic ------------------------------------------------------------------
 
     def function(self, e: sp.Function) -> tuple[Node, int]:
@@ -308,6 +320,10 @@ def _spaced(factors: list[Node]) -> tuple[Node, ...]:
     return tuple(items)
 
 
+def _span(first: sp.Basic, last: sp.Basic) -> str:
+    return f"{last}" if last == first + 1 else f"{first + 1}…{last}"
+
+
 def element_index(parent: sp.MatrixSymbol, i: int, j: int) -> str:
     """Index of an entry as shown: x y z of a plane or space vector, else counted from one."""
     shape = int(parent.rows), int(parent.cols)
@@ -349,6 +365,7 @@ _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
     (Factor, _Layout.factor),
     (Triangular, _Layout.triangular),
     (MatrixElement, _Layout.element),
+    (MatrixSlice, _Layout.slice_of),
     ((sp.MatrixSymbol, sp.Symbol), _symbol),
     ((sp.Add, sp.MatAdd), _Layout.sum),
     (sp.MatMul, _Layout.matrix_product),
