@@ -32,7 +32,7 @@ int mstmm_classical_beam_spatial_discrete_transfer(const real *restrict m, const
  * in  K_f[3] (N/m) modal stiffness
  * in  D_f[3] (N*s/m) modal damping
  * in  r_e[3] (m) output end at rest, frame axes
- * in  Phi_O[3][2] (1) shapes at the output end
+ * in  Phi_O[3][2] (1) shapes, output end
  * in  Theta_O[3][2] (1/m) section rotation per mode at the output end (rate of its rotation at the predictor: T(Psi) Theta of a rotation vector Psi)
  * in  Theta_I[3][2] (1/m) section rotation per mode at the input end (rate of its rotation at the predictor: T(Psi) Theta of a rotation vector Psi)
  * in  A[1] (1/s2) time map, ydd = A y + B
@@ -2299,7 +2299,7 @@ static const mstmm_kernel mstmm_classical_beam_spatial_discrete_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_beam_spatial_discrete_transfer_inputs,
         .outputs = mstmm_classical_beam_spatial_discrete_transfer_outputs,
-        .ir_hash = "d302e5673e016f10350fda93d1d56bc96a58018303bf2e2631b728325010e56b",
+        .ir_hash = "fee9b8621eb9f47274d0161303f91ffe27f7d206a384b030392736258329b12c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2309,7 +2309,7 @@ const mstmm_element mstmm_classical_beam_spatial_discrete = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "beam_spatial_discrete",
-    .hash = "fa538a48a09ac023204f653d1134922df3ea1a1890cc2d95bad55e68642fbba3",
+    .hash = "245413b57513687c8ac9bdcf84f0a882a440d1b0537046615552ae207bd76bd2",
     .nq = 0,
     .nu = 0,
     .np = 0,

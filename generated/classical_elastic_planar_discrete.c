@@ -34,7 +34,7 @@ int mstmm_classical_elastic_planar_discrete_transfer(const real *restrict m,
  * in  K_f[3] (N/m) modal stiffness
  * in  D_f[3] (N*s/m) modal damping
  * in  r_e[2] (m) output end at rest, frame axes
- * in  Phi_O[2][2] (1) shapes at the output end
+ * in  Phi_O[2][2] (1) shapes, output end
  * in  Theta_O[1][2] (1/m) section rotation per mode at the output end
  * in  Theta_I[1][2] (1/m) section rotation per mode at the input end
  * in  A[1] (1/s2) time map, ydd = A y + B
@@ -805,7 +805,7 @@ static const mstmm_kernel mstmm_classical_elastic_planar_discrete_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_elastic_planar_discrete_transfer_inputs,
         .outputs = mstmm_classical_elastic_planar_discrete_transfer_outputs,
-        .ir_hash = "714ca3dff5e0e65083a51c2aca1e3b11881c5896af93423f7c449de04c3f2086",
+        .ir_hash = "3b013da783f194db24869e9f317af00b08143a93f12879c7e66400afc9b0c9dd",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -815,7 +815,7 @@ const mstmm_element mstmm_classical_elastic_planar_discrete = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "elastic_planar_discrete",
-    .hash = "f92b21add9968e5411ccd8fba0d6b699851a87c47a6d17e64fd4329a0801b34e",
+    .hash = "43c3aacf1715b73bb0b455d24336e7449f9291c501cd32eec3059688963d5427",
     .nq = 0,
     .nu = 0,
     .np = 0,

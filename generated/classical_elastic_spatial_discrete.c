@@ -33,7 +33,7 @@ int mstmm_classical_elastic_spatial_discrete_transfer(const real *restrict m,
  * in  K_f[1] (N/m) modal stiffness
  * in  D_f[1] (N*s/m) modal damping
  * in  r_e[3] (m) output end at rest, frame axes
- * in  Phi_O[3] (1) shapes at the output end
+ * in  Phi_O[3] (1) shapes, output end
  * in  Theta_O[3] (1/m) section rotation per mode at the output end (rate of its rotation at the predictor: T(Psi) Theta of a rotation vector Psi)
  * in  Theta_I[3] (1/m) section rotation per mode at the input end (rate of its rotation at the predictor: T(Psi) Theta of a rotation vector Psi)
  * in  A[1] (1/s2) time map, ydd = A y + B
@@ -1976,7 +1976,7 @@ static const mstmm_kernel mstmm_classical_elastic_spatial_discrete_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_classical_elastic_spatial_discrete_transfer_inputs,
         .outputs = mstmm_classical_elastic_spatial_discrete_transfer_outputs,
-        .ir_hash = "005d03c1a41b5148408bba14fed892f8458d7aba611ff91635b69148d88486f4",
+        .ir_hash = "6b1fe09929cdaa4bef8ea76d8e2a24c98b6c3270bd73f3c014827e23933e5dbc",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1986,7 +1986,7 @@ const mstmm_element mstmm_classical_elastic_spatial_discrete = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "elastic_spatial_discrete",
-    .hash = "7407db0698ff83476483bad94d1a38fdbe2ea8d74b0e4d55af562f8d2bfd239e",
+    .hash = "60a3f0915fbf99f0b2f56e03dc89cab8f0fe514f3819d8a79f1c1630d9a69826",
     .nq = 0,
     .nu = 0,
     .np = 0,

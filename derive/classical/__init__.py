@@ -1,6 +1,7 @@
 """The classical transfer matrices: one file per element, each a Derivation with its premises.
 
-`CLASSICAL` names them; `guards` are the pivot guards to lower them with.
+`CLASSICAL` names them all, `FLEXIBLE` those of the discrete-time form; `guards` are the pivot
+guards to lower them with.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from mstmm.spec import ElementSpec
 from ..derivation import Derivation
 from ..lower import lower
 from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
+from .flexible_catalogue import FLEXIBLE
 from .hinge_relation import PIVOT_LIMIT, VANISHING_PIVOT, guards
 
 __all__ = [
     "CLASSICAL",
+    "FLEXIBLE",
     "PIVOT_LIMIT",
     "VANISHING_PIVOT",
     "classical_guards",
@@ -39,6 +42,7 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
     "pin_spatial": pin_spatial.derivation,
     "acceleration": acceleration.derivation,
     "acceleration_planar": _planar_acceleration,
+    **FLEXIBLE,
 }
 
 
