@@ -18,10 +18,11 @@ from typing import Any
 
 from .graph import Graph, Node, Number
 from .ir import (
-    LOOP_INDEX,
+    LOOPS,
     Assign,
     Element,
     Guard,
+    Inner,
     KernelIR,
     Operand,
     Port,
@@ -144,8 +145,9 @@ def tangent(
 
     A run-time sized `solve` x = A^-1 b is differentiated as A^-1 db, by a second solve.
 
-    Raises ValueError for names that the kernel does not have, and where A itself depends on
-    `ports`: the right side db - dA x is then no array that a `solve` can read.
+    Raises ValueError for names that the kernel does not have, for a kernel that reads what it has
+    stored itself (differentiate it at a fixed size), and where A itself depends on `ports`: the
+    right side db - dA x is then no array that a `solve` can read.
     """
     return _Tangent(kernel, set(ports), outputs, values, guards).run()
 
@@ -216,14 +218,22 @@ class _Tangent:
                 self.graph.guard(condition, statement.code, statement.message)
             elif isinstance(statement, Solve):
                 self._solve(statement)
+            elif isinstance(statement, Sum):
+                self._inner(statement)
             else:
-                for assign in statement.body:
-                    self._assign(assign)
+                for inner in statement.body:
+                    self._inner(inner)
                 value = self._value(statement.value)
-                if isinstance(statement, Sum):
-                    self.nodes[statement.number] = self.graph.sum_over_modes(value)
-                else:
-                    self.stores.setdefault(statement.port, []).append((statement.index, value))
+                self.stores.setdefault(statement.port, []).append((statement.index, value))
+
+    def _inner(self, statement: Inner) -> None:
+        if isinstance(statement, Assign):
+            self._assign(statement)
+            return
+        for inner in statement.body:
+            self._inner(inner)
+        value = self._value(statement.value)
+        self.nodes[statement.number] = self.graph.sum_over_modes(value, statement.over)
 
     def _assign(self, assign: Assign) -> None:
         operands = [self._value(operand) for operand in assign.args]
@@ -233,13 +243,23 @@ class _Tangent:
         if isinstance(operand, Temporary):
             return self.nodes[operand.number]
         if isinstance(operand, Element):
+            self._refuse_stored(operand.port)
             return self.graph.element(operand.port, *operand.index)
         if operand.text == "pi":
             return self.graph.pi
         return self.graph.constant(Fraction(operand.text))
 
+    def _refuse_stored(self, name: str) -> None:
+        if name in self.stores:
+            raise ValueError(
+                f"{self.kernel.name}: it reads {name!r}, which it has stored; differentiate the "
+                "kernel at a fixed size"
+            )
+
     def _solve(self, solve: Solve) -> None:
         """The solve itself, and that of its derivative where it is not zero."""
+        self._refuse_stored(solve.matrix)
+        self._refuse_stored(solve.right)
         if solve.matrix in self.moving:
             raise ValueError(
                 f"{self.kernel.name}: the matrix {solve.matrix!r} of a run-time sized solve "
@@ -260,7 +280,7 @@ class _Tangent:
         return {
             element(port.name, *index): element(PREFIX + port.name, *index)
             for port in self.moving.values()
-            for index in _places(port.shape)
+            for index in _readings(port.shape)
         }
 
 
@@ -269,8 +289,15 @@ def _slope(port: Port) -> Port:
 
 
 def _places(shape: Index) -> list[Index]:
-    """Every index of the shape; along the run-time size the loop index stands for all."""
-    ranges = [(LOOP_INDEX,) if isinstance(extent, str) else range(extent) for extent in shape]
+    """Every index of the shape; along the run-time size a loop index stands for all."""
+    letters = iter(LOOPS)
+    ranges = [(next(letters),) if isinstance(extent, str) else range(extent) for extent in shape]
+    return list(product(*ranges))
+
+
+def _readings(shape: Index) -> list[Index]:
+    """Every index by which a kernel may read an array: either letter along the run-time size."""
+    ranges = [LOOPS if isinstance(extent, str) else range(extent) for extent in shape]
     return list(product(*ranges))
 
 
@@ -279,5 +306,5 @@ def _nested(shape: Index, entries: Mapping[Index, Node], at: Index = ()) -> Any:
     if not shape:
         return entries.get(at)
     if isinstance(shape[0], str):
-        return _nested(shape[1:], entries, (*at, LOOP_INDEX))
+        return _nested(shape[1:], entries, (*at, LOOPS[sum(isinstance(i, str) for i in at)]))
     return [_nested(shape[1:], entries, (*at, i)) for i in range(shape[0])]
