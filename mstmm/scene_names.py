@@ -15,19 +15,15 @@ if TYPE_CHECKING:
     from .scene_parts import Hinge
 
 
-@dataclass(frozen=True)
-class Flexible:
-    """What expressions may say of a flexible body: names of its modal coordinates, None where they
-    are not known before it is compiled; whether its bare name is a place."""
-
-    modes: tuple[str, ...] | None
-    is_place: bool
+#: Names of the modal coordinates of a flexible body; None where they are not known before it is
+#: compiled.
+Modal = tuple[str, ...] | None
 
 
-def flexible(scene: Scene) -> dict[str, Flexible]:
-    """The flexible bodies of a scene by name."""
-    beams = {beam.name: Flexible(beam.mode_names, True) for beam in scene.beam}
-    return beams | {elastic.name: Flexible(None, False) for elastic in scene.elastic}
+def flexible(scene: Scene) -> dict[str, Modal]:
+    """The modal coordinates of every flexible body by its name."""
+    beams: dict[str, Modal] = {beam.name: beam.mode_names for beam in scene.beam}
+    return beams | {elastic.name: None for elastic in scene.elastic}
 
 
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
@@ -47,7 +43,7 @@ class Scope:
     own: Hinge | None = None
     spring: bool = False
     positions: bool = False
-    flexible: Mapping[str, Flexible] = field(default_factory=dict)
+    flexible: Mapping[str, Modal] = field(default_factory=dict)
 
 
 def problem_with(name: Name, scope: Scope) -> str | None:
@@ -85,20 +81,20 @@ def _bare(name: Name, scope: Scope) -> str | None:
     return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
 
 
-def _modal(name: Name, body: Flexible) -> str | None:
+def _modal(name: Name, modes: Modal) -> str | None:
     """A modal coordinate or its rate: blade.q[0], blade.u[0]."""
     if len(name.parts) == 2 and name.quantity in ("q", "u"):
-        if body.modes is None:
+        if modes is None:
             if name.index is not None:
                 return None
             return f"{name.text!r}: say which shape, as in {name.text}[0]"
-        return index_problem(name, name.owner, len(body.modes), "flexible body")
-    if len(name.parts) == 2 and name.quantity in (body.modes or ()):
-        place = (body.modes or ()).index(name.quantity)
+        return index_problem(name, name.owner, len(modes), "flexible body")
+    if len(name.parts) == 2 and name.quantity in (modes or ()):
+        place = (modes or ()).index(name.quantity)
         return f"{name.text!r} is unknown; write {name.owner}.q[{place}]"
     return (
         f"{name.text!r} is unknown; of a flexible body there is {name.owner}.q[0], "
-        f"{name.owner}.u[0], and in events x, y, z, vx, vy, vz of its ends"
+        f"{name.owner}.u[0], and in events x, y, z, vx, vy, vz of it and its ends"
     )
 
 
@@ -138,8 +134,4 @@ def _position(name: Name, scope: Scope) -> str | None:
         return scope.bodies.missing(name.owner, repr(name.owner))
     if len(name.parts) == 3 and name.parts[1] not in ends:
         return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], ends)}'
-    body = scope.flexible.get(name.owner)
-    if len(name.parts) == 2 and body is not None and not body.is_place:
-        end = f"{name.owner}.{next(iter(ends), 'tip')}.{name.quantity}"
-        return f"{name.text!r}: an elastic body is met at its ends alone; write {end}"
     return None

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from mstmm.drive import motion
+from mstmm.errors import SceneError
 from mstmm.expression import Expression, Name
 from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR, Port
@@ -68,6 +69,7 @@ def resolver(
             hinge = name.hinge or (own.name if own else "")
             slots = layout.hinges[hinge]
             first = slots.q if quantity == "q" else slots.u
+            _refuse_beyond(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
             return graph.element(quantity, first + index)
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)
@@ -79,6 +81,14 @@ def resolver(
         return graph.element("points", 6 * probes.setdefault(parts, len(probes)) + component)
 
     return resolve
+
+
+def _refuse_beyond(name: Name, owner: str, index: int, entries: Sequence[str]) -> None:
+    """How many shapes a flexible body has is known only here where `"auto"` chose them."""
+    if index >= len(entries):
+        raise SceneError(
+            f"{name.text!r}: {owner!r} has {len(entries)} entries: {', '.join(entries) or 'none'}"
+        )
 
 
 def _kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> KernelIR:
