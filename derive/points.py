@@ -14,7 +14,7 @@ from typing import Any
 
 import mpmath
 
-from mstmm.ir import KernelIR, Port
+from mstmm.ir import KernelIR, Port, Solve
 from mstmm.spec import Param
 
 Numbers = list[float]
@@ -32,15 +32,22 @@ _TURNS: dict[str, tuple[float, tuple[float, float, float, float]]] = {
     "half turn back": (-math.pi, (0.0, -_HALF, 0.0, _HALF)),
 }
 _MASS = {"tiny masses": 1e-9, "huge masses": 1e9}
+#: What is zero at rest.
+_MOTION_AND_LOAD = frozenset(
+    ("u", "s", "motion", "motion_I", "v", "w", "tau", "e", "effort", "eta", "etad")
+)
+#: Sizes at which kernels with a run-time size are compared.
+_SIZES = (1, 2, 3, 5)
 _INERTIAL = frozenset({"S", "M", "J", "J_I"})
 
 
 @dataclass(frozen=True)
 class Point:
-    """Inputs of one kernel, as it takes them."""
+    """Inputs of one kernel, as it takes them; `n` is its run-time size if it has one."""
 
     label: str
     inputs: dict[str, Numbers]
+    n: int = 0
 
 
 @dataclass(frozen=True)
@@ -53,8 +60,17 @@ class Source:
     seed: int = 20261
 
     def points(self, kernel: KernelIR, count: int = 2) -> Iterator[Point]:
-        """`count` random points, then the special ones that this kernel can tell apart."""
+        """`count` random points, then the special ones that this kernel can tell apart.
+
+        A kernel with a run-time size has them at several sizes.
+        """
         numbers = random.Random(f"{self.seed} {kernel.name}")
+        if kernel.size_symbol is not None:
+            for n in _SIZES:
+                yield Point(f"random, n = {n}", self._drawn(kernel, numbers, n), n)
+            still = self._still(kernel, numbers, _SIZES[-1])
+            yield Point(f"{still.label}, n = {_SIZES[-1]}", still.inputs, _SIZES[-1])
+            return
         names = {port.name for port in kernel.inputs}
         for k in range(count):
             yield Point(f"random {k + 1}", self._drawn(kernel, numbers))
@@ -71,12 +87,15 @@ class Source:
             for label, factor in _MASS.items():
                 yield Point(label, self._scaled(self._drawn(kernel, numbers), factor))
 
-    def _drawn(self, kernel: KernelIR, numbers: random.Random) -> dict[str, Numbers]:
-        return {port.name: self.draw(port, kernel, numbers) for port in kernel.inputs}
+    def _drawn(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> dict[str, Numbers]:
+        return {port.name: self.draw(port, kernel, numbers, n) for port in kernel.inputs}
 
-    def draw(self, port: Port, kernel: KernelIR, numbers: random.Random) -> Numbers:
+    def draw(self, port: Port, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Numbers:
         """One random value of a port that the kernel could meet."""
-        length = port.length()
+        length = port.length(n)
+        if any(isinstance(extent, str) for extent in port.shape):
+            solved = {s.matrix for s in kernel.statements if isinstance(s, Solve)}
+            return _full(n, numbers) if port.name in solved else _uniform(length, numbers)
         if port.name == "p":
             return self.parameter_values(length, numbers)
         if port.name == "q" and self.kind == "hinge":
@@ -122,19 +141,19 @@ class Source:
             values += [*rotation(numbers), *_uniform(3, numbers)]
         return values
 
-    def _still(self, kernel: KernelIR, numbers: random.Random) -> Point:
+    def _still(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Point:
         """No motion, no turn, no load: parameters and inertias alone."""
         inputs = {}
         for port in kernel.inputs:
-            drawn = self.draw(port, kernel, numbers)
+            drawn = self.draw(port, kernel, numbers, n)
             if port.name == "q" and self.kind == "hinge":
                 drawn = self.coordinate_values(numbers, "rest")
             elif port.shape == (3, 3) and port.name != "F_scale":
                 drawn = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
             elif port.name in ("turn", "link"):
                 drawn[:2] = [1.0, 0.0]
-            elif port.name in ("u", "s", "motion", "motion_I", "v", "w", "tau", "e", "effort"):
-                drawn = [0.0] * port.length()
+            elif port.name in _MOTION_AND_LOAD:
+                drawn = [0.0] * port.length(n)
             inputs[port.name] = drawn
         return Point("rest", inputs)
 
@@ -263,6 +282,16 @@ def rotation(numbers: random.Random) -> Numbers:
             s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x),
             s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y),
         ]  # fmt: skip
+
+
+def _full(n: int, numbers: random.Random) -> Numbers:
+    """A symmetric matrix with eigenvalues of 1 and more, row by row."""
+    upper = iter(_definite(n, numbers))
+    rows = [[0.0] * n for _ in range(n)]
+    for i in range(n):
+        for j in range(i, n):
+            rows[i][j] = rows[j][i] = next(upper)
+    return [value for row in rows for value in row]
 
 
 def _definite(n: int, numbers: random.Random) -> Numbers:

@@ -152,7 +152,7 @@ class _Subject:
         c_seen = self._function(kernel) is not None
         for point in self.source.points(kernel, points):
             count += 1
-            compared = self._compare(kernel, point.inputs)
+            compared = self._compare(kernel, point.inputs, point.n)
             if isinstance(compared, str):
                 problems.append(f"at {point.label!r}: {compared}")
             elif compared is None:
@@ -167,7 +167,7 @@ class _Subject:
         )  # fmt: skip
 
     def _compare(
-        self, kernel: KernelIR, inputs: dict[str, list[float]]
+        self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
     ) -> tuple[float, float] | str | None:
         """(equations, compiled) errors; None where all are stopped alike; text where not."""
         from .derive.direct import Undefined, evaluate_equations
@@ -175,20 +175,20 @@ class _Subject:
 
         code, exact = 0, None
         try:
-            exact = evaluate(kernel, inputs)
+            exact = evaluate(kernel, inputs, n=n)
         except GuardFailure as failure:
             code = failure.code
         stated = None
         if self.stated:
             form = self.stated[kernel.name]
             try:
-                stated = evaluate_equations(form.derivation, inputs, form.guards)
+                stated = evaluate_equations(form.derivation, inputs, form.guards, n=n)
             except Undefined as undefined:
                 if exact is not None and _finite(exact):
                     return f"the equations have no value ({undefined}), the IR has one"
                 return None
         rounded = {name: [float(v) for v in row] for name, row in inputs.items()}  # as C has them
-        found = self._c_values(kernel, rounded)
+        found = self._c_values(kernel, rounded, n)
         if found is not None and found[0] != code:
             return f"C returns {found[0]}, the IR {code}"
         if exact is None or not _finite(exact):
@@ -196,17 +196,21 @@ class _Subject:
         first = 0.0 if stated is None else _difference(exact, stated.outputs, inputs)
         if stated is not None and stated.asymmetry > 1e-30 * _size(inputs):
             return "a quantity called symmetric is not"
-        second = 0.0 if found is None else self._share(kernel, rounded, found[1])
+        second = 0.0 if found is None else self._share(kernel, rounded, found[1], n)
         return first, second
 
     def _share(
-        self, kernel: KernelIR, inputs: dict[str, list[float]], got: Mapping[str, Sequence[float]]
+        self,
+        kernel: KernelIR,
+        inputs: dict[str, list[float]],
+        got: Mapping[str, Sequence[float]],
+        n: int,
     ) -> float:
         """Largest error of C as a share of its bound."""
         from .derive.rounding import rounding_bounds
 
         worst = 0.0
-        for name, limits in rounding_bounds(kernel, inputs).items():
+        for name, limits in rounding_bounds(kernel, inputs, n).items():
             for value, (exact, bound) in zip(got[name], limits, strict=True):
                 worst = max(
                     worst, float(abs(value - exact)) / bound if value == value else math.inf
@@ -223,10 +227,10 @@ class _Subject:
         return partial(_call, self.compiled)
 
     def _c_values(
-        self, kernel: KernelIR, inputs: dict[str, list[float]]
+        self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
     ) -> tuple[int, dict[str, list[float]]] | None:
         function = self._function(kernel)
-        return None if function is None else function(kernel, inputs)
+        return None if function is None else function(kernel, inputs, n)
 
     # --- statements of mechanics ------------------------------------------------------------------
 
@@ -298,9 +302,10 @@ def _generic(nu: int, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]
 
 
 def _call(
-    compiled: Compiled, kernel: KernelIR, inputs: Mapping[str, Sequence[float]]
+    compiled: Compiled, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
     """A compiled kernel through its descriptor: (code, outputs)."""
+    from .abi import c_outputs
     from .runtime import prebuilt
 
     ffi, _ = prebuilt.module()
@@ -311,20 +316,21 @@ def _call(
         if prebuilt.text(ffi, descriptor.kernels[i].name) == kernel.name
     )
     given = [ffi.new("real[]", list(inputs[port.name]) or 1) for port in kernel.inputs]
-    taken = [ffi.new("real[]", max(1, port.length())) for port in kernel.outputs]
-    code = found.call(0, ffi.new("real *[]", given or 1), ffi.new("real *[]", taken or 1))
-    return int(code), _named(kernel, taken)
+    taken = [ffi.new("real[]", max(1, port.length(n))) for port in c_outputs(kernel)]
+    code = found.call(n, ffi.new("real *[]", given or 1), ffi.new("real *[]", taken or 1))
+    return int(code), _named(kernel, taken, n)
 
 
-def _named(kernel: KernelIR, arrays: Sequence[Any]) -> dict[str, list[float]]:
+def _named(kernel: KernelIR, arrays: Sequence[Any], n: int = 0) -> dict[str, list[float]]:
+    """Outputs by name; a work array behind them is left out."""
     return {
-        port.name: list(array)[: port.length()]
-        for port, array in zip(kernel.outputs, arrays, strict=True)
+        port.name: list(array)[: port.length(n)]
+        for port, array in zip(kernel.outputs, arrays, strict=False)
     }
 
 
 def _interpret(
-    tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]]
+    tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
     """The hinge kernel of an element without a library, as the engine interprets it."""
     from .runtime import prebuilt
