@@ -49,6 +49,11 @@ def _shape(k: str) -> tuple[Quantity, ...]:
 SHAPE_K, SHAPE_L = _shape("k"), _shape("l")
 
 
+def _linear(shape: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
+    """What enters mass and stiffness: all but the slopes."""
+    return (shape[0], shape[1], shape[3])
+
+
 def _entries(quantity: Quantity) -> Matrix:
     return Matrix([quantity.symbol[i, 0] for i in range(quantity.rows)])
 
@@ -136,35 +141,46 @@ def rigid() -> Derivation:
 
 
 def moments() -> Derivation:
-    """Integrands of C, E, F, of the stiffness and of the shortening, for shapes k and l."""
+    """Integrands of C, E, F and of the stiffness, for shapes k and l."""
     r, uk, ul = _point(), _field(SHAPE_K), _field(SHAPE_L)
     c = vector("C", 3)
     e, f = sp.MatrixSymbol("E", 3, 3), sp.MatrixSymbol("F", 3, 3)
-    stiffness, shortening = sp.MatrixSymbol("K", 1, 1), sp.MatrixSymbol("g", 1, 1)
+    stiffness = sp.MatrixSymbol("K", 1, 1)
     return Derivation(
         "beam",
         "integrands per length of the moments of two shapes",
-        (X, INERTIA, STIFFNESS, *SHAPE_K, *SHAPE_L),
+        (X, INERTIA, STIFFNESS, *_linear(SHAPE_K), *_linear(SHAPE_L)),
         (
             Quantity(c, "", "int rho u_k dA"),
             Quantity(e, "", "int rho r0 u_k^T dA"),
             Quantity(f, "", "int rho u_k u_l^T dA"),
             Quantity(stiffness, "", "strain energy's second derivative by eta_k, eta_l"),
-            Quantity(shortening, "", "-u2' second derivative by eta_k, eta_l"),
         ),
         (
             Equation("C", c, _mass(uk)),
             Equation("E", e, _mass(Matrix(r * uk.T))),
             Equation("F", f, _mass(Matrix(uk * ul.T))),
             Equation("K", stiffness, Matrix([[_mixed(strain_energy, 3)]])),
-            Equation("g", shortening, Matrix([[_mixed(lambda a: -second_order(a), 2)]])),
         ),
         sources=SOURCES,
         notes=(
             "displacement u = (s, v, w) + theta x (0, y, z), theta = (psi, -w', v')",
             "axial strain s' - y v'' - z w'', shear by the rate of twist psi' alone",
-            "second order: u2' = -(v'^2 + w'^2)/2, the axis keeps its length",
         ),
+    )
+
+
+def shortening() -> Derivation:
+    """Rate along the beam of the second-order displacement towards the root, for shapes k and l."""
+    rate = sp.MatrixSymbol("g", 1, 1)
+    return Derivation(
+        "beam",
+        "rate of shortening by two shapes",
+        (SHAPE_K[2], SHAPE_L[2]),
+        (Quantity(rate, "", "-u2', second derivative by eta_k, eta_l"),),
+        (Equation("g", rate, Matrix([[_mixed(lambda a: -second_order(a), 2)]])),),
+        sources=SOURCES,
+        notes=("u2' = -(v'^2 + w'^2)/2: the axis keeps its length",),
     )
 
 
@@ -188,4 +204,6 @@ def section_rotation() -> Derivation:
 
 
 #: Name -> derivation of every kernel of the beam.
-KERNELS = {"rigid": rigid, "moments": moments, "section": section_rotation}
+KERNELS = {
+    "rigid": rigid, "moments": moments, "shortening": shortening, "section": section_rotation,
+}  # fmt: skip

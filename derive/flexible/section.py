@@ -22,7 +22,7 @@ eta, etad = ETA.symbol, ETAD.symbol
 #: Largest rotation of a section against its frame, rad.
 LARGEST_TURN = sp.Rational(3, 2)
 #: Terms of the series.
-TERMS = 13
+TERMS = 11
 
 POINT = Quantity(vector("r", 3), "m", "section point at rest from o, frame axes")
 PHI = modal("phi", 3, "displacement of the point per mode")
