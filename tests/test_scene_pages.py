@@ -9,17 +9,27 @@ import pytest
 import mstmm
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import (
+    Arrays,
+    Beam,
     Body,
+    Box,
     Chain,
+    Damping,
+    Elastic,
+    ElasticEnd,
     Event,
     Friction,
     Hinge,
     Law,
     Limits,
     Load,
+    Modes,
     Scene,
+    Section,
+    Shapes,
     Spring,
     SpringLaw,
+    Start,
     load_scene,
 )
 from mstmm.scene_rules import Table
@@ -56,9 +66,12 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "table",
-    [Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event],
+    [
+        Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event, Beam,
+        Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box,
+    ],
     ids=lambda t: t.__name__,
-)
+)  # fmt: skip
 def test_every_key_is_described(table: type[Table]) -> None:
     keys = {field.alias or name for name, field in table.model_fields.items()}
     missing = {key for key in keys if f"`{key}`" not in FORMAT}
