@@ -157,6 +157,8 @@ class SizedLowering(Lowering):
             return self.graph.constant(0)
         if isinstance(i, int) and isinstance(j, int) and self._is_fixed(e):
             return self._fixed_matrix(e)[i][j]
+        if isinstance(e, sp.MatrixBase):
+            return self.scalar(e[i, j])
         if isinstance(e, sp.MatAdd):
             first, *rest = [self.entry(term, i, j) for term in e.args]
             for term in rest:
