@@ -77,7 +77,8 @@ def layout_of(
         n = len(body.modes)
         units = tuple("rad" if mode.startswith("twist") else "m" for mode in body.modes)
         rates = tuple(f"{unit}/s" for unit in units)
-        modal[name] = HingeSlots(name, "modes", q, u, body.modes, units, body.modes, rates, None)
+        speeds = tuple(f"{mode}_rate" for mode in body.modes)
+        modal[name] = HingeSlots(name, "modes", q, u, body.modes, units, speeds, rates, None)
         q, u = q + n, u + n
     internal = range(len(expanded.described.hinge), len(scene.hinge))
     return Layout(scene, tuple(groups), q, u, modal, internal)

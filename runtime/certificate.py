@@ -12,6 +12,9 @@ from mstmm.scene import Hinge, Scene
 
 from .conditioning import LARGEST, PivotLoss, SingularDistance, pivot_loss, singular_distance
 from .error_estimate import ANGLE, PART, SAFETY, ErrorEstimate
+from .flexible import certify
+from .flexible.certify import Flexibility
+from .flexible.observe_momentum import undeformed
 from .stability import StepCheck
 
 if TYPE_CHECKING:
@@ -70,6 +73,7 @@ class Certificate:
         too_large: the scene has too many bodies for the pivots to be looked at.
         samples: how many samples there are; balances need two.
         end: the run's own message.
+        flexible: how far the model of each flexible body was from the end of its range.
     """
 
     energy: Drift
@@ -85,6 +89,7 @@ class Certificate:
     end: str
     too_large: bool = False
     samples: int = 2
+    flexible: tuple[Flexibility, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -115,6 +120,7 @@ class Certificate:
             rows.append(("h |lambda| at the start", f"{self.step.product:.3g}"))
         if self.sum_of_local_errors is not None:
             rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
+        rows += certify.rows(self.flexible)
         rows += _error_rows(self.error)
         rows += [("warning", text) for text in self.warnings]
         width = max(len(name) for name, _ in rows)
@@ -131,6 +137,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
         None if statistics is None else statistics.sum_local_error, error,
         bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()), run.message,
         len(result.model.scene.bodies) > LARGEST, len(result.t),
+        certify.flexibilities(result._flexible),
     )  # fmt: skip
 
 
@@ -159,16 +166,20 @@ def _momentum(result: Result) -> list[Drift]:
     largest angular momentum and that times the scene's reach.
     """
     scene, found = result.model.scene, list[Drift]()
-    if not len(result.t) or not _isolated(scene):
+    flexible = result.model.flexible
+    dragged = any(body.drag is not None for body in flexible.values())
+    if not len(result.t) or dragged or not _isolated(scene):
         return found
-    some = range(0, len(scene.bodies), max(1, len(scene.bodies) // _SOME))
-    names = [scene.bodies.name(i) for i in some]
+    bodies = scene.skeleton.bodies
+    some = range(0, len(bodies), max(1, len(bodies) // _SOME))
+    names = [bodies.name(i) for i in some]
     result._observed.fetch(names)
     reach = max((_largest(result.position(name)) for name in names), default=0.0)
     force, moment = _support(result, reach)
     kinetic = np.sqrt(2 * _largest(result.energies()["kinetic"]))
     mass = sum(body.mass for body in scene.body)
     mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
+    mass += sum(undeformed(body)[0] for body in flexible.values())
     linear, angular = result.momentum(), result.angular_momentum()
     speed = kinetic * np.sqrt(mass)
     scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
@@ -256,7 +267,7 @@ def _warnings(c: Certificate) -> list[str]:
             "many steps were as long as the stability of the explicit method allows: the scene is "
             "stiff for it (scipy-Radau or scipy-BDF may be faster), or the fixed step is too long"
         )
-    return found
+    return found + certify.warnings(c.flexible)
 
 
 def _error_rows(error: ErrorEstimate | None) -> list[tuple[str, str]]:

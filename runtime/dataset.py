@@ -10,6 +10,7 @@ from mstmm.errors import EnvironmentFailure
 from mstmm.hinge_types import effort_unit
 
 from . import provenance
+from .flexible import dataset as flexible
 from .quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 #: Speeds of a scene up to which everything about every body and hinge is written out.
 MOST_SPEEDS = 5000
+_EVERYTHING = ("body", "hinge", "flexible", "mode")
 
 
 def extra(name: str, what: str, error: ImportError) -> EnvironmentFailure:
@@ -42,9 +44,9 @@ def dataset(result: Result) -> Any:
         raise extra("io", "an xarray Dataset", error) from None
     variables, labels = _states(result), _labels(result)
     if result.model.nu <= MOST_SPEEDS:
-        variables |= _bodies(result) | _hinges(result)
+        variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
     else:
-        labels = {key: label for key, label in labels.items() if key not in ("body", "hinge")}
+        labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
     variables |= _sums(result) | provenance.variables(result)
     return xarray.Dataset(variables, labels, provenance.attributes(result))
 
@@ -67,14 +69,14 @@ def _common(units: list[str]) -> str:
 
 def _labels(result: Result) -> dict[str, Variable]:
     layout = result.model.layout
-    hinges = list(layout.hinges.values())
-    q_units = [unit or "1" for h in hinges for unit in h.q_units]
-    u_units = [unit or "1" for h in hinges for unit in h.u_units]
-    udot = [f"{h.name}.{acceleration_name(n)}" for h in hinges for n in h.u_names]
+    owners = list(layout.owners)
+    q_units = [unit or "1" for h in owners for unit in h.q_units]
+    u_units = [unit or "1" for h in owners for unit in h.u_units]
+    udot = [f"{h.name}.{acceleration_name(n)}" for h in owners for n in h.u_names]
     plain: dict[str, tuple[str, list[str], str]] = {
-        "coordinate": ("coordinate", layout.q_names, "hinge coordinate"),
+        "coordinate": ("coordinate", layout.q_names, "coordinate of a hinge or a mode"),
         "coordinate_units": ("coordinate", q_units, "unit of the coordinate"),
-        "speed": ("speed", layout.u_names, "hinge speed"),
+        "speed": ("speed", layout.u_names, "speed of a hinge or a mode"),
         "speed_units": ("speed", u_units, "unit of the speed"),
         "acceleration_name": ("speed", udot, "name of the speed's rate"),
         "effort_units": ("speed", [effort_unit(u) for u in u_units], "unit of the effort"),
@@ -82,6 +84,7 @@ def _labels(result: Result) -> dict[str, Variable]:
         "body": ("body", list(result._observed.references), "body or end of a body"),
         "axis": ("axis", ["x", "y", "z"], "inertial axis"),
         "component": ("component", ["w", "x", "y", "z"], "component of a quaternion"),
+        **flexible.labels(result),
     }
     found: dict[str, Variable] = {"time": (("time",), result.t, _about("s", "time"))}
     for name, (dim, words, long_name) in plain.items():
@@ -90,9 +93,9 @@ def _labels(result: Result) -> dict[str, Variable]:
 
 
 def _states(result: Result) -> dict[str, Variable]:
-    hinges = list(result.model.layout.hinges.values())
-    q_units = [unit for h in hinges for unit in h.q_units]
-    u_units = [unit for h in hinges for unit in h.u_units]
+    owners = list(result.model.layout.owners)
+    q_units = [unit for h in owners for unit in h.q_units]
+    u_units = [unit for h in owners for unit in h.u_units]
     by_speed, efforts = ("time", "speed"), [effort_unit(unit) for unit in u_units]
     rates = [rate_unit(unit) for unit in u_units]
     effort = result._observed.part("efforts")

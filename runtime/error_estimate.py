@@ -111,7 +111,8 @@ def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str
 
 
 def _differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
-    """(unit, largest difference (n,)) of one coordinate of a hinge, or of all that repeat it."""
+    """(unit, largest difference (n,)) of one coordinate of a hinge, or of all that repeat it; of
+    every modal coordinate."""
     for group in layout.groups:
         places = group.q_places() if kind == "q" else group.u_places()
         for j, hinge in enumerate(group.hinges[: group.count]):
@@ -124,6 +125,10 @@ def _differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tupl
             if turn is not None:
                 entries = first[:, None] + turn + np.arange(4)
                 yield "rad", rotation_between(a[:, entries], b[:, entries]).max(axis=1)
+    for body in layout.modal.values():
+        start, units = (body.q, body.q_units) if kind == "q" else (body.u, body.u_units)
+        for k, unit in enumerate(units, start):
+            yield unit, np.abs(a[:, k] - b[:, k])
 
 
 def rotation_between(a: Array, b: Array) -> Array:

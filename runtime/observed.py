@@ -20,6 +20,7 @@ from mstmm.scene_parts import BodyTable
 from .engine import PARTS, Probe
 
 if TYPE_CHECKING:
+    from .layout import Layout
     from .model import Model
     from .simulate import Trajectory
 
@@ -41,7 +42,7 @@ class Observed:
     def __init__(self, model: Model, run: Trajectory) -> None:
         self.engine, self.run = model._engine, run
         self.failures: tuple[str, ...] = ()
-        self.references = References(model.scene)
+        self.references = References(model.scene.skeleton)
         self._points: dict[str, Array] = {}
         self._parts: dict[str, Array] = {}
 
@@ -50,10 +51,17 @@ class Observed:
         if reference not in self._points:
             known = self.references.canonical(reference)
             if known is None and split(reference)[0] != "ground":
-                raise SceneError(self._unknown(reference))
+                raise SceneError(self.unknown(reference))
             self._observe("points", known or reference)
             self._points[reference] = self._points[known or reference]
         return self._points[reference]
+
+    def node(self, name: str) -> Array:
+        """(n, 24): as `points` of a body of the engine's own scene, such as a point mass of a beam
+        "blade/point 1", or of any body of the user's."""
+        if name not in self._points:
+            self._seen([name], ("points",))
+        return self._points[name]
 
     def fetch(self, references: Sequence[str]) -> None:
         """Observe these bodies and ends in one go, where they are asked for one after another."""
@@ -97,7 +105,8 @@ class Observed:
             self.failures = self.failures or seen.failures
             yield getattr(seen, name)
 
-    def _unknown(self, reference: str) -> str:
+    def unknown(self, reference: str) -> str:
+        """That there is no such body or end, and what is near."""
         body = split(reference)[0]
         if self.references.bodies.of_chain(body) and self.references.bodies.find(body) is None:
             return f'"{reference}": {self.references.bodies.missing(body)}'
@@ -120,6 +129,8 @@ class Observed:
         run = self.run
         probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
         seen = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
+        if "efforts" in parts:
+            _no_efforts_on_modes(seen.efforts, self.engine.packed.layout)
         for array in (seen.points, *(getattr(seen, name) for name in PARTS)):
             array.flags.writeable = False
         self.failures = self.failures or seen.failures
@@ -128,8 +139,17 @@ class Observed:
         self._parts |= {name: getattr(seen, name) for name in parts if name != "points"}
 
 
+def _no_efforts_on_modes(efforts: Array, layout: Layout) -> None:
+    """Laws and drives act on hinges: on modes they put nothing."""
+    for slots in layout.modal.values():
+        efforts[:, slots.u_slice] = 0.0
+
+
 class References(Collection[str]):
-    """Every body and every end of the scene: "rod1", "rod1.tip"."""
+    """Every body and every end of the scene: "rod1", "rod1.tip".
+
+    `scene` is the skeleton: flexible bodies count as bodies with ends like all others.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.bodies = scene, scene.bodies

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,8 @@ from mstmm.errors import SceneError
 from .curves import curve
 from .dataset import extra
 from .files import replacing
-from .table import default_names
+from .flexible.pictures import Picture, picture
+from .table import default_names, default_pictures
 
 if TYPE_CHECKING:
     from .quantities import Quantity
@@ -42,6 +44,9 @@ _STYLE: dict[str, Any] = {
 #: Points of a smooth curve between samples of the integrator's own steps.
 _FINE = 1500
 
+#: Inches of a panel of curves.
+_HEIGHT = 2.3
+
 #: A panel shows at least this part of its largest value.
 _FLAT = 1e-3
 
@@ -64,19 +69,21 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
         from matplotlib.figure import Figure
     except ImportError as error:
         raise extra("plot", "a picture", error) from None
-    chosen = [result.quantity(name) for name in list(names) or default_names(result)]
-    quantities = list({quantity.name: quantity for quantity in chosen}.values())
-    if not quantities:
+    panels = _panels(result, names)
+    if not panels:
         raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")
-    panels = _panels(quantities)
     style: Any = _STYLE
     with mpl.rc_context(style):
-        size = (7.5, 1.0 + 2.3 * len(panels))
-        figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, panel in zip(axes, panels, strict=True):
-            _draw(axis, result, panel)
-        axes[-1].set_xlabel("time in s")
+        figure = Figure(
+            figsize=(7.5, 1.0 + sum(panel.height for panel in panels)), layout="constrained"
+        )
+        groups = [[panel] for panel in panels if not panel.over_time]
+        groups += [[panel for panel in panels if panel.over_time]]
+        groups = [group for group in groups if group]
+        heights = [sum(panel.height for panel in group) for group in groups]
+        parts = figure.subfigures(len(groups), 1, height_ratios=heights, squeeze=False)[:, 0]
+        for part, group in zip(parts, groups, strict=True):
+            _fill(part, group)
         if title:
             figure.suptitle(title)
         if path is not None:
@@ -84,12 +91,33 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
     return figure
 
 
-def _panels(quantities: Sequence[Quantity]) -> list[list[Quantity]]:
-    """Quantities of one unit together, in the order of their first ones."""
-    panels: dict[str, list[Quantity]] = {}
-    for quantity in quantities:
-        panels.setdefault(quantity.unit, []).append(quantity)
-    return list(panels.values())
+def _panels(result: Result, names: Sequence[str]) -> list[Picture]:
+    """Pictures, then quantities of one unit together, in the order of their first ones."""
+    wanted = list(dict.fromkeys(names)) or [*default_pictures(result), *default_names(result)]
+    found = {name: picture(result, name) for name in wanted}
+    panels: list[Picture] = [one for one in found.values() if one is not None]
+    chosen = [result.quantity(name) for name, one in found.items() if one is None]
+    units: dict[str, list[Quantity]] = {}
+    for quantity in {quantity.name: quantity for quantity in chosen}.values():
+        units.setdefault(quantity.unit, []).append(quantity)
+    curves = [
+        Picture(partial(_curves, result, some), _HEIGHT, over_time=True) for some in units.values()
+    ]
+    return panels + curves
+
+
+def _fill(part: Any, group: Sequence[Picture]) -> None:
+    """One picture, or all panels over time with one time axis below the last."""
+    heights = [panel.height for panel in group]
+    axes = part.subplots(len(group), 1, height_ratios=heights, sharex=True, squeeze=False)[:, 0]
+    for axis, panel in zip(axes, group, strict=True):
+        panel.draw(part, axis)
+    if group[0].over_time:
+        axes[-1].set_xlabel("time in s")
+
+
+def _curves(result: Result, panel: Sequence[Quantity], figure: Any, axis: Any) -> None:
+    _draw(axis, result, panel)
 
 
 def _draw(axis: Any, result: Result, panel: Sequence[Quantity]) -> None:

@@ -16,10 +16,12 @@ from mstmm.errors import SceneError
 from mstmm.hinge_types import effort_unit
 from mstmm.scene_errors import near
 
+from .kinds import Kind
 from .layout import HingeSlots
 from .observed import quaternions
 
 if TYPE_CHECKING:
+    from .flexible.results import FlexibleResults
     from .observed import Observed
 
 Array = NDArray[np.float64]
@@ -42,16 +44,6 @@ class Quantity:
     long_name: str
     labels: tuple[str, ...] = ()
     rates: Callable[[], Array] | None = field(default=None, compare=False)
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A vector quantity of a body or hinge: unit, long name, columns, short names of those."""
-
-    unit: str
-    long_name: str
-    labels: tuple[str, ...]
-    short: tuple[str, ...]
 
 
 #: Quantities of a body or an end, in the order of `Observation.points`.
@@ -79,7 +71,7 @@ SUMS: dict[str, tuple[str, str, slice]] = {
     "energy": ("J", "total energy", slice(0, 3)),
     "energy.kinetic": ("J", "kinetic energy", slice(0, 1)),
     "energy.gravity": ("J", "potential energy of gravity", slice(1, 2)),
-    "energy.springs": ("J", "energy of springs", slice(2, 3)),
+    "energy.springs": ("J", "energy of springs and of deformed bodies", slice(2, 3)),
     "power": ("W", "power of everything that is not stored", slice(3, 4)),
     "momentum": ("kg*m/s", "linear momentum", slice(4, 7)),
     "angular_momentum": ("kg*m2/s", "angular momentum about the inertial origin", slice(7, 10)),
@@ -102,8 +94,11 @@ class Quantities:
     Names are made per owner, a hinge, a body, an end or the scene (""), when they are asked for.
     """
 
-    def __init__(self, observed: Observed, builtin: Collection[str]) -> None:
+    def __init__(
+        self, observed: Observed, builtin: Collection[str], flexible: FlexibleResults
+    ) -> None:
         self.observed, self.run, self._builtin = observed, observed.run, builtin
+        self._flexible = flexible
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
@@ -134,6 +129,11 @@ class Quantities:
 
     def of_hinge(self, hinge: str, kind: str) -> Array:
         """force or moment (n, 3)."""
+        if hinge in self.layout.modal:
+            raise SceneError(
+                f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
+                "that holds it"
+            )
         self.slots(hinge)
         place = self.observed.engine.packed.hinge_position[hinge]
         first = 0 if kind == "force" else 3
@@ -186,7 +186,7 @@ class Quantities:
         """Names of one owner."""
         if owner not in self._tables:
             table = Table({}, [])
-            if owner in self.layout.hinges:
+            if owner in self.layout.hinges and owner not in self.layout.modal:
                 self._hinge(table, self.layout.hinges[owner])
             elif owner:
                 self._body(table, owner)
@@ -205,6 +205,28 @@ class Quantities:
                 f"{reference}.{kind}", reference, about, self._bound(self.of_body, reference, kind),
                 None if rates is None else self._bound(self.of_body, reference, rates),
             )  # fmt: skip
+        if reference in self.layout.modal:
+            self._modal(table, self.layout.modal[reference])
+        from .flexible.names import add_body
+
+        add_body(table, self._flexible, reference)
+
+    def _modal(self, table: Table, body: HingeSlots) -> None:
+        """Modal coordinates of a flexible body, their speeds and accelerations: blade.y1."""
+        q, u = body.q_slice, body.u_slice
+        group = _Group(table, body.name, "flexible body")
+        rates = [rate_unit(unit) for unit in body.u_units]
+        accelerations = [acceleration_name(name) for name in body.u_names]
+
+        def udot() -> Array:
+            return self.observed.columns("udot", (u,))
+
+        def speeds() -> Array:
+            return self.run.u[:, u]
+
+        group.add("q", "coordinate", body.q_names, body.q_units, lambda: self.run.q[:, q], speeds)
+        group.add("u", "speed", body.u_names, body.u_units, speeds, udot)
+        group.add("udot", "acceleration", accelerations, rates, udot)
 
     def _scene(self, table: Table) -> None:
         for name, (unit, long_name, columns) in SUMS.items():
@@ -269,9 +291,13 @@ class Table:
             self.scalars.append(name)
 
     def vector(
-        self, name: str, owner: str, about: Kind, get: Values, rates: Values | None = None
-    ) -> None:
-        """The vector under its name, each component under name.x, and short as in rod1.tip.vx."""
+        self, name: str, owner: str, about: Kind, get: Values, rates: Values | None = None,
+        listed: bool = True,
+    ) -> None:  # fmt: skip
+        """The vector under its name, each component under name.x, and short as in rod1.tip.vx.
+
+        What is not `listed` has names but no column in a wide table.
+        """
         long_name = f"{about.long_name} of {owner}"
         self.entries[name] = lambda: Quantity(
             name, get(), about.unit, long_name, about.labels, rates
@@ -280,9 +306,9 @@ class Table:
             text = f"{long_name}, {label}"
             short = f"{owner}.{about.short[k]}" if about.short else ""
             taken = not short or short in self.entries
-            self.scalar(f"{name}.{label}", about.unit, text, get, k, rates, listed=taken)
+            self.scalar(f"{name}.{label}", about.unit, text, get, k, rates, listed and taken)
             if not taken:
-                self.scalar(short, about.unit, text, get, k, rates)
+                self.scalar(short, about.unit, text, get, k, rates, listed)
 
 
 @dataclass
@@ -291,6 +317,7 @@ class _Group:
 
     table: Table
     hinge: str
+    word: str = "hinge"
 
     def add(
         self, short: str, word: str, names: Sequence[str], units: Sequence[str], get: Values,
@@ -298,7 +325,7 @@ class _Group:
     ) -> None:  # fmt: skip
         """One kind of quantity, one name and unit per column."""
         for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-            full, long_name = f"{self.hinge}.{name}", f"{word} {name} of hinge {self.hinge}"
+            full, long_name = f"{self.hinge}.{name}", f"{word} {name} of {self.word} {self.hinge}"
             self.table.scalar(full, unit, long_name, get, k, rates)
             self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
         if len(names) == 1 and names[0] != short:

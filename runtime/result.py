@@ -16,6 +16,7 @@ from mstmm.hinge_types import HINGE_TYPES
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
 from .execution import Watch, first_run, second_run
+from .flexible.results import FlexibleResults
 from .integrate import Statistics, Status
 from .layout import HingeSlots
 from .observed import Observed
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Result:
+class Result(FlexibleResults):
     """What a run gave: states, and everything that follows from them, over the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
@@ -65,7 +66,7 @@ class Result:
         self.statistics: Statistics | None = run.statistics
         self.settings: Settings = run.settings
         self._observed = Observed(model, run)
-        self._quantities = Quantities(self._observed, HINGE_TYPES)
+        self._quantities = Quantities(self._observed, HINGE_TYPES, self)
 
     @property
     def success(self) -> bool:
@@ -126,11 +127,11 @@ class Result:
     # --- hinges ---------------------------------------------------------------------------------
 
     def coordinate(self, hinge: str) -> Array:
-        """Coordinates (n, nq) of one hinge."""
+        """Coordinates (n, nq) of one hinge; of a flexible body the modal ones."""
         return self.q[:, self._quantities.slots(hinge).q_slice]
 
     def speed(self, hinge: str) -> Array:
-        """Speeds (n, nu) of one hinge."""
+        """Speeds (n, nu) of one hinge; of a flexible body the modal ones."""
         return self.u[:, self._quantities.slots(hinge).u_slice]
 
     def force(self, hinge: str) -> Array:
@@ -188,6 +189,13 @@ class Result:
         """Every name that `quantity`, `plot` and `table` take."""
         return tuple(self._quantities.names())
 
+    def pictures(self) -> tuple[str, ...]:
+        """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
+        them), "blade.shape", "blade.deflection" (along the beam), "blade.modal_energy"."""
+        from .flexible.pictures import names
+
+        return tuple(names(self))
+
     def quantity(self, name: str) -> Quantity:
         """Values with unit by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy"."""
         return self._quantities.get(name)
@@ -219,7 +227,9 @@ class Result:
     def plot(self, *names: str, path: str | Path | None = None, title: str | None = None) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
 
-        Without names, the hinge coordinates.  With `path`, also written there (.png, .svg, .pdf).
+        Names of `pictures` draw flexible bodies.  Without names, the hinge coordinates, and the
+        shapes and tip deflections of flexible bodies.  With `path`, also written there (.png, .svg,
+        .pdf).
         """
         from .plot import plot
 

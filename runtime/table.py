@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -15,20 +15,46 @@ if TYPE_CHECKING:
 #: Columns of a table nobody chose the columns of.
 _DEFAULT_COLUMNS = 6
 
+#: A tip that moves by less than this part of the middle is held by the floating frame.
+_HELD = 1e-9
+
 #: Hinges among which these are looked for.
 _LOOKED_AT = 10_000
 
 
 def default_names(result: Result, most: int = _DEFAULT_COLUMNS) -> list[str]:
-    """The first hinge coordinates, without quaternions."""
-    layout = result.model.layout
+    """The first hinge coordinates, without quaternions, and deflections of the last end of the
+    first flexible bodies."""
+    layout, bent = result.model.layout, list(_deflections(result, most // 2))
     names = (
         f"{hinge.name}.{name}"
         for hinge in islice(layout.hinges.values(), _LOOKED_AT)
         for name, unit in zip(hinge.q_names, hinge.q_units, strict=True)
         if unit
     )
-    return list(islice(names, most))
+    return [*islice(names, most - len(bent)), *bent]
+
+
+def default_pictures(result: Result) -> list[str]:
+    """What is drawn above the curves if nobody chose: the shapes of flexible bodies."""
+    return ["shape"] if result.model.flexible else []
+
+
+def _deflections(result: Result, most: int) -> Iterator[str]:
+    """The larger deflection of the tip of each beam, or the first modal coordinate of a body whose
+    frame follows its tip or that is no beam."""
+    for name, body in islice(result.model.flexible.items(), most):
+        if body.shapes is None:
+            yield f"{name}.{body.modes[0]}"
+            continue
+        across = np.abs(
+            np.nan_to_num(result.deflection(name, np.array([0.5, 1.0]) * body.shapes.length))
+        )
+        middle, tip = np.max(across[:, :, 1:], axis=0, initial=0.0)
+        if tip.max() <= _HELD * middle.max():
+            yield f"{name}.{body.modes[0]}"
+        else:
+            yield f"{name}.tip.deflection.{'yz'[int(tip.argmax())]}"
 
 
 def flat(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 def sizes(result: Result) -> str:
     """3 bodies on 3 hinges, 9 degrees of freedom."""
-    scene = result.model.scene
+    scene, bodies = result.model.scene, len(result.model.scene.skeleton.bodies)
     return (
-        f"{count(len(scene.bodies), 'body', 'bodies')} on {count(len(scene.hinges), 'hinge')}, "
+        f"{count(bodies, 'body', 'bodies')} on {count(len(scene.hinges), 'hinge')}, "
         f"{count(result.model.nu, 'degree')} of freedom"
     )
 
@@ -39,8 +39,10 @@ def effort(result: Result, seconds: float) -> str:
 
 def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int) -> str:
     """Some samples; columns that nobody asked for are left out where the terminal is narrow."""
-    if names:
-        return result.table(*names, rows=rows)
+    pictures = result.pictures()
+    numbers = [name for name in names if name not in pictures]
+    if numbers:
+        return result.table(*numbers, rows=rows)
     chosen = [*default_quantities(result), "energy"]
     text = result.table(*chosen, rows=rows)
     while len(chosen) > 1 and max(map(len, text.splitlines())) > width:
@@ -57,9 +59,16 @@ def default_quantities(result: Result) -> list[str]:
     from mstmm.runtime.table import default_names
 
     scene = result.model.scene
-    body = scene.bodies[-1]
+    body = scene.skeleton.bodies[-1]
     tip = ".".join([body.name, *list(body.ends)[-1:]])
     return default_names(result) or [f"{tip}.{axis}" for axis in "xyz"]
+
+
+def default_panels(result: Result) -> list[str]:
+    """What to draw if nobody asked: shapes of flexible bodies, and what the table shows."""
+    from mstmm.runtime.table import default_pictures
+
+    return [*default_pictures(result), *default_quantities(result)] or ["energy"]
 
 
 def to_json(result: Result, seconds: float) -> dict[str, Any]:
@@ -91,6 +100,7 @@ def _certificate(result: Result) -> dict[str, Any]:
     data = {key: value for key, value in vars(certificate).items() if key != "error"}
     plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
     plain["momentum"] = [vars(drift) for drift in certificate.momentum]
+    plain["flexible"] = [vars(body) for body in certificate.flexible]
     error = certificate.error
     if error is None:
         return {**plain, "error": None}

@@ -149,7 +149,7 @@ def simulate(
             result = certified(result, progress)
             result.save(plan.output)
     if plan.plot is not None:
-        names = plan.quantities or report.default_quantities(result) or ["energy"]
+        names = plan.quantities or report.default_panels(result)
         result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
     _report(plan, result, seconds, json)
     if interrupted(result):
@@ -188,9 +188,11 @@ def _model(plan: Plan) -> Model:
     model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep, plan.engine)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
+        pictures = start.pictures()
         for name in plan.quantities:
             try:
-                start.quantity(name)
+                if name not in pictures:
+                    start.quantity(name)
             except SceneError as error:
                 raise SceneError(f"--quantity {error}") from None
     return model

@@ -6,13 +6,14 @@ shapes could not follow, coupling chi, shear.  Thresholds and reasons stand besi
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .observe import Motion, tilde
-from .observe_energy import frequencies, modal_energy, modal_mass
+from .observe_energy import modal_energy
 
 if TYPE_CHECKING:
     from .modal_body import ModalBody
@@ -54,23 +55,54 @@ def cross_spin(motion: Motion) -> float:
     return float(np.max(np.linalg.norm(motion.frame_spin[:, first:], axis=1), initial=0.0))
 
 
+@dataclass(frozen=True)
+class SecondOrder:
+    """Moments of the second-order displacement: G (3, n, n) = int rho g_a, X (3, 3, n, n) =
+    int rho r0_a g_b, and its values (3, n, n) at the ends."""
+
+    G: Array
+    X: Array
+    ends: dict[str, Array]
+
+
+def second_order(body: ModalBody) -> SecondOrder | None:
+    """Of a beam the shortening of its bent axis, also where its kinematics leave it out; of another
+    body what it has; None if it has nothing."""
+    if body.shapes is None:
+        ends = {name: port.shortening for name, port in body.ports.items()}
+        known = np.any(body.G) or any(np.any(g) for g in ends.values())
+        return SecondOrder(body.G, body.X, ends) if known else None
+    n = len(body.modes)
+    G, X = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
+    x, weights = body.shapes.rule()
+    mass = weights * body.shapes.sections(x).mass_per_length
+    along = body.shapes.at(x).shortening
+    G[0] = np.einsum("m,mkl->kl", mass, along)
+    X[0, 0] = np.einsum("m,mkl->kl", mass * x, along)
+    ends = {}
+    for name, port in body.ports.items():
+        ends[name] = np.zeros((3, n, n))
+        ends[name][0] = body.shapes.at(port.position[:1]).shortening[0]
+    return SecondOrder(G, X, ends)
+
+
 def stiffness_from_loads(
-    motion: Motion, gravity: Array, ports: dict[str, Array], second_order: ModalBody
+    motion: Motion, gravity: Array, ports: dict[str, Array], second: SecondOrder
 ) -> Array:
     """(n, modes, modes) K_g of the loads on the undeformed body.
 
     K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port), with the acceleration a = a_o + W r0 of
     the rigid motion, W = wd~ + w~ w~, and g the second-order displacement: for a beam
     (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L).  `ports` are forces (n, 3) in N on
-    the ends, inertial axes; `second_order` holds G, X and the ports' shortening (not zero).
+    the ends, inertial axes.
     """
     force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
     spin = tilde(motion.frame_spin)
     turning = tilde(motion.frame_spin_rate) + spin @ spin
-    total = -np.einsum("ta,akl->tkl", force, second_order.G)
-    total -= np.einsum("tab,bakl->tkl", turning, second_order.X)
+    total = -np.einsum("ta,akl->tkl", force, second.G)
+    total -= np.einsum("tab,bakl->tkl", turning, second.X)
     for name, load in ports.items():
-        total += np.einsum("ta,akl->tkl", motion.inward(load), second_order.ports[name].shortening)
+        total += np.einsum("ta,akl->tkl", motion.inward(load), second.ends[name])
     return total
 
 
@@ -107,30 +139,34 @@ def last_shape_share(motion: Motion) -> tuple[float, str]:
     return worst
 
 
-def spin_ratio(motion: Motion) -> float:
-    """Largest spin across the body over its first frequency in the frame."""
-    return cross_spin(motion) / float(frequencies(motion.body)[0])
+def bends(body: ModalBody, plane: str) -> bool:
+    """Whether a beam has shapes of deflection along y or z."""
+    return any(name.startswith(plane) for name in body.modes)
 
 
-def coupling(body: ModalBody, hinge_rows: Array, hinge_inertia: Array) -> Array:
-    """(modes,) chi_i = M_ri^T D^-1 M_ri / M_ii: share of the inertia at a hinge held by shape i.
+def shear_error(body: ModalBody) -> float | None:
+    """Relative error of the highest bending frequency of a beam for want of shear (and of rotary
+    inertia where the model has none); None where the section's radius of gyration is not known.
 
-    `hinge_rows` (modes, nu) and `hinge_inertia` (nu, nu) of the hinge, what hangs outboard free to
-    move, the modes held.
+    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the highest
+    shape in 1/m, r the radius of gyration in m; the 1 is rotary inertia.
     """
-    inertia = np.diag(modal_mass(body))
-    carried = np.linalg.solve(hinge_inertia, hinge_rows.T)
-    return np.einsum("kj,jk->k", hinge_rows, carried) / inertia
-
-
-def shear_error(highest: float, gyration: float, rotary: bool) -> float:
-    """Relative error of the highest bending frequency without shear (and rotary inertia).
-
-    1/2 (beta r)^2 (1 + E/(k G)) of Timoshenko's correction with beta the wave number in 1/m, r the
-    section's radius of gyration in m, E/(k G) = 3.1 (a rectangle of nu = 0.3); the 1 is rotary
-    inertia, left out where the model has it.  Not meant above about a half.
-    """
-    return 0.5 * (highest * gyration) ** 2 * (_SHEAR + (0.0 if rotary else 1.0))
+    shapes = body.shapes
+    if shapes is None:
+        return None
+    x, weights = shapes.rule()
+    sections, worst = shapes.sections(x), None
+    for plane, about in (("y", 2), ("z", 1)):
+        bent = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
+        gyration = np.sqrt(np.max(sections.rho_I[about] / sections.mass_per_length))
+        if not bent or not gyration > 0:
+            continue
+        phi, bending = shapes.at(x).phi[:, "xyz".index(plane)], shapes.at(x).curvature[:, about]
+        squares = (weights @ bending**2) / (weights @ phi**2)
+        fourth = np.max(squares[bent])  # int phi''^2 / int phi^2 = beta^4
+        error = 0.5 * np.sqrt(fourth) * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
+        worst = max(worst or 0.0, float(error))
+    return worst
 
 
 #: E / (k G) of a rectangular section, nu = 0.3, k = 5/6.

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
+    from .beam_shapes import BeamShapes
     from .modal_body import ModalBody
 
 Array = NDArray[np.float64]
@@ -56,6 +57,11 @@ class Motion:
         arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         kept = {name: arrays[name] for name in _ARRAYS}
         return Motion(self.body, **kept)
+
+    @property
+    def shapes(self) -> BeamShapes:
+        """Shapes along the axis of a beam; SceneError for a body that has none."""
+        return shapes_of(self.body, "what is along its axis")
 
     # --- the floating frame in its own axes -----------------------------------------------------
 
@@ -97,7 +103,7 @@ _ARRAYS = (
 # --- places along a beam --------------------------------------------------------------------------
 
 
-def shapes_of(body: ModalBody, what: str) -> Any:
+def shapes_of(body: ModalBody, what: str) -> BeamShapes:
     """Shapes of a beam along its axis; SceneError for a body that has no axis."""
     if body.shapes is None:
         raise SceneError(
@@ -124,9 +130,9 @@ def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 
 def deflection(motion: Motion, places: Array) -> Array:
     """(n, m, 3) elastic displacement in m of the axis at x, frame axes, shortening included."""
-    at = motion.body.shapes.at(places)
+    at = motion.shapes.at(places)
     moved = np.einsum("mak,tk->tma", at.phi, motion.eta)
-    if motion.body.shapes.stiffening:
+    if motion.shapes.stiffening:
         moved[:, :, 0] -= 0.5 * bilinear(at.shortening, motion.eta, motion.eta)
     return moved
 
@@ -138,7 +144,7 @@ def bilinear(matrices: Array, a: Array, b: Array) -> Array:
 
 def turns(motion: Motion, places: Array) -> Array:
     """(n, m, 3) rotation vectors in rad of the sections against the frame: twist, -w', v'."""
-    return np.einsum("mak,tk->tma", motion.body.shapes.at(places).theta, motion.eta)
+    return np.einsum("mak,tk->tma", motion.shapes.at(places).theta, motion.eta)
 
 
 def slope(motion: Motion, places: Array) -> Array:
@@ -149,7 +155,7 @@ def slope(motion: Motion, places: Array) -> Array:
 
 def curvature(motion: Motion, places: Array) -> Array:
     """(n, m, 2) curvature in 1/m about y, -w'', and about z, v''."""
-    bent = motion.body.shapes.at(places).curvature[:, 1:]
+    bent = motion.shapes.at(places).curvature[:, 1:]
     return np.einsum("mak,tk->tma", bent, motion.eta)
 
 
@@ -179,3 +185,22 @@ def tilde(v: Array) -> Array:
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     rows = [zero, -z, y, z, zero, -x, -y, x, zero]
     return np.stack(rows, axis=-1).reshape(*v.shape[:-1], 3, 3)
+
+
+def elastic_moment(motion: Motion, places: Array) -> Array:
+    """(n, m, 2) bending moments in N*m of the curvature of the shapes: about y and about z."""
+    sections = motion.shapes.sections(places)
+    stiffness = np.stack([sections.EI_y, sections.EI_z], axis=1)
+    return curvature(motion, places) * stiffness
+
+
+def elastic_force(motion: Motion, places: Array) -> Array:
+    """(n, m) axial force EA s' in N of the axial shapes; SceneError for a beam without them."""
+    at = motion.shapes.at(places)
+    if not at.stretch.any():
+        raise SceneError(
+            f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
+            'take source = "equilibrium"'
+        )
+    stretch = np.einsum("mk,tk->tm", at.stretch, motion.eta)
+    return np.asarray(stretch * motion.shapes.sections(places).EA)

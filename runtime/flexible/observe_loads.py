@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .observe import Motion, bilinear, section_rotations, tilde
+from .observe import Motion, bilinear, deflection, section_rotations, tilde, turns
 
 Array = NDArray[np.float64]
 
@@ -36,15 +37,24 @@ class PointLoad:
     force: Array
     moment: Array
 
+    def some(self, samples: Any) -> PointLoad:
+        """The same at some samples."""
+        return PointLoad(self.x, self.force[samples], self.moment[samples])
+
 
 @dataclass(frozen=True)
 class LineLoad:
-    """Force (n, 3) N and moment (n, 3) N*m, spread evenly over first <= x <= last, inertial axes."""
+    """Force (n, 3) N and moment (n, 3) N*m, spread evenly from x = first to last (m), inertial
+    axes."""
 
     first: float
     last: float
     force: Array
     moment: Array
+
+    def some(self, samples: Any) -> LineLoad:
+        """The same at some samples."""
+        return LineLoad(self.first, self.last, self.force[samples], self.moment[samples])
 
 
 def section_loads(
@@ -68,8 +78,7 @@ def section_loads(
     force, moment = (np.empty((len(motion.t), len(places), 3)) for _ in range(2))
     for first in range(0, len(motion.t), rows):
         some = slice(first, first + rows)
-        on = [PointLoad(p.x, p.force[some], p.moment[some]) for p in points]
-        along = [LineLoad(p.first, p.last, p.force[some], p.moment[some]) for p in lines]
+        on, along = [p.some(some) for p in points], [p.some(some) for p in lines]
         piece = _Sums(motion.some(some), edges, gravity, on, along)
         force[some], moment[some] = piece.at(places, held)
     return force, moment
@@ -79,9 +88,9 @@ def _edges(
     motion: Motion, places: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
 ) -> Array:
     """Ends of the panels: nothing jumps within one."""
-    shapes = motion.body.shapes
+    shapes = motion.shapes
     count = max(_PANELS, 2 * motion.eta.shape[1])
-    known = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.breaks)]
+    known = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.pieces)]
     known += [np.array([p.x]) for p in points]
     known += [np.array([p.first, p.last]) for p in lines]
     return np.unique(np.clip(np.concatenate(known), 0.0, shapes.length))
@@ -136,15 +145,12 @@ class _Sums:
             total = total + wrench[:, None] * (beyond.astype(float) - below)[:, None]
         force = total[:, :, :3]
         moment = total[:, :, 3:] - np.cross(_places(self.motion, places), force)
-        turned = np.einsum("mak,tk->tma", self.motion.body.shapes.at(places).theta, self.motion.eta)
-        back = section_rotations(turned)
+        back = section_rotations(turns(self.motion, places))
         return np.einsum("tmji,tmj->tmi", back, force), np.einsum("tmji,tmj->tmi", back, moment)
 
 
 def _places(motion: Motion, x: Array) -> Array:
     """(n, m, 3) places of the deflected axis, frame axes."""
-    from .observe import deflection
-
     at_rest = np.zeros((len(x), 3))
     at_rest[:, 0] = x
     return at_rest + deflection(motion, x)
@@ -152,12 +158,12 @@ def _places(motion: Motion, x: Array) -> Array:
 
 def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
     """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
-    body, at = motion.body, motion.body.shapes.at(x)
-    sections = body.shapes.sections(x)
+    body, shapes, at = motion.body, motion.shapes, motion.shapes.at(x)
+    sections = shapes.sections(x)
     place = _places(motion, x)
     moving = np.einsum("mak,tk->tma", at.phi, motion.etad)
     pushed = np.einsum("mak,tk->tma", at.phi, motion.etadd)
-    if body.shapes.stiffening:
+    if shapes.stiffening:
         moving[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etad)
         pushed[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etadd)
         pushed[:, :, 0] -= bilinear(at.shortening, motion.etad, motion.etad)
@@ -168,20 +174,23 @@ def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, 
     acceleration += 2 * np.cross(w, moving) + pushed
     weight = motion.inward(np.broadcast_to(gravity, motion.velocity.shape))[:, None]
     density = weight - acceleration
-    if body.drag:
-        density -= body.drag * (motion.frame_velocity[:, None] + turning + moving)
     force = density * sections.mass_per_length[:, None]
-    return place, force, -_rotary(motion, at, sections.rho_I)
+    if body.drag is not None:
+        drag = sections.drag[:, None]
+        force -= drag * (motion.frame_velocity[:, None] + turning + moving)
+    return place, force, -_rotary(motion, x, sections.rho_I.T)
 
 
-def _rotary(motion: Motion, at: object, per_length: Array) -> Array:
+def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
 
-    The sections turn with Psi (of the first order in rates: Psi is small where this matters).
+    The sections' inertia turns with its part of Psi (twist alone without rotary inertia), of the
+    first order in rates: Psi is small where this matters.
     """
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
-    theta = at.theta_inertial  # type: ignore[attr-defined]
+    shapes = motion.shapes
+    theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
     turned, rate, growth = (
         np.einsum("mak,tk->tma", theta, modal) for modal in (motion.eta, motion.etad, motion.etadd)
     )
