@@ -36,6 +36,7 @@ def compile_scene(
     sweep: str = "riccati",
     accuracy: float = 1e-8,
     bake: bool = False,
+    flexibility: str | None = None,
 ) -> Model:
     """Model of a scene, ready to compute.
 
@@ -51,6 +52,9 @@ def compile_scene(
             largest acceleration, that is not an error.
         bake: with "fused", make the scene's numbers part of the code instead of reading them at run
             time: somewhat faster, but other parameters need the compiler again.
+        flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
+            the run, then respond elastically to its motion and loads) or "rigid"; None takes each
+            body's own `model`.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
     leave a motion of the start undetermined; EnvironmentFailure if engine="fused" and there is no
@@ -64,7 +68,10 @@ def compile_scene(
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
     from .fusion import Fusion
     from .runtime import store
+    from .runtime.flexible.rigidified import with_level
     from .runtime.model import Model
+
+    scene = with_level(scene, flexibility)
 
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)

@@ -82,8 +82,13 @@ def expansion_of(scene: Scene) -> Expanded:
     if not (scene.beam or scene.elastic):
         return Expanded(scene, scene, {})
     from .flexible.bodies import modal_bodies
+    from .flexible.rigidified import rigidified
 
-    return expand(scene, modal_bodies(scene))
+    rigid = rigidified(scene)
+    expanded = expand(rigid.scene, modal_bodies(rigid.scene))
+    expanded.described, expanded.rigidified = scene, rigid
+    expanded.nodes |= rigid.nodes
+    return expanded
 
 
 def releasable(scene: Scene) -> list[str]:

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
     from mstmm.scene_elastic import Elastic
 
-__all__ = ["elastic_bodies", "elastic_body", "model_of", "save_matrices"]
+__all__ = [
+    "elastic_bodies", "elastic_body", "modal_body", "model_of", "rigid_of", "save_matrices",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -40,15 +42,17 @@ _ROUNDING = 1e-10
 
 
 def elastic_bodies(scene: Scene) -> dict[str, ModalBody]:
-    """The modal body of every [[elastic]] table, in the order of the scene.
+    """The modal body of every [[elastic]] table but those with model = "rigid", in the order of
+    the scene.
 
     Raises SceneError for files and matrices that describe no free elastic body and for ends off the
     mesh, EnvironmentFailure where a mesh needs the extra `fem`.
     """
-    return {elastic.name: _of_scene(elastic, scene) for elastic in scene.elastic}
+    return {e.name: modal_body(e, scene) for e in scene.elastic if e.model != "rigid"}
 
 
-def _of_scene(elastic: Elastic, scene: Scene) -> ModalBody:
+def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
+    """The modal body of one [[elastic]] table of a scene, whatever its model."""
     model = model_of(elastic)
     holder = _holder(elastic.name, scene)
     held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
@@ -68,6 +72,12 @@ def _of_scene(elastic: Elastic, scene: Scene) -> ModalBody:
         highest=elastic.highest_frequency, stiffening=elastic.stiffening,
         damping=elastic.damping, start=elastic.initial, notes=notes,
     )  # fmt: skip
+
+
+def rigid_of(elastic: Elastic) -> tuple[ElasticModel, dict[str, Port]]:
+    """Mass and ends of an [[elastic]] table, without any shapes."""
+    model = model_of(elastic)
+    return model, {name: port(model, name, end, False) for name, end in elastic.ends.items()}
 
 
 def model_of(elastic: Elastic) -> ElasticModel:

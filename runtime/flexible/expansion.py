@@ -18,6 +18,7 @@ from mstmm.scene import Body, Hinge, Scene, split
 from mstmm.scene_parts import End, Load
 
 from .modal_body import MassPoint, ModalBody, ModalPort
+from .rigidified import Rigidified
 
 HELD, POINT = "held", "point"
 
@@ -44,6 +45,8 @@ class Expanded:
     idle: set[str] = field(default_factory=set)
     #: End by which each flexible body is held.
     held: dict[str, str] = field(default_factory=dict)
+    #: What became of the bodies that are rigid in the run, None where there is none.
+    rigidified: Rigidified | None = None
 
     def is_node(self, name: str) -> bool:
         """Whether a body of the scene of nodes belongs to a flexible body."""
