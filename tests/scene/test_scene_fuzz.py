@@ -82,6 +82,7 @@ def check(make: Any) -> None:
         assert 1 <= len(lines) <= 11
         assert all(line.isprintable() and len(line) < 1500 for line in lines)
         return
+    assert all(line.isprintable() for line in scene.warnings)
     assert Scene(**tomllib.loads(scene.to_toml())) == scene
     assert Scene(**scene.model_dump()) == scene
 
