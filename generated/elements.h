@@ -502,9 +502,11 @@ int mstmm_sweep_beam_rigid(const real *restrict x, const real *restrict inertia,
     real *restrict mass, real *restrict first, real *restrict second);
 int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inertia,
     const real *restrict stiffness, const real *restrict axis_k, const real *restrict turn_k,
-    const real *restrict slope_k, const real *restrict strain_k, const real *restrict axis_l,
-    const real *restrict turn_l, const real *restrict slope_l, const real *restrict strain_l,
-    real *restrict C, real *restrict E, real *restrict F, real *restrict K, real *restrict g);
+    const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
+    const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
+    real *restrict K);
+int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
+    real *restrict g);
 int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
     real *restrict phi, real *restrict theta);
 

@@ -12,9 +12,11 @@ int mstmm_sweep_beam_rigid(const real *restrict x, const real *restrict inertia,
     real *restrict mass, real *restrict first, real *restrict second);
 int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inertia,
     const real *restrict stiffness, const real *restrict axis_k, const real *restrict turn_k,
-    const real *restrict slope_k, const real *restrict strain_k, const real *restrict axis_l,
-    const real *restrict turn_l, const real *restrict slope_l, const real *restrict strain_l,
-    real *restrict C, real *restrict E, real *restrict F, real *restrict K, real *restrict g);
+    const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
+    const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
+    real *restrict K);
+int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
+    real *restrict g);
 int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
     real *restrict phi, real *restrict theta);
 
@@ -69,23 +71,20 @@ static const mstmm_port mstmm_sweep_beam_rigid_outputs[] = {
  * in  stiffness[4] EA (N), GI_t, EI_y, EI_z (N m^2); EI_y bends along z
  * in  axis_k[3] displacement s, v, w of the axis by shape k
  * in  turn_k[3] rotation of the section that carries inertia
- * in  slope_k[2] v', w'
  * in  strain_k[4] s', psi', w'', v''
  * in  axis_l[3] displacement s, v, w of the axis by shape l
  * in  turn_l[3] rotation of the section that carries inertia
- * in  slope_l[2] v', w'
  * in  strain_l[4] s', psi', w'', v''
  * out C[3] int rho u_k dA
  * out E[3][3] int rho r0 u_k^T dA
  * out F[3][3] int rho u_k u_l^T dA
  * out K[1] strain energy's second derivative by eta_k, eta_l
- * out g[1] -u2' second derivative by eta_k, eta_l
  */
 int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inertia,
     const real *restrict stiffness, const real *restrict axis_k, const real *restrict turn_k,
-    const real *restrict slope_k, const real *restrict strain_k, const real *restrict axis_l,
-    const real *restrict turn_l, const real *restrict slope_l, const real *restrict strain_l,
-    real *restrict C, real *restrict E, real *restrict F, real *restrict K, real *restrict g)
+    const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
+    const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
+    real *restrict K)
 {
     const real t0 = inertia[0] * axis_k[0];
     C[0] = t0;
@@ -166,17 +165,13 @@ int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inerti
     const real t55 = t49 + t54;
     const real t56 = t47 + t55;
     K[0] = t56;
-    const real t57 = slope_k[0] * slope_l[0];
-    const real t58 = slope_k[1] * slope_l[1];
-    const real t59 = t57 + t58;
-    g[0] = t59;
     return 0;
 }
 
 static int mstmm_sweep_beam_moments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_beam_moments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2], out[3], out[4]);
+    return mstmm_sweep_beam_moments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
 }
 
 static const mstmm_port mstmm_sweep_beam_moments_inputs[] = {
@@ -185,11 +180,9 @@ static const mstmm_port mstmm_sweep_beam_moments_inputs[] = {
     {"stiffness", 4, "", 0, 0},
     {"axis_k", 3, "", 0, 0},
     {"turn_k", 3, "", 0, 0},
-    {"slope_k", 2, "", 0, 0},
     {"strain_k", 4, "", 0, 0},
     {"axis_l", 3, "", 0, 0},
     {"turn_l", 3, "", 0, 0},
-    {"slope_l", 2, "", 0, 0},
     {"strain_l", 4, "", 0, 0},
 };
 
@@ -198,6 +191,36 @@ static const mstmm_port mstmm_sweep_beam_moments_outputs[] = {
     {"E", 9, "", 0, 0},
     {"F", 9, "", 0, 0},
     {"K", 1, "", 0, 0},
+};
+
+/* rate of shortening by two shapes
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5
+ * in  slope_k[2] v', w'
+ * in  slope_l[2] v', w'
+ * out g[1] -u2', second derivative by eta_k, eta_l
+ */
+int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
+    real *restrict g)
+{
+    const real t0 = slope_k[0] * slope_l[0];
+    const real t1 = slope_k[1] * slope_l[1];
+    const real t2 = t0 + t1;
+    g[0] = t2;
+    return 0;
+}
+
+static int mstmm_sweep_beam_shortening_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_beam_shortening(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_beam_shortening_inputs[] = {
+    {"slope_k", 2, "", 0, 0},
+    {"slope_l", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_beam_shortening_outputs[] = {
     {"g", 1, "", 0, 0},
 };
 
@@ -254,11 +277,23 @@ static const mstmm_kernel mstmm_sweep_beam_kernels[] = {
         .name = "moments",
         .function = (void (*)(void))mstmm_sweep_beam_moments,
         .call = mstmm_sweep_beam_moments_call,
-        .n_inputs = 11,
-        .n_outputs = 5,
+        .n_inputs = 9,
+        .n_outputs = 4,
         .inputs = mstmm_sweep_beam_moments_inputs,
         .outputs = mstmm_sweep_beam_moments_outputs,
-        .ir_hash = "ad1a75103b27e2280509a9a09ab56576624d7aa212ec454ba0e21e326cd86098",
+        .ir_hash = "5684f014226475ad37f5ed06fa7fe3351e6fa0ddb737da0a695ead78639bba0a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "shortening",
+        .function = (void (*)(void))mstmm_sweep_beam_shortening,
+        .call = mstmm_sweep_beam_shortening_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_beam_shortening_inputs,
+        .outputs = mstmm_sweep_beam_shortening_outputs,
+        .ir_hash = "fd0a9c10149d6e2e32926045e71efd163e33387925f4b55541358aa1890f9e58",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -280,7 +315,7 @@ const mstmm_element mstmm_sweep_beam = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "beam",
-    .hash = "cf4c22064e0cd22b14c87f9f37f88485dda4f680a42a344110b85cec345ea629",
+    .hash = "e40a03e78875ed5c9e731060bd687f6458cf98be364fb0701dde87ef0bdc10a5",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -290,6 +325,6 @@ const mstmm_element mstmm_sweep_beam = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_beam_kernels,
 };

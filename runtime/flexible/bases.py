@@ -91,7 +91,7 @@ def _parts(data: BeamData, direction: str, base: float, count: int) -> list[Shap
         for start, end, mirrored in ((0.0, base, True), (base, length, False)):
             if end > start:
                 shapes += [
-                    Eigenfunction(CLAMPED_FREE, k, start, end, mirrored)
+                    Eigenfunction(CLAMPED_FREE, k, start, end, mirrored, end == length)
                     for k in range(1, count + 1)
                 ]
         return shapes
@@ -112,7 +112,10 @@ def _rod(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape
     shapes: list[Shape] = []
     for start, end, mirrored in ((0.0, base, True), (base, length, False)):
         if end > start:
-            shapes += [Sine("fixed-free", k, start, end, mirrored) for k in range(1, count + 1)]
+            shapes += [
+                Sine("fixed-free", k, start, end, mirrored, end == length)
+                for k in range(1, count + 1)
+            ]
     return shapes
 
 
@@ -143,4 +146,4 @@ def _span(
     """Shape k of a span held at its left end, its right end or both."""
     kinds = ("clamped-clamped", CLAMPED_FREE) if bends else ("fixed-fixed", "fixed-free")
     make = Eigenfunction if bends else Sine
-    return make(kinds[0 if left and right else 1], k, start, end, mirrored=not left)
+    return make(kinds[0 if left and right else 1], k, start, end, not left, not right)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,16 +44,30 @@ class ShapeValues:
     shortening: Array  #: (m, n, n) along x: u = phi eta - 1/2 eta^T shortening eta
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def gauss(points: int) -> tuple[Array, Array]:
     """Nodes and weights of the Gauss rule on 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     return (nodes + 1.0) / 2.0, weights / 2.0
 
 
-def points_for(length: float, density: float) -> int:
-    """Gauss points for products of two shapes with `density` half-waves per metre."""
-    return 8 + int(np.ceil(3.0 * length * density))
+def gauss_between(places: Iterable[float], density: float) -> tuple[Array, Array]:
+    """Gauss points and weights (m) between neighbouring places, for products of two shapes with
+    `density` half-waves per metre; long pieces are cut, for rules of high order lose digits."""
+    xs, ws = [], []
+    for a, b in pairwise(places):
+        cuts = max(1, int(np.ceil((b - a) * density / _WAVES)))
+        h = (b - a) / cuts
+        nodes, weights = gauss(8 + int(np.ceil(3.0 * h * density)))
+        xs.append((a + h * (np.arange(cuts)[:, None] + nodes)).ravel())
+        ws.append(np.tile(h * weights, cuts))
+    if not xs:
+        return np.zeros(0), np.zeros(0)
+    return np.concatenate(xs), np.concatenate(ws)
+
+
+#: Half-waves that one Gauss rule covers at most.
+_WAVES = 8.0
 
 
 class BeamShapes:
@@ -111,12 +126,7 @@ class BeamShapes:
     def rule(self) -> tuple[Array, Array]:
         """Places and weights (m) of a quadrature along the beam that integrates products of shapes
         to rounding."""
-        places, weights = [], []
-        for a, b in zip(self.pieces, self.pieces[1:], strict=False):
-            nodes, share = gauss(points_for(b - a, self.density))
-            places.append(a + (b - a) * nodes)
-            weights.append((b - a) * share)
-        return np.concatenate(places), np.concatenate(weights)
+        return gauss_between(self.pieces, self.density)
 
     def rows(self, x: Array, d: int) -> Array:
         """Derivative number d of s, v, w, psi per mode: (4, n, m)."""
@@ -169,11 +179,7 @@ class BeamShapes:
 
     def _slopes_between(self, ends: Array) -> list[tuple[Array, Array]]:
         """(rate (m, n, n), weights) of each interval between neighbouring ends."""
-        rules = [
-            (a + (b - a) * gauss(points_for(b - a, self.density))[0],
-             (b - a) * gauss(points_for(b - a, self.density))[1])
-            for a, b in itertools.pairwise(ends)
-        ]  # fmt: skip
+        rules = [gauss_between(pair, self.density) for pair in pairwise(ends)]
         if not rules:
             return []
         rates = self.shortening_rate(np.concatenate([places for places, _ in rules]))
@@ -184,8 +190,8 @@ class BeamShapes:
     def shortening_rate(self, x: Array) -> Array:
         """d shortening / dx by the kernel, (m, n, n)."""
         slopes = self.rows(x, 1)[1:3]
-        inputs = pair_inputs(self.n, len(x), slope=slopes)
-        return np.moveaxis(beam_kernels.evaluate("moments", inputs)["g"][0], 2, 0)
+        inputs = {"slope_k": slopes[:, :, None, :], "slope_l": slopes[:, None, :, :]}
+        return np.moveaxis(beam_kernels.evaluate("shortening", inputs)["g"][0], 2, 0)
 
     # --- ports -----------------------------------------------------------------------------------
 
@@ -199,12 +205,8 @@ class BeamShapes:
         """The mean of all sections between `start` and `end` (m): where a force that is the same
         per length on all of them acts."""
         inner = [x for x in self.pieces if start < x < end]
-        places, weights = [], []
-        for a, b in zip((start, *inner), (*inner, end), strict=True):
-            nodes, share = gauss(points_for(b - a, self.density))
-            places.append(a + (b - a) * nodes)
-            weights.append((b - a) * share / (end - start))
-        x, w = np.concatenate(places), np.concatenate(weights)
+        x, w = gauss_between((start, *inner, end), self.density)
+        w = w / (end - start)
         values = self.at(x)
         phi, theta, shortening = (
             np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, values.shortening)
@@ -238,15 +240,3 @@ class BeamShapes:
 def without_noise(values: Array, scale: Array, share: float = 1e-13) -> Array:
     """Entries below `share` of their scale as exact zeros."""
     return np.where(np.abs(values) <= share * scale, 0.0, values)
-
-
-def pair_inputs(n: int, m: int, **given: Array) -> dict[str, Array]:
-    """Inputs of the kernel of two shapes: `axis`, `turn`, `slope`, `strain`, each (rows, n, m), for
-    all pairs k, l at m points; what is not given is zero.  Section data and x: zero as well."""
-    sizes = {"axis": 3, "turn": 3, "slope": 2, "strain": 4}
-    inputs = {"x": np.zeros((1, 1)), "inertia": np.zeros((3, 1)), "stiffness": np.zeros((4, 1))}
-    for name, rows in sizes.items():
-        values = given.get(name, np.zeros((rows, n, m)))
-        inputs[f"{name}_k"] = values[:, :, None, :]
-        inputs[f"{name}_l"] = values[:, None, :, :]
-    return inputs

@@ -12,7 +12,6 @@ order.  A different origin is a motion of the frame along x that its own coordin
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy as np
 from mstmm.errors import SceneError
 
 from .beam_data import BeamData
-from .beam_shapes import Mode, gauss, points_for
+from .beam_shapes import Mode, gauss_between
 from .modal_body import Array
 from .shapes import Moved, Shape
 
@@ -109,12 +108,7 @@ def _rule(data: BeamData, direction: str, shapes: list[Shape]) -> tuple[Array, A
     places = np.unique([*data.breaks, *(b for shape in shapes for b in shape.breaks)])
     places = places[(places >= 0) & (places <= data.length)]
     density = max((shape.density for shape in shapes), default=0.0)
-    xs, ws = [], []
-    for a, b in itertools.pairwise(places):
-        nodes, share = gauss(points_for(b - a, density))
-        xs.append(a + (b - a) * nodes)
-        ws.append((b - a) * share)
-    x, w = np.concatenate(xs), np.concatenate(ws)
+    x, w = gauss_between(places, density)
     mass, yy, zz = data.inertia[:, data.piece(x)]
     if direction == "twist":
         polar = yy + zz

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import beam_kernels
-from .beam_shapes import BeamShapes, pair_inputs, without_noise
+from .beam_shapes import BeamShapes, without_noise
 from .modal_body import Array, Moments
 
 
@@ -37,13 +37,17 @@ def stiffness(shapes: BeamShapes) -> Array:
 
 
 def _inputs(shapes: BeamShapes, x: Array) -> dict[str, Array]:
+    """Inputs of the kernel of two shapes for all pairs k, l at all x; section data are zero."""
     values, slopes, bends = (shapes.rows(x, d) for d in range(3))
-    strain = np.stack([slopes[0], slopes[3], bends[2], bends[1]])
-    inputs = pair_inputs(
-        shapes.n, len(x), axis=values[:3], turn=shapes.carried(slopes, values[3]),
-        slope=slopes[1:3], strain=strain,
-    )  # fmt: skip
+    rows = {
+        "axis": values[:3],
+        "turn": shapes.carried(slopes, values[3]),
+        "strain": np.stack([slopes[0], slopes[3], bends[2], bends[1]]),
+    }
+    inputs = {"inertia": np.zeros((3, 1)), "stiffness": np.zeros((4, 1))}
     inputs["x"] = x[None, None, None, :]
+    for name, array in rows.items():
+        inputs[f"{name}_k"], inputs[f"{name}_l"] = array[:, :, None, :], array[:, None, :, :]
     return inputs
 
 

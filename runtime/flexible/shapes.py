@@ -20,6 +20,7 @@ from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .modal_body import Array
 
@@ -98,6 +99,7 @@ class Eigenfunction:
     start: float
     end: float
     mirrored: bool = False
+    closed: bool = True  #: its last section counts as inside
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -118,7 +120,7 @@ class Eigenfunction:
         span = self.end - self.start
         xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
         scale = (-1.0 if self.mirrored and d % 2 else 1.0) / span**d
-        inside = (x >= self.start) & (x <= self.end)
+        inside = _inside(x, self.start, self.end, self.closed)
         return np.where(inside, scale * self._unit(np.clip(xi, 0.0, 1.0), d), 0.0)
 
     def _unit(self, xi: Array, d: int) -> Array:
@@ -137,6 +139,10 @@ def _wave(angle: Array, d: int, cosine: float, sine: float) -> Array:
     return (cosine * c + sine * s) * np.cos(angle) + (sine * c - cosine * s) * np.sin(angle)
 
 
+def _inside(x: Array, start: float, end: float, closed: bool) -> NDArray[np.bool_]:
+    return (x >= start) & ((x <= end) if closed else (x < end))
+
+
 @dataclass(frozen=True)
 class Sine:
     """sqrt2 sin or sqrt2 cos of a rod in twist or in tension on start <= x <= end, zero outside.
@@ -150,6 +156,7 @@ class Sine:
     start: float
     end: float
     mirrored: bool = False
+    closed: bool = True  #: its last section counts as inside
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -169,7 +176,7 @@ class Sine:
         xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
         scale = (-1.0 if self.mirrored and d % 2 else 1.0) * _SQRT2 * (self.beta / span) ** d
         wave = (1.0, 0.0) if self.kind == "free-free" else (0.0, 1.0)
-        inside = (x >= self.start) & (x <= self.end)
+        inside = _inside(x, self.start, self.end, self.closed)
         return np.where(inside, scale * _wave(self.beta * np.clip(xi, 0.0, 1.0), d, *wave), 0.0)
 
 
