@@ -16,10 +16,10 @@ from .show_names import shown_name
 
 STAGES = ("equations", "matrix", "ir", "c")
 
-#: What the blocks of a transfer matrix stand for.
+#: What the blocks of a transfer matrix stand for, by the unit of a state's first block.
 STATES = {
-    (13, 13): "blocks: acceleration, angular acceleration, moment, force, 1",
-    (7, 7): "blocks: acceleration, angular acceleration, moment, force, 1",
+    "[m/s2": "blocks: acceleration, angular acceleration, moment, force, 1",
+    "[m": "blocks: position, angle, moment, force, modal coordinates where there are any, 1",
 }
 
 
@@ -136,7 +136,11 @@ def _equations(derivation: Derivation) -> list[Item]:
 def _matrices(derivation: Derivation) -> list[Item]:
     """The definitions that follow from the premises, large matrices block by block."""
     items: list[Item] = [Heading("Result", 3), _quantities(derivation.outputs)]
-    items += [_formula(e, True) for e in derivation.definitions]
+    states = {q.name: STATES.get(q.unit.split(",")[0], "") for q in derivation.outputs}
+    items += [
+        _formula(e, states.get(str(getattr(e.left, "name", "")), ""))
+        for e in derivation.definitions
+    ]
     return items + [Paragraph(note, "note") for note in derivation.notes]
 
 
@@ -196,10 +200,9 @@ def _c_source(view: ElementView) -> list[Item]:
     return [*items, Heading("C", 2), Code(view.c_text().rstrip("\n"))]
 
 
-def _formula(e: Equation, blocks: bool = False) -> Formula:
+def _formula(e: Equation, labels: str = "") -> Formula:
     zeros = ""
     if e.zeros:
         zeros = "entries " + ", ".join(f"({i + 1},{j + 1})" for i, j in e.zeros) + " vanish"
-    labels = STATES.get(tuple(getattr(e.right, "shape", ()))) if blocks else None
     remark = "; ".join(filter(None, (e.remark, zeros, labels)))
     return Formula(e.name, tuple(stated(e.left, e.right)), e.source, remark)

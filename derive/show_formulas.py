@@ -14,6 +14,7 @@ from .show_text import box
 #: Blocks of the matrices of the method: state vectors, wrenches and accelerations.
 PARTITIONS: dict[int, tuple[int, ...]] = {
     13: (3, 3, 3, 3, 1), 7: (2, 1, 1, 2, 1), 12: (3, 3, 3, 3), 9: (3, 3, 3), 6: (3, 3),
+    10: (2, 1, 1, 2, 3, 1), 15: (3, 3, 3, 3, 2, 1),
 }  # fmt: skip
 
 #: A block wider than this in text gets a name and is spelled out below the matrix.

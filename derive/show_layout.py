@@ -96,9 +96,13 @@ class Table:
 
 Node = Name | Word | Sign | Row | Fraction | Raised | Fence | Root | Table
 
-#: Arrays of coordinates, speeds, parameters and efforts: their entries are counted, not x y z.
+#: Arrays of coordinates, speeds, parameters, efforts, and numbers per mode: entries are counted.
 COORDINATE_ARRAYS = frozenset(
-    ("q", "qdot", "u", "udot", "p", "g", "s", "tau", "tau_n", "alpha", "effort")
+    (
+        *("q", "qdot", "u", "udot", "p", "g", "s", "tau", "tau_n", "alpha", "effort"),
+        *("eta", "etad", "etadd", "eta_I", "eta_O", "eta_p", "eta_N", "eta_pI", "eta_pO"),
+        *("S_c", "S_r", "e"),
+    )
 )
 
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)

@@ -36,7 +36,7 @@ def planar_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equati
     angular = Perp(c).T * a + inertia * wd
     if modes:
         eta, etad, etadd = _modal(modes)
-        shift, slope, spin = _shift(statement), *_rows(modes)
+        shift, slope, spin = sp.MatrixSymbol("S_t", 2, modes), *_rows(modes)
         linear = linear + shift * etadd + 2 * rate * Perp(shift * etad)
         angular = angular + spin * etadd + rate * (slope * etad)
     at = _planar_end(statement)
@@ -46,7 +46,7 @@ def planar_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equati
         Equation("frame axes", axes, Matrix([[cosine, -sine], [sine, cosine]])),
         Equation("acceleration less gravity, frame axes", a,
                  axes.T * (vector("rdd", 2) - vector("g", 2))),
-        *_moments(body, modes),
+        *_moments(body, modes), *_beam_shapes(statement),
         Equation(
             "balance of forces", axes * linear, q_i - q_o + vector("f_r", 2),
             _number(statement, 0),
@@ -64,16 +64,14 @@ def planar_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equati
         )  # fmt: skip
         if statement.kind == "elastic":
             inertial = inertial - 2 * rate * (_skew("G_f", modes) * etad)
-        loads = (
-            vector("f_eta", modes) + ends[0].T * m_i
-            - _planar_shapes(statement).T * axes.T * q_o - ends[1].T * m_o
-        )  # fmt: skip
-        premises.append(
-            Equation(
-                "balance of the modes", inertial + _elastic(modes), loads, _number(statement, 2)
-            )
-        )
-        premises.append(Equation("one set of modal coordinates", vector("eta_O", modes), eta))
+        shapes = sp.MatrixSymbol("Phi_O", 2, modes)
+        loads = ends[0].T * m_i - shapes.T * (axes.T * q_o) - ends[1].T * m_o
+        premises += [
+            Equation("inertia of the modes", vector("i_f", modes), inertial),
+            Equation("loads on the modes", vector("l_f", modes), loads + vector("f_eta", modes)),
+            _balance_of_modes(statement),
+            Equation("one set of modal coordinates", vector("eta_O", modes), eta),
+        ]
     premises += [
         Equation("output end", r_o, r_i + axes * at, "", "position of the section"),
         Equation("one floating frame", vector("theta_O", 1), theta),
@@ -102,11 +100,11 @@ def spatial_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equat
         Equation("angular acceleration", wd, A * turned + vector("B_w", 3)),
         Equation("acceleration less gravity, frame axes", a,
                  axes.T * (vector("rdd", 3) - vector("g", 3))),
-        *_moments(body, modes),
+        *_moments(body, modes), *_spatial_shapes(statement),
     ]  # fmt: skip
     if modes:
         eta, etad, etadd = _modal(modes)
-        shift, spin = _spatial_shift(statement), sp.MatrixSymbol("G", 3, modes)
+        shift, spin = sp.MatrixSymbol("S_t", 3, modes), sp.MatrixSymbol("G", 3, modes)
         slope, rate = sp.MatrixSymbol("J_e", 6, modes), sp.MatrixSymbol("Jd", 3, 3)
         linear = linear + shift * etadd + 2 * (Tilde(w) * (shift * etad))
         angular = angular + spin * etadd + rate * w + Tilde(w) * (spin * etad)
@@ -123,8 +121,10 @@ def spatial_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equat
     ]  # fmt: skip
     arm: sp.Basic = vector("r_e", 3)
     if modes:
-        premises.append(_spatial_modes(statement))
-        premises.append(Equation("one set of modal coordinates", vector("eta_O", modes), eta))
+        premises += [
+            *_spatial_modes(statement), _balance_of_modes(statement),
+            Equation("one set of modal coordinates", vector("eta_O", modes), eta),
+        ]  # fmt: skip
         arm = arm + sp.MatrixSymbol("Phi_O", 3, modes) * eta
     premises += [
         Equation("output end", r_o, r_i + axes * arm, "", "position of the section; r_e at rest"),
@@ -133,28 +133,35 @@ def spatial_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equat
     return tuple(premises)
 
 
-def _spatial_modes(statement: BodyStatement) -> Equation:
+def _spatial_modes(statement: BodyStatement) -> tuple[Equation, ...]:
     modes = statement.modes
     axes, a, w, wd = sp.MatrixSymbol("R", 3, 3), *(vector(name, 3) for name in ("a", "w", "wd"))
     eta, _, etadd = _modal(modes)
     x, y, z = (w[i, 0] for i in range(3))
-    squares = Matrix([[x**2, 2 * x * y, 2 * x * z, y**2, 2 * y * z, z**2]])
+    squares = vector("w_2", 6)
+    products = Matrix([x**2, 2 * x * y, 2 * x * z, y**2, 2 * y * z, z**2])
     spin, spin_rate = sp.MatrixSymbol("G", 3, modes), sp.MatrixSymbol("Gd", 3, modes)
-    slope = sp.MatrixSymbol("J_e", 6, modes)
+    slope, shift = sp.MatrixSymbol("J_e", 6, modes), sp.MatrixSymbol("S_t", 3, modes)
+    mass = sp.MatrixSymbol("M_f", modes, modes)
     inertial = (
-        _spatial_shift(statement).T * a + spin.T * wd + _modal_mass(statement) * etadd
-        + 2 * (spin_rate.T * w) - HALF * (slope.T * squares.T)
-    )  # fmt: skip
+        shift.T * a
+        + spin.T * wd
+        + mass * etadd
+        + 2 * (spin_rate.T * w)
+        - HALF * (slope.T * squares)
+    )
     shapes, outer, inner = (
         sp.MatrixSymbol(name, 3, modes) for name in ("Phi_O", "Theta_O", "Theta_I")
     )
     loads = (
-        vector("f_eta", modes) + inner.T * axes.T * vector("m_I", 3)
-        - shapes.T * axes.T * vector("q_O", 3) - outer.T * axes.T * vector("m_O", 3)
+        vector("f_eta", modes) + inner.T * (axes.T * vector("m_I", 3))
+        - shapes.T * (axes.T * vector("q_O", 3)) - outer.T * (axes.T * vector("m_O", 3))
         - sp.MatrixSymbol("K_g", modes, modes) * (eta - vector(ETA, modes))
     )  # fmt: skip
-    return Equation(
-        "balance of the modes", inertial + _elastic(modes), loads, _number(statement, 2)
+    return (
+        Equation("products of the angular velocity", squares, products),
+        Equation("inertia of the modes", vector("i_f", modes), inertial),
+        Equation("loads on the modes", vector("l_f", modes), loads),
     )
 
 
@@ -180,10 +187,13 @@ def _rows(modes: int) -> tuple[sp.MatrixSymbol, sp.MatrixSymbol]:
     return sp.MatrixSymbol("J_e", 1, modes), sp.MatrixSymbol("G", 1, modes)
 
 
-def _elastic(modes: int) -> sp.MatrixExpr:
+def _balance_of_modes(statement: BodyStatement) -> Equation:
+    modes = statement.modes
     eta, etad, _ = _modal(modes)
     stiffness, damping = (sp.MatrixSymbol(name, modes, modes) for name in ("K_f", "D_f"))
-    return stiffness * eta + damping * etad
+    inertial, loads = vector("i_f", modes), vector("l_f", modes)
+    balance = inertial + stiffness * eta + damping * etad
+    return Equation("balance of the modes", balance, loads, _number(statement, 2))
 
 
 def _time_map(name: str, size: int, angle: bool = False) -> tuple[Equation, ...]:
@@ -217,33 +227,35 @@ def _rates(
     body: BodyMoments, modes: int, slope: sp.MatrixSymbol, etad: sp.MatrixSymbol
 ) -> tuple[Equation, ...]:
     """Rates of J and G."""
-    change = [sum(slope[i, k] * etad[k, 0] for k in range(modes)) for i in range(6)]
-    xx, xy, xz, yy, yz, zz = change
+    change = vector("j_d", 6)
+    xx, xy, xz, yy, yz, zz = change.as_explicit()
     rate = Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     at_rest = dict.fromkeys(vector(ETA, modes).as_explicit(), sp.Integer(0))
     spin = next(e.right for e in body.definitions if str(e.left.name) == "G")
     varying = spin - spin.xreplace(at_rest)
     rates = dict(zip(at_rest, etad.as_explicit(), strict=True))
     return (
+        Equation("rate of J", change, slope * etad, "", "xx xy xz yy yz zz"),
         Equation("rate of J", sp.MatrixSymbol("Jd", 3, 3), rate),
         Equation("rate of G", sp.MatrixSymbol("Gd", 3, modes), Matrix(varying.xreplace(rates))),
     )  # fmt: skip
 
 
-def _shift(statement: BodyStatement) -> sp.Basic:
-    """int rho phi (2 x n)."""
+def _beam_shapes(statement: BodyStatement) -> tuple[Equation, ...]:
+    """What a planar beam's deflections are as plane vectors."""
+    if statement.kind != "beam":
+        return ()
     modes = statement.modes
-    if statement.kind == "beam":
-        s = vector("s", modes)
-        return Matrix(2, modes, lambda i, k: s[k, 0] if i else sp.Integer(0))
-    return sp.MatrixSymbol("S_t", 2, modes)
+    s, deflection = vector("s", modes), sp.MatrixSymbol("phi_O", 1, modes)
+    at_end = sp.MatrixSymbol("Phi_O", 2, modes)
+    return (
+        Equation("int rho phi", sp.MatrixSymbol("S_t", 2, modes), _across(s.T, modes)),
+        Equation("shapes, output end", at_end, _across(deflection, modes)),
+    )
 
 
-def _planar_shapes(statement: BodyStatement) -> sp.Basic:
-    if statement.kind == "beam":
-        deflection = sp.MatrixSymbol("phi_O", 1, statement.modes)
-        return Matrix(2, statement.modes, lambda i, k: deflection[0, k] if i else sp.Integer(0))
-    return sp.MatrixSymbol("Phi_O", 2, statement.modes)
+def _across(row: sp.MatrixExpr, modes: int) -> Matrix:
+    return Matrix(2, modes, lambda i, k: row[0, k] if i else sp.Integer(0))
 
 
 def _planar_end(statement: BodyStatement) -> sp.Basic:
@@ -253,7 +265,7 @@ def _planar_end(statement: BodyStatement) -> sp.Basic:
         rest = vector("r_e", 2)
     if not statement.modes:
         return rest
-    return rest + _planar_shapes(statement) * vector("eta_I", statement.modes)
+    return rest + sp.MatrixSymbol("Phi_O", 2, statement.modes) * vector("eta_I", statement.modes)
 
 
 def _skew(name: str, size: int) -> Matrix:
@@ -265,13 +277,17 @@ def _skew(name: str, size: int) -> Matrix:
     )  # fmt: skip
 
 
-def _spatial_shift(statement: BodyStatement) -> sp.Basic:
+def _spatial_shapes(statement: BodyStatement) -> tuple[Equation, ...]:
+    """First moments of a beam's shapes, and the modal masses."""
     modes = statement.modes
+    if not modes:
+        return ()
+    masses = Equation("modal masses", sp.MatrixSymbol("M_f", modes, modes), _modal_mass(statement))
     if statement.kind != "beam":
-        return sp.MatrixSymbol("S_t", 3, modes)
-    s = vector("s", modes)
-    along = ["xyz".index(plane) for plane in statement.planes]
-    return Matrix(3, modes, lambda i, k: s[k, 0] if i == along[k] else sp.Integer(0))
+        return (masses,)
+    s, along = vector("s", modes), ["xyz".index(plane) for plane in statement.planes]
+    shift = Matrix(3, modes, lambda i, k: s[k, 0] * int(i == along[k]))
+    return (Equation("int rho phi", sp.MatrixSymbol("S_t", 3, modes), shift), masses)
 
 
 def _modal_mass(statement: BodyStatement) -> sp.Basic:
