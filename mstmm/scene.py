@@ -95,8 +95,8 @@ class Scene(Table):
 
     @property
     def skeleton(self) -> Scene:
-        """The same scene with every beam and elastic body as a rigid body with the same ends,
-        behind `body`: what names and the tree are checked on."""
+        """The same scene with every beam and elastic body as a body with the same ends (and no
+        mass), behind `body`: what names and the tree are checked on."""
         return self._skeleton if self.beam or self.elastic else self
 
     @cached_property

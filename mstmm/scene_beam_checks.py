@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import scene_rules as rules
 from .scene_errors import near
@@ -21,12 +21,16 @@ DIRECTIONS = ("y", "z", "twist", "axial")
 #: Most shapes in one direction.  More have half-waves so short that neither Euler's hypothesis nor
 #: the integrals of their products in double precision tell them apart.
 MAX_SHAPES = 60
-SHAPES = rules.whole(0, 10**6)
+SHAPES = rules.Rule(
+    "a whole number, 0 or more", lambda value: _count(value), {"type": "integer", "minimum": 0}
+)
 
 #: Pieces join, and ends lie on the beam, to this share of its length.
 _ROUNDING = 1e-9
 #: Polar inertia against the sum of both rotary inertias.
 _AGREES = 1e-3
+#: Smallest mass, moment and stiffness of a beam, and the inverse of the largest.
+_TINY = 1e-100
 
 #: Key of the section -> what it is, with its unit.
 _MEANING = {
@@ -39,6 +43,13 @@ _MEANING = {
 }
 
 
+def _count(value: Any) -> int:
+    value = rules.plain(value)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise rules.refuse(f"expected {SHAPES.expected}, found {found(value)}")
+    return value
+
+
 def problems(beam: Beam) -> Iterator[Problem]:
     """Everything in which the keys of a beam do not fit each other."""
     pieces = list(_pieces(beam))
@@ -47,6 +58,7 @@ def problems(beam: Beam) -> Iterator[Problem]:
     if not pieces:
         yield from _data(beam)
         yield from _polar(beam)
+        yield from _sizes(beam)
     yield from _shapes(beam)
     yield from _ends(beam)
     yield from _lists(beam)
@@ -165,6 +177,22 @@ def _polar(beam: Beam) -> Iterator[Problem]:
             f"plane section has it, found {polar:g}; leave it out",
         )
         return
+
+
+def _sizes(beam: Beam) -> Iterator[Problem]:
+    """Can the moments and stiffnesses of the beam be written as numbers at all?"""
+    if any(piece.mass_per_length is None for piece in beam.sections):
+        return
+    square, cube = beam.length * beam.length, beam.length * beam.length * beam.length
+    sizes = [cube, beam.mass, beam.mass * square]
+    for piece in beam.sections:
+        sizes += [stiffness / (cube or 1) for stiffness in piece.bending_stiffness or ()]
+    if not all(_TINY < size < 1 / _TINY for size in sizes):
+        yield (
+            ("length",),
+            f"a beam of {beam.length:g} m and {beam.mass:g} kg has mass and stiffness beyond what "
+            "numbers hold; check the units (m, kg/m, N m^2)",
+        )
 
 
 def _shapes(beam: Beam) -> Iterator[Problem]:

@@ -99,12 +99,23 @@ _OF_CHAINS = {
 }
 
 
+#: What else the keys of beams are called.
+_SYMBOLS = {
+    "EI": "bending_stiffness", "EA": "axial_stiffness", "GJ": "torsional_stiffness",
+    "GIt": "torsional_stiffness", "rhoA": "mass_per_length", "mu": "mass_per_length",
+    "rhoI": "rotary_inertia", "mass": "mass_per_length", "L": "length", "E": "young",
+    "nu": "poisson", "rho": "density",
+}  # fmt: skip
+
+
 def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
     if len(place) == 5 and place[0] == "chain" and key in _OF_CHAINS:
         return _OF_CHAINS[key]
     if key in RESERVED:
         return f"{RESERVED[key]} come in a later release; leave {key} out for now"
     keys = [f.alias or name for name, f in model.model_fields.items()]
+    if _SYMBOLS.get(key) in keys:
+        return f'unknown key; did you mean "{_SYMBOLS[key]}"?'
     return f"unknown key{near(key, keys)}"
 
 
@@ -119,7 +130,8 @@ def _expected(model: type[BaseModel], place: Location) -> str:
             if isinstance(mark, (Rule, Shorthand)):
                 return mark.expected
         if "tuple" in str(info.annotation):
-            return f"a list of tables; write [[{key}]]"
+            names = ".".join(part for part in place if isinstance(part, str))
+            return f"a list of tables; write [[{names}]]"
     return "a table"
 
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def skeleton(scene: Scene) -> Scene:
-    """The scene with its beams, then its elastic bodies, as rigid bodies behind `body`."""
-    bodies = (*scene.body, *map(rigid_beam, scene.beam), *map(_rigid_elastic, scene.elastic))
+    """The scene with its beams, then its elastic bodies, as bodies without mass behind `body`."""
+    bodies = (*scene.body, *map(_bare, scene.beam), *map(_bare, scene.elastic))
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}
     return type(scene).model_construct(**{**fields, "body": bodies, "beam": (), "elastic": ()})
 
@@ -30,29 +30,29 @@ def rigid_beam(beam: Beam) -> Body:
     for s in beam.sections:
         line, long = s.mass_per_length or 0.0, s.to - s.from_
         mass += line * long
-        first += line * (s.to**2 - s.from_**2) / 2
-        second += line * (s.to**3 - s.from_**3) / 3
+        first += line * long * (s.to + s.from_) / 2
+        second += line * long * (s.to * s.to + s.to * s.from_ + s.from_ * s.from_) / 3
         spin = (s.polar_inertia_per_length or 0.0) * long
         polar += spin
         own = s.rotary_inertia
         about[0] += spin / 2 if own is None else own[0] * long
         about[1] += spin / 2 if own is None else own[1] * long
     middle = first / mass
-    across = second - mass * middle**2
+    across = second - first * middle
     return Body.model_construct(
         name=beam.name, type="rigid", mass=mass, center_of_mass=(middle, 0.0, 0.0),
         inertia=(polar, across + about[0], across + about[1], 0.0, 0.0, 0.0), ends=beam.ends,
     )  # fmt: skip
 
 
-def _rigid_elastic(elastic: Elastic) -> Body:
-    """A body with the ends alone: its numbers are in files that a scene does not open."""
+def _bare(flexible: Beam | Elastic) -> Body:
+    """A body with the ends alone: names and the tree ask for no more."""
     ends = {
         name: End.model_construct(position=end.position or (0.0, 0.0, 0.0),
                                   orientation=end.orientation)
-        for name, end in elastic.ends.items()
+        for name, end in flexible.ends.items()
     }  # fmt: skip
-    return Body.model_construct(name=elastic.name, type="rigid", ends=ends)
+    return Body.model_construct(name=flexible.name, type="rigid", ends=ends)
 
 
 #: The keys that refer to a body or an end of one.

@@ -15,6 +15,7 @@ from mstmm.errors import SceneError
 from mstmm.expression import parse
 from mstmm.scene import Scene, load_scene
 from mstmm.scene_shapes import ShapeFunction, shape_at
+from mstmm.scene_skeleton import rigid_beam
 from scene.scenes import Data, bladed, hinge
 
 WHOLE = """
@@ -173,7 +174,7 @@ def test_the_rigid_beam_has_the_mass_and_inertia_of_its_pieces() -> None:
         {"from": 3, "to": 10, "mass_per_length": 0.5, "rotary_inertia": [0.2, 0.1]},
     ]
     scene = Scene(**bladed(section=pieces, mass_per_length=...))
-    body = scene.skeleton.body[0]
+    body = rigid_beam(scene.beam[0])
     n = 20_000
     slices = [(10 * (k + 0.5) / n, 10 / n) for k in range(n)]
     line = [(x, (2.0 if x < 3 else 0.5) * dx) for x, dx in slices]
