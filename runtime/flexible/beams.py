@@ -2,31 +2,63 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.errors import SceneError
+from mstmm.scene_parts import Load
 
 from .bases import shapes_of
 from .beam_data import BeamData, beam_data
 from .beam_shapes import DIRECTIONS, BeamShapes, Mode
-from .choices import BENDING, Choice, choices, wants_quadrature
+from .choices import Choice, choices, wants_quadrature
 from .frames import in_frame
-from .holding import holding
-from .modal_body import Array, MassPoint, ModalBody, ModalPort
+from .holding import Holding, Surroundings, holding
+from .modal_body import Array, MassPoint, ModalBody
 from .moments import drag_moments, mass_moments, stiffness
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
     from mstmm.scene_beam import Beam
-    from mstmm.scene_parts import Load
+
+
+class BeamBodies:
+    """Beams of one scene; equal ones that are held alike are worked out once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._around = Surroundings(scene)
+        self._known: dict[str, ModalBody] = {}
+
+    def body(self, beam: Beam) -> ModalBody:
+        """The numbers of one beam.  SceneError for shapes that cannot be told apart."""
+        data = beam_data(beam)
+        held = holding(self._around, beam, data)
+        key = repr((beam.model_copy(update={"name": ""}), held))
+        if key not in self._known:
+            self._known[key] = _made(beam, data, held)
+        core = self._known[key]
+        assert core.shapes is not None
+        spans = {
+            load.name: core.shapes.mean_section(*_span(load, data.length))
+            for _, load in self._around.acts.get(beam.name, ())
+            if isinstance(load, Load) and load.force_per_length is not None
+        }
+        return replace(core, name=beam.name, ports={**core.ports, **spans})
 
 
 def beam_body(scene: Scene, beam: Beam) -> ModalBody:
-    """The numbers of one beam.  SceneError for shapes that cannot be told apart."""
-    data = beam_data(beam)
-    held = holding(scene, beam, data)
+    """The numbers of one beam of a scene.  SceneError for shapes that cannot be told apart."""
+    return BeamBodies(scene).body(beam)
+
+
+def _span(load: Load, length: float) -> tuple[float, float]:
+    start, end = load.span or (0.0, length)
+    return start, min(end, length)
+
+
+def _made(beam: Beam, data: BeamData, held: Holding) -> ModalBody:
     chosen = choices(beam, data, held)
     modes: list[Mode] = []
     notes: list[str] = []
@@ -57,7 +89,7 @@ def beam_body(scene: Scene, beam: Beam) -> ModalBody:
         modes=names,
         K=k,
         D=damping(mass, k, beam.damping.ratio, beam.damping.stiffness, _blocks(modes), beam.name),
-        ports=_ports(shapes_all, data, [x for x in scene.load if x.on == beam.name]),
+        ports={name: shapes_all.section(x, turn) for name, (x, turn) in data.ends.items()},
         points=points,
         drag=drag_moments(shapes_all),
         eta=eta,
@@ -76,17 +108,7 @@ def _described(choice: Choice, count: int) -> str:
     return f"{choice.direction}: {shapes}, frame {frame.kind}{where}{why}"
 
 
-# --- ports ----------------------------------------------------------------------------------------
-
-
-def _ports(shapes: BeamShapes, data: BeamData, loads: list[Load]) -> dict[str, ModalPort]:
-    """Every end, and the mean section of every load per length under the load's name."""
-    ports = {name: shapes.section(x, turn) for name, (x, turn) in data.ends.items()}
-    for load in loads:
-        if load.force_per_length is not None:
-            start, end = load.span or (0.0, data.length)
-            ports[load.name] = shapes.mean_section(start, min(end, data.length))
-    return ports
+# --- quadrature -----------------------------------------------------------------------------------
 
 
 def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
@@ -157,6 +179,3 @@ def _start(beam: Beam, names: tuple[str, ...]) -> tuple[Array, Array]:
             )
         values.append(np.zeros(len(names)) if given is None else np.asarray(given, dtype=float))
     return values[0], values[1]
-
-
-__all__ = ["BENDING", "beam_body", "damping", "mass_points"]

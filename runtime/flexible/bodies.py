@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .beams import beam_body
+from .beams import BeamBodies
 from .modal_body import ModalBody
 
 if TYPE_CHECKING:
@@ -17,7 +17,8 @@ def modal_bodies(scene: Scene) -> dict[str, ModalBody]:
 
     Raises SceneError for a body whose shapes, matrices or ports do not fit.
     """
-    found = {b.name: beam_body(scene, b) for b in scene.beam if b.model != "rigid"}
+    beams = BeamBodies(scene)
+    found = {b.name: beams.body(b) for b in scene.beam if b.model != "rigid"}
     if scene.elastic:
         from .elastic import elastic_bodies
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.scene_flexible_checks import free_axes
-from mstmm.scene_rules import GROUND, split
+from mstmm.scene_parts import Load, Spring
+from mstmm.scene_rules import split
 
 from .beam_data import BeamData
 from .modal_body import Array
 from .static_shapes import stiffness_of
 
 if TYPE_CHECKING:
-    from mstmm.scene import Scene
+    from mstmm.scene import Chain, Scene
     from mstmm.scene_beam import Beam
     from mstmm.scene_parts import Hinge
 
@@ -53,13 +54,56 @@ class Holding:
     sprung: frozenset[str] = frozenset()
     ends: tuple[End, ...] = ()
     said: str = ""  #: the hinge in words
-    other_sections: Mapping[str, float] = field(default_factory=dict)
 
 
-def holding(scene: Scene, beam: Beam, data: BeamData) -> Holding:
+class Surroundings:
+    """What acts on which body of a scene, found once for all its beams."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.holds = {hinge.outboard_body: hinge for hinge in scene.hinge}
+        self.carries: dict[str, list[Hinge]] = {}
+        for hinge in scene.hinge:
+            self.carries.setdefault(hinge.inboard_body, []).append(hinge)
+        self.acts: dict[str, list[tuple[str, Chain | Spring | Load]]] = {}
+        acting: list[Chain | Spring | Load] = [*scene.chain, *scene.spring, *scene.load]
+        for element in acting:
+            for reference in _references(element):
+                name, end = split(reference)
+                self.acts.setdefault(name, []).append((end or "root", element))
+        self._masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
+        self._masses |= {b.name: b.mass for b in scene.beam}
+        for chain in scene.chain:
+            name = split(chain.inboard)[0]
+            self._masses[name] = np.inf
+        self._beyond: dict[str, float] = {}
+
+    def mass_beyond(self, body: str) -> float:
+        """Mass of a body and of all that hangs on it; infinite where that is not known."""
+        waiting = [body]
+        while waiting:
+            name = waiting[-1]
+            children = [hinge.outboard_body for hinge in self.carries.get(name, ())]
+            missing = [child for child in children if child not in self._beyond]
+            if missing:
+                waiting += missing
+                continue
+            waiting.pop()
+            own = self._masses.get(name, np.inf)
+            self._beyond[name] = own + sum(self._beyond[child] for child in children)
+        return self._beyond[body]
+
+
+def _references(element: Chain | Spring | Load) -> tuple[str, ...]:
+    """The bodies and ends that an element acts on."""
+    if isinstance(element, Load):
+        return (element.on,)
+    return (element.from_, element.to) if isinstance(element, Spring) else (element.inboard,)
+
+
+def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
     """Read from the hinges, springs and loads of the scene; a beam without hinge floats."""
-    ends = tuple(_ends(scene, beam, data))
-    hinge = next((h for h in scene.hinge if h.outboard_body == beam.name), None)
+    ends = tuple(sorted(set(_ends(around, beam, data)), key=lambda end: end.x))
+    hinge = around.holds.get(beam.name)
     if hinge is None:
         return Holding("root", 0.0, frozenset(AXES), True, ends=ends, said="no hinge")
     at = hinge.outboard_end or "root"
@@ -74,7 +118,7 @@ def holding(scene: Scene, beam: Beam, data: BeamData) -> Holding:
         heavy_rotor=free if rotors else frozenset(),
         sprung=free if stiff else frozenset(),
         ends=ends,
-        said=f'{hinge.type} hinge "{hinge.name}"',
+        said=f"the {hinge.type} hinge",
     )
 
 
@@ -102,55 +146,33 @@ def _resisted(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
 # --- what acts at the other sections --------------------------------------------------------------
 
 
-def _ends(scene: Scene, beam: Beam, data: BeamData) -> Iterator[End]:
-    for hinge in scene.hinge:
-        name, end = split(hinge.inboard)
-        if name == beam.name:
-            x, turn = data.ends[end or "root"]
-            back = np.array(hinge.rotation)
-            free = _directions(turn @ back, free_axes(hinge))
-            if any(hinge.law.stiffness) or any(hinge.law.inertia) or _acts(hinge):
-                free = frozenset()
-            carried = frozenset(AXES) - free
-            yield End(x, carried, _mass_beyond(scene, hinge.outboard_body) > HEAVY * data.mass)
-    for chain in scene.chain:
-        name, end = split(chain.inboard)
-        if name == beam.name:
-            yield End(data.ends[end or "root"][0], frozenset(AXES), True)
+def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
+    for hinge in around.carries.get(beam.name, ()):
+        x, turn = data.ends[hinge.inboard_end or "root"]
+        free = _directions(turn @ np.array(hinge.rotation), free_axes(hinge))
+        if any(hinge.law.stiffness) or any(hinge.law.inertia) or _acts(hinge):
+            free = frozenset()
+        heavy = around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
+        yield End(x, frozenset(AXES) - free, heavy)
+    for end, element in around.acts.get(beam.name, ()):
+        x = data.ends[end][0]
+        if isinstance(element, Load):
+            if element.force_per_length is None:
+                turning = any(not m.is_zero for m in element.moment)
+                yield End(x, frozenset(AXES if turning else ()))
+        elif isinstance(element, Spring):
+            yield End(x, frozenset(), _is_stiff(element, data))
+        else:
+            yield End(x, frozenset(AXES), True)
+
+
+def _is_stiff(spring: Spring, data: BeamData) -> bool:
+    """Stiff beside the beam as a cantilever, or of a user's type."""
     own = 3 * min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()) / data.length**3
-    for spring in scene.spring:
-        for reference in (spring.from_, spring.to):
-            name, end = split(reference)
-            if name == beam.name:
-                heavy = spring.type != "spring" or spring.law.stiffness > HEAVY * own
-                yield End(data.ends[end or "root"][0], frozenset(), heavy)
-    for load in scene.load:
-        name, end = split(load.on)
-        if name == beam.name and load.force_per_length is None:
-            turning = any(not m.is_zero for m in load.moment)
-            yield End(data.ends[end or "root"][0], frozenset(AXES if turning else ()), False)
+    return spring.type != "spring" or spring.law.stiffness > HEAVY * own
 
 
 def _acts(hinge: Hinge) -> bool:
     """A drive or an effort: a moment whatever the beam does."""
     driven = hinge.drive is not None and any(d is not None for d in hinge.drive)
     return driven or any(not e.is_zero for e in hinge.law.effort)
-
-
-def _mass_beyond(scene: Scene, body: str) -> float:
-    """Mass of a body and of all that hangs on it; infinite where a user's type hides it."""
-    children: dict[str, list[str]] = {}
-    for hinge in scene.hinge:
-        children.setdefault(hinge.inboard_body, []).append(hinge.outboard_body)
-    masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
-    masses |= {b.name: b.mass for b in scene.beam}
-    carries_chain = {split(chain.inboard)[0] for chain in scene.chain}
-    total, waiting, seen = 0.0, [body], {GROUND}
-    while waiting:
-        name = waiting.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        total += np.inf if name in carries_chain else masses.get(name, np.inf)
-        waiting += children.get(name, [])
-    return total

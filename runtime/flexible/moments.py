@@ -52,7 +52,6 @@ def _inputs(shapes: BeamShapes, x: Array) -> dict[str, Array]:
 
 
 def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
-    n = shapes.n
     rigid = beam_kernels.evaluate("rigid", {"x": x[None, :], "inertia": density})
     mass = float(rigid["mass"][0] @ w)
     first = rigid["first"] @ w
@@ -60,9 +59,9 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     inputs = _inputs(shapes, x)
     inputs["inertia"] = density[:, None, None, :]
     found = beam_kernels.evaluate("moments", inputs)
-    c = np.broadcast_to(found["C"], (3, n, 1, len(x)))[:, :, 0] @ w
-    e = np.broadcast_to(found["E"], (3, 3, n, 1, len(x)))[:, :, :, 0] @ w
-    f = np.broadcast_to(found["F"], (3, 3, n, n, len(x))) @ w
+    c = found["C"][:, :, 0] @ w
+    e = found["E"][:, :, :, 0] @ w
+    f = found["F"] @ w
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
     g, moment = _second_order(shapes, rigid["mass"][0] * w, rigid["first"][0] * w, x)

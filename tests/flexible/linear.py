@@ -100,8 +100,8 @@ def joined(
     0 to 5 (translations, rotations) that it leaves."""
     keep = [i for i in range(6) if i not in free]
     (i, a, ra), (j, b, rb) = first, second
-    turn = lambda r: np.kron(np.eye(2), r)  # noqa: E731
-    return [{i: (turn(ra) @ port_rows(a))[keep], j: -(turn(rb) @ port_rows(b))[keep]}]
+    ga, gb = (np.kron(np.eye(2), r) @ port_rows(p) for r, p in ((ra, a), (rb, b)))
+    return [{i: ga[keep], j: -gb[keep]}]
 
 
 def held(body: tuple[int, ModalPort, Array], free: Any = ()) -> list[dict[int, Array]]:
