@@ -256,7 +256,8 @@ class Run:
             return Samples(
                 np.zeros(0), np.zeros((0, n)), np.zeros((0, nm)), np.zeros(0, dtype=np.int64)
             )
-        self._samples = [Samples.joined(self._samples)]
+        if len(self._samples) > 1:
+            self._samples = [Samples.joined(self._samples)]
         return self._samples[0]
 
     def take(self) -> Samples:

@@ -256,7 +256,9 @@ def simulate(
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
     run, step = first_run(model, settings, q, u, watch, resume)
     error = second_run(model, run, q, u, watch) if certify and run.success else None
-    return Result(model, replace(run, notes=(*run.notes, *watch.notes)), error, step)
+    if watch.notes:
+        run = replace(run, notes=(*run.notes, *watch.notes))
+    return Result(model, run, error, step)
 
 
 def load_result(path: str | Path) -> Result:

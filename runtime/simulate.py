@@ -214,9 +214,8 @@ def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
     engine, found = system.engine, np.full(len(start), settings.atol)
     if system.with_power:
         q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
-        seen = engine.observe(
-            np.array([settings.t_start]), q[None].copy(), u[None].copy(), system.memory[None].copy()
-        )
+        at = np.array([settings.t_start])
+        seen = engine.observe(at, q[None], u[None], system.memory[None], parts=("sums",))
         energy = float(np.abs(seen.sums[0, :3]).sum()) or 1.0
         found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
     return found
@@ -296,14 +295,14 @@ def split(
 ) -> Trajectory:
     """Trajectory of samples; with output times only those, not the events between."""
     if settings.output_times is not None:
-        wanted = np.isin(samples.t, np.asarray(settings.output_times)) & (samples.event >= 0)
+        wanted = _among(samples.t, np.asarray(settings.output_times)) & (samples.event >= 0)
         behind = np.append(samples.t[1:] != samples.t[:-1], True)  # an event at such a time
         keep = wanted & behind[: len(wanted)]
         samples = Samples(
             samples.t[keep], samples.y[keep], samples.memory[keep], samples.event[keep]
         )
     nq, nu = system.engine.nq, system.engine.nu
-    y, residual = settled(system.engine, samples.t, samples.y, samples.memory)
+    y, residual = settled(system, samples.t, samples.y, samples.memory)
     work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
     return Trajectory(
         samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
@@ -312,13 +311,20 @@ def split(
     )  # fmt: skip
 
 
-def settled(engine: Engine, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
+def _among(t: Array, times: Array) -> NDArray[np.bool_]:
+    """Which of `t` are among the increasing `times`."""
+    if not len(times):
+        return np.zeros(len(t), bool)
+    return np.asarray(times[np.minimum(np.searchsorted(times, t), len(times) - 1)] == t)
+
+
+def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
     """Samples (n, n_state) with unit quaternions and exact driven coordinates.
 
     Between steps the samples are the method's dense output, which meets both only within the
     tolerance.  Also returns the largest distance of a quaternion's length from 1.
     """
-    y, residual = y.copy(), 0.0
+    engine, y, residual = system.engine, y.copy(), 0.0
     entries = engine.packed.layout.quaternions[:, None] + np.arange(4)
     rows = max(1, _QUATERNIONS // max(1, len(entries)))
     for first in range(0, len(y) if len(entries) else 0, rows):
@@ -327,10 +333,11 @@ def settled(engine: Engine, t: Array, y: Array, memory: Array) -> tuple[Array, f
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
         some[:, entries] /= lengths[:, :, None]
     if engine.packed.model.n_drives:
-        system = SceneSystem(engine)
+        now = system.memory.copy()
         for time, known, row in zip(t, memory, y, strict=True):
             system.memory[: len(known)] = known
             engine.lib.mstmm_scene_settle(system.run, time, engine.pointer(row))
+        system.memory[:] = now
     return y, residual
 
 

@@ -142,7 +142,7 @@ def _side_by_side(
     engine = model._engine
     systems = [SceneSystem(engine, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
-    start, _ = settled(engine, np.zeros(len(start)), start, np.zeros((len(start), 1)))
+    start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])
     lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu)
     samples, outcomes = run_lanes(lanes, start)
@@ -153,7 +153,7 @@ def _side_by_side(
         rows.success[i] = status is Status.FINISHED
         rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome)
     flat = rows.samples[which].reshape(-1, model.nq + model.nu)
-    flat, _ = settled(engine, np.zeros(len(flat)), flat, np.zeros((len(flat), 1)))
+    flat, _ = settled(systems[0], np.zeros(len(flat)), flat, np.zeros((len(flat), 1)))
     rows.samples[which] = flat.reshape(len(which), -1, model.nq + model.nu)
 
 
