@@ -46,12 +46,20 @@ def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
         assert counts == tuple(len(group) for group in groups)
 
 
+#: Modes of kernels whose size is known at run time.
+SIZE = 3
+
+
 def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
-    """Values a kernel could meet: rotations for 3 x 3, definite inertias for 21 numbers.
+    """Values a kernel could meet: rotations for 3 x 3, definite inertias for 21 numbers and for
+    modal mass matrices.
 
     Special points are zeros, no rotation, and a unit inertia.
     """
-    length = port.length()
+    length = port.length(SIZE)
+    if port.name == "S_ff":
+        half = np.zeros((SIZE, SIZE)) if special else rng.normal(size=(SIZE, SIZE))
+        return [float(v) for v in (half @ half.T + np.eye(SIZE)).ravel()]
     if port.shape == (3, 3):
         turn = np.eye(3) if special else np.linalg.qr(rng.normal(size=(3, 3)))[0]
         return [float(v) for v in turn.ravel()]
@@ -62,21 +70,28 @@ def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
 
 
 def agree(library: CLibrary, stem: str, kernel: KernelIR, inputs: dict[str, list[float]]) -> bool:
-    """Compare C, tape, floats and exact values; False if a guard stopped all of them alike."""
-    compiled = library.call(stem, kernel.name, inputs)
-    code, rows = library.run_tape(compile_tape(kernel), [inputs[p.name] for p in kernel.inputs])
-    assert code == compiled.code
+    """Compare C, tape, floats and exact values; False if a guard stopped all of them alike.
+
+    Kernels with a run-time size have no tape.
+    """
+    n = SIZE if kernel.size_symbol else 0
+    compiled = library.call(stem, kernel.name, inputs, n)
+    rows = None
+    if not n:
+        code, rows = library.run_tape(compile_tape(kernel), [inputs[p.name] for p in kernel.inputs])
+        assert code == compiled.code
     try:
-        floats = evaluate_floats(kernel, inputs)
+        floats = evaluate_floats(kernel, inputs, n)
     except GuardFailure as failure:
         assert compiled.code == failure.code
         return False
     assert compiled.code == 0
-    for (name, row), interpreted in zip(floats.items(), rows, strict=True):
+    for name, row in floats.items():
         assert same(compiled.outputs[name], row), name
+    for (name, row), interpreted in zip(floats.items(), rows or (), strict=rows is not None):
         assert same(interpreted, row), name
     if all(np.isfinite(row).all() for row in floats.values()):
-        for name, limits in rounding_bounds(kernel, inputs).items():
+        for name, limits in rounding_bounds(kernel, inputs, n).items():
             for got, (value, bound) in zip(compiled.outputs[name], limits, strict=True):
                 assert abs(got - value) <= bound, name
     return True
