@@ -95,7 +95,7 @@ def polynomial(text: str) -> Polynomial:
 
 def text_of(coefficients: Mapping[int, float]) -> str:
     """Sum of powers of x with the given factors, as a scene may state it."""
-    return " + ".join(f"({c!r})*x^{k}" for k, c in coefficients.items())
+    return " + ".join(f"({float(c)!r})*x^{k}" for k, c in coefficients.items())
 
 
 class Shapes:
@@ -176,8 +176,12 @@ class Shapes:
             return np.vstack([values[:3] - back, turn]), at
         if kind == "chord":
             first, last = self.rows(np.array([0.0, self.length]))
-            slope = (last - first) / self.length
-            return np.vstack([first[:3], first[3], -slope[2], slope[1]]), 0.0
+            # A chord leaves the twist about it and the place along it to the section that is held.
+            slope, own = (
+                (last - first) / self.length,
+                self.rows(np.array([end_place(self.beam, held)]))[0],
+            )
+            return np.vstack([own[0], first[1:3], own[3], -slope[2], slope[1]]), 0.0
         place, field, mass = self.points()
         tilde = np.cross(np.eye(3), place[:, None, :])  # e_a x r0
         rigid = np.concatenate([np.tile(np.eye(3), (len(place), 1, 1)), tilde], axis=1)

@@ -1,7 +1,8 @@
 """Planar chains of inextensible beams in absolute angles, without any floating frame.
 
 A point of the chain is the integral of (cos theta, sin theta) along it, and all angles are linear
-in the coordinates: theta = B a + offset + theta_0(t).  Kinetic energy, gravity and strain energy are
+in the coordinates: theta = B a + offset + theta_0(t).  The energies are those of motion,
+gravity and strain:
 
     T = 1/2 sum_ij K_ij cos(theta_i - theta_j) theta_i' theta_j',   V_g = g sum_i m_i sin theta_i,
     V_s = 1/2 a^T S a,
@@ -223,7 +224,7 @@ def segments(
 
 
 def extrapolated(values: Sequence[Array]) -> tuple[Array, float]:
-    """Limit of values at N, 2 N (, 4 N) with errors in even powers of 1/N, and its last correction."""
+    """Limit of values at N, 2 N, ... with errors in even powers of 1/N, and its last correction."""
     table = [np.asarray(v, float) for v in values]
     power = 4.0
     last = table[-1]

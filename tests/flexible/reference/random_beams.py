@@ -14,6 +14,7 @@ from reference.jets import Array
 from reference.tree import SIZES
 
 from .beam import text_of
+from .dense import mass_matrix, system
 
 Scene = dict[str, Any]
 Generator = np.random.Generator
@@ -28,10 +29,11 @@ def random_beam(rng: Generator, name: str, planar: bool = False, stiffening: boo
     mass = float(10 ** rng.uniform(-0.5, 0.7))
 
     def shapes(count: int, first: int) -> list[str]:
-        return [
-            text_of({k: float(rng.uniform(0.3, 1.0)) for k in (first + i, first + i + 1)})
-            for i in range(count)
-        ]
+        texts = []
+        for k in range(first, first + count):
+            a, b = rng.uniform(0.3, 1.0, 2)
+            texts.append(text_of({k: a * length ** (1.0 - k), k + 1: -b * length**-k}))
+        return texts
 
     own: dict[str, list[str]] = {"y": shapes(2, 2)}
     beam: Scene = {
@@ -146,8 +148,9 @@ def _hinge(
     return hinge
 
 
-def random_state(scene: Scene, seed: int, size: float = 0.1) -> tuple[Array, Array]:
-    """Hinges within about a radian, modes within `size`, rates of all within 1."""
+def random_state(scene: Scene, seed: int, size: float = 0.05) -> tuple[Array, Array]:
+    """Hinges within about a radian, modes within `size` (or less, where a mass matrix that is cut
+    after the second order is not safely definite), rates of all within 1."""
     rng = np.random.default_rng(seed)
     q, u = [], []
     for hinge in scene["hinge"]:
@@ -158,8 +161,13 @@ def random_state(scene: Scene, seed: int, size: float = 0.1) -> tuple[Array, Arr
             own[-4:] /= np.linalg.norm(own[-4:])
         q.append(own)
         u.append(rng.uniform(-1, 1, nu))
+    beams = {body.name: body for body in system(scene).bodies}
     for beam in scene["beam"]:
-        n = sum(beam["modes"].values())
-        q.append(rng.uniform(-size, size, n))
-        u.append(rng.uniform(-1, 1, n))
+        body = beams[beam["name"]]
+        eta = rng.uniform(-size, size, body.n)
+        least = 0.3 * np.linalg.eigvalsh(mass_matrix(body, 0 * eta, True))[0]
+        while np.linalg.eigvalsh(mass_matrix(body, eta, True))[0] < least:
+            eta = eta / 2
+        q.append(eta)
+        u.append(rng.uniform(-1, 1, body.n))
     return np.concatenate(q), np.concatenate(u)

@@ -1,0 +1,110 @@
+"""Beams of the engine against the dense system of particles, on random chains and trees.
+
+The reference sums over particles, writes ports and hinges as positions in Taylor arithmetic and
+solves one saddle-point system; it shares no formula with the engine.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from flexible.reference import dense, random_beams
+from flexible.reference.beam import flexible_body
+from reference.compare import worst
+
+import mstmm
+from mstmm.runtime.flexible.bodies import modal_bodies
+
+ACCURACY = 1e-10
+TIME = 0.3
+
+
+def compare(
+    scene: dict[str, Any], seed: int, engine: str = "looped", particles: bool = False
+) -> None:
+    """Accelerations, hinge loads and energy at one state."""
+    print(f"random_beams seed = {seed}")
+    q, u = random_beams.random_state(scene, seed)
+    model = mstmm.compile(mstmm.Scene(**scene), engine=engine)
+    found = dense.solve(scene, q, u, TIME, lagrangian=not particles)
+    assert worst(model.accelerations(q, u, t=TIME), found.udot) < ACCURACY
+    result = model.simulate(t_start=TIME, t_end=TIME, initial=(q, u))
+    assert result.success, result.message
+    names = [hinge["name"] for hinge in scene["hinge"]]
+    wrenches = [np.concatenate([result.force(n)[0], result.moment(n)[0]]) for n in names]
+    assert worst(wrenches, np.hstack([found.force, found.moment]), floor=1.0) < ACCURACY
+    energy = dense.energy(scene, q, u)
+    assert abs(result.energy()[0] - energy) < ACCURACY * max(abs(energy), 1.0)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_spatial_trees(seed: int) -> None:
+    compare(random_beams.random_system(seed), seed)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_planar_trees(seed: int) -> None:
+    compare(random_beams.random_system(seed, planar=True), seed)
+
+
+@pytest.mark.parametrize("draw", range(6))
+def test_trees_drawn_afresh(draw: int, rng: np.random.Generator) -> None:
+    seed = int(rng.integers(2**32))
+    compare(random_beams.random_system(seed, planar=draw % 2 == 0), seed)
+
+
+@pytest.mark.parametrize("seed", range(30, 34))
+def test_long_chains(seed: int) -> None:
+    compare(random_beams.random_system(seed, chain=True, most=9), seed)
+
+
+@pytest.mark.parametrize("seed", range(40, 46))
+def test_without_stiffening_particles_are_the_same(seed: int) -> None:
+    """Linear fields: the sum over particles needs no cut at all."""
+    scene = random_beams.random_system(seed, most=3, stiffening=False)
+    compare(scene, seed, particles=True)
+
+
+@pytest.mark.parametrize("seed", (50, 51))
+def test_fused_engine(seed: int) -> None:
+    compare(random_beams.random_system(seed, most=3), seed, engine="fused")
+
+
+@pytest.mark.parametrize("seed", range(60, 66))
+def test_numbers_of_a_beam(seed: int) -> None:
+    """Moments, stiffness and ends of a beam against sums over its particles, in every frame."""
+    scene = random_beams.random_system(seed, planar=seed % 2 == 0)
+    held = {
+        h["outboard"].partition(".")[0]: h["outboard"].partition(".")[2] for h in scene["hinge"]
+    }
+    bodies = modal_bodies(mstmm.Scene(**scene))
+    for beam in scene["beam"]:
+        made = bodies[beam["name"]]
+        body = flexible_body(beam, held[beam["name"]])
+        p = body.particles
+        expected = {
+            "mass": p.mass.sum(),
+            "first": p.mass @ p.place,
+            "second": np.einsum("m,ma,mb->ab", p.mass, p.place, p.place),
+            "C": np.einsum("m,mak->ak", p.mass, p.phi),
+            "E": np.einsum("m,ma,mbk->abk", p.mass, p.place, p.phi),
+            "F": np.einsum("m,mak,mbl->abkl", p.mass, p.phi, p.phi),
+            "K": body.K,
+            "D": body.D,
+        }
+        for name, value in expected.items():
+            assert worst(getattr(made, name), value, floor=1.0) < 1e-12, name
+        drawn = np.einsum("m,mkl->kl", p.mass, p.shortening)
+        moved = np.einsum("m,ma,mkl->akl", p.mass, p.place, p.shortening)
+        assert worst(made.G[0], drawn, floor=1.0) < 1e-12
+        assert worst(made.X[:, 0], moved, floor=1.0) < 1e-12
+        assert not made.G[1:].any() and not made.X[:, 1:].any()
+        for name, port in made.ports.items():
+            section = body.ends[name]
+            assert worst(port.position, section.place) < 1e-13
+            assert worst(port.rotation, section.rotation) < 1e-13
+            assert worst(port.phi, section.phi, floor=1.0) < 1e-12
+            assert worst(port.theta, section.theta, floor=1.0) < 1e-12
+            assert worst(port.shortening[0], section.shortening, floor=1.0) < 1e-12
