@@ -96,27 +96,39 @@ def _scene(path: str) -> Report:
     scene = mstmm.load_scene(path)
     model = compiled(path, scene)
     sizes = {
-        "bodies": len(scene.bodies), "hinges": len(scene.hinges), "coordinates": model.nq,
-        "speeds": model.nu, "springs": len(scene.spring), "loads": len(scene.load),
-        "events": len(scene.event),
+        "bodies": len(scene.bodies), "beams": len(scene.beam), "elastic": len(scene.elastic),
+        "hinges": len(scene.hinges), "coordinates": model.nq, "speeds": model.nu,
+        "springs": len(scene.spring), "loads": len(scene.load), "events": len(scene.event),
     }  # fmt: skip
-    report = {"ok": True, "kind": "scene", **sizes, "warnings": list(scene.warnings)}
-    return {**report, "toml": scene.to_toml(), "text": _scene_text(path, scene, sizes)}
+    notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
+    warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
+    report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
+    text = _scene_text(path, scene, sizes, warnings, notes)
+    return {**report, "toml": scene.to_toml(), "text": text}
 
 
 _ONE = {
-    "bodies": "body", "hinges": "hinge", "coordinates": "coordinate", "speeds": "speed",
-    "springs": "spring", "loads": "load", "events": "event",
+    "bodies": "body", "beams": "beam", "elastic": "elastic body", "hinges": "hinge",
+    "coordinates": "coordinate", "speeds": "speed", "springs": "spring", "loads": "load",
+    "events": "event",
 }  # fmt: skip
 
 
-def _scene_text(path: str, scene: Scene, sizes: dict[str, int]) -> str:
+_MANY = {"elastic": "elastic bodies"}
+
+
+def _scene_text(
+    path: str, scene: Scene, sizes: dict[str, int], warnings: list[str], choices: list[str]
+) -> str:
     from . import report
 
     said = ", ".join(
-        report.count(number, _ONE[name], name) for name, number in sizes.items() if number
+        report.count(number, _ONE[name], _MANY.get(name, name))
+        for name, number in sizes.items()
+        if number
     )
-    lines = [f"{path}: ok; {said or 'nothing in it'}", *(f"  note: {w}" for w in scene.warnings)]
+    lines = [f"{path}: ok; {said or 'nothing in it'}", *(f"  note: {w}" for w in warnings)]
+    lines += [f"  {choice}" for choice in choices]
     return "\n".join(lines + _tree_lines(scene))
 
 
@@ -128,6 +140,7 @@ def _tree_lines(scene: Scene) -> list[str]:
     """The tree of bodies, each with the hinge it hangs on."""
     from mstmm.topology import build
 
+    scene = scene.skeleton
     tree = build(scene)
     depth: dict[int, int] = {-1: 0}  # of the bodies on which others may hang
     lines = ["  ground"] if tree.runs else []

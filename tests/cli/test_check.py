@@ -39,6 +39,32 @@ def test_a_chain_is_one_line(mstmm: Command, folder: Path) -> None:
     assert done.code == 0 and "1001 bodies on 1001 hinges, 3001 degrees of freedom" in done.out
 
 
+def test_flexible_bodies_and_what_was_chosen_for_them(mstmm: Command, folder: Path) -> None:
+    (folder / "blade.toml").write_text(
+        """
+        gravity = [0, 0, -9.81]
+        body = [{ name = "camera", mass = 0.3, inertia = [1, 1, 1] }]
+        hinge = [
+            { name = "hub", type = "pin", inboard = "ground", outboard = "blade" },
+            { name = "mount", type = "fixed", inboard = "blade.tip", outboard = "camera" },
+        ]
+        [[beam]]
+        name = "blade"
+        length = 10.0
+        mass_per_length = 1.2
+        bending_stiffness = 1.4e4
+        rotary_inertia = 0.3
+        modes = { y = 2 }
+        """
+    )
+    done = mstmm("check", "blade.toml")
+    assert done.code == 0
+    assert "ok; 1 body, 1 beam, 2 hinges, 3 coordinates, 3 speeds" in done.out
+    assert 'note: beam "blade": its length is 5.8 times the height of the section' in done.out
+    assert "  blade: y: 2 " in done.out
+    assert "    blade  (hub: pin)\n      camera  (mount: fixed)\n" in done.out
+
+
 def test_echo_loads_back_to_the_same_scene(mstmm: Command, folder: Path) -> None:
     done = mstmm("check", "pendulum.toml", "--echo")
     (folder / "echo.toml").write_text(done.out)
