@@ -127,8 +127,8 @@ class Differentiation:
         for j, unit in enumerate(np.eye(nu)):
             bend[:, j] -= columns("q", "qdot", {**states, "u": unit[None]}, motion)[:, 0]
         n, bend = np.swapaxes(n, 1, 2), np.swapaxes(bend, 1, 2)
-        for hinge in self._model.layout.hinges.values():
-            rows, own = hinge.q_slice, hinge.u_slice
+        for owner in self._model.layout.owners:
+            rows, own = owner.q_slice, owner.u_slice
             back = np.linalg.pinv(n[:, rows, own])
             rate_q[:, own, own] = back @ bend[:, rows, own]
             rate_u[:, own, own] = back @ n[:, rows, own]

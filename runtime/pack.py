@@ -77,15 +77,18 @@ class Packed:
         )
 
 
-def expansion_of(scene: Scene) -> Expanded:
-    """The scene of nodes; scenes without flexible bodies are their own."""
+def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> Expanded:
+    """The scene of nodes; scenes without flexible bodies are their own.
+
+    `flexible` are the numbers of the flexible bodies where they are known already.
+    """
     if not (scene.beam or scene.elastic):
         return Expanded(scene, scene, {})
     from .flexible.bodies import modal_bodies
     from .flexible.rigidified import rigidified
 
     rigid = rigidified(scene)
-    expanded = expand(rigid.scene, modal_bodies(rigid.scene))
+    expanded = expand(rigid.scene, modal_bodies(rigid.scene) if flexible is None else flexible)
     expanded.described, expanded.rigidified = scene, rigid
     expanded.nodes |= rigid.nodes
     return expanded
@@ -106,16 +109,18 @@ def pack(
     product_accuracy: float | None = None,
     *,
     align: bool = True,
+    flexible: Mapping[str, ModalBody] | None = None,
 ) -> Packed:
     """Engine arrays of a scene; `known` are elements beyond the prebuilt ones.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
     may deviate from the Riccati sweep by that much.  Without `align` internal frames are those of
     the bodies' own hinges, whatever hangs on them: smooth functions of the scene's numbers.
+    `flexible` are the numbers of the flexible bodies where they are known already.
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    packed = _Packing(scene, known or {}, align).run()
+    packed = _Packing(scene, known or {}, align, flexible).run()
     if product_accuracy is not None:
         attach(packed, product_accuracy)
         resize(packed, int(packed.model.tape_slots))
@@ -125,8 +130,14 @@ def pack(
 class _Packing:
     """One pass over a scene; every method fills one part of the model."""
 
-    def __init__(self, scene: Scene, known: Known, align: bool) -> None:
-        self.expanded = expanded = expansion_of(scene)
+    def __init__(
+        self,
+        scene: Scene,
+        known: Known,
+        align: bool,
+        flexible: Mapping[str, ModalBody] | None,
+    ) -> None:
+        self.expanded = expanded = expansion_of(scene, flexible)
         self.scene, self.elements, self.align = expanded.scene, Elements(known), align
         self.ffi, self.lib = prebuilt.module()
         self.kept: list[Any] = []

@@ -1,4 +1,8 @@
-"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]"."""
+"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]".
+
+Whole numbers (members of a chain, shapes of a beam, nodes of a mesh) are no parameters: they decide
+the length of q and u.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +15,7 @@ from typing import Any
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
-TABLES = ("body", "hinge", "chain", "load", "event", "spring")
-#: How many members a chain has is no parameter: it decides the length of q and u.
-_COUNT = "count"
+TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -28,10 +30,8 @@ def _named(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
-    if isinstance(value, bool):
-        return
-    if isinstance(value, (int, float)):
-        yield path, float(value)
+    if isinstance(value, float):
+        yield path, value
     elif isinstance(value, dict):
         for key, entry in value.items():
             yield from _numbers(f"{path}.{key}", entry)
@@ -45,7 +45,7 @@ def read(scene: Scene) -> dict[str, float]:
     data = _data(scene)
     found = dict(_numbers("gravity", data["gravity"]))
     for name, element in _named(data):
-        found.update(_numbers(name, {key: x for key, x in element.items() if key != _COUNT}))
+        found.update(_numbers(name, element))
     return found
 
 
@@ -90,7 +90,7 @@ def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
 def _set(data: dict[str, Any], path: str, value: float) -> bool:
     parts = path.split(".")
     owners = _owners(data, parts)
-    return parts != [_COUNT] and any(_assign(owner, parts, value) for owner in owners)
+    return any(_assign(owner, parts, value) for owner in owners)
 
 
 def _owners(data: dict[str, Any], parts: list[str]) -> list[Any]:
@@ -118,7 +118,7 @@ def _assign(target: Any, parts: list[str], value: float) -> bool:
         elif index is not None:
             return False
         if i == len(parts) - 1:
-            if isinstance(holder[place], (dict, list)):
+            if isinstance(holder[place], (dict, list, int)):
                 return False
             holder[place] = float(value)
             return True
