@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mstmm.graph import Node
 from mstmm.structure import ModalStructure, SectionStructure
 
 from .inline import Guarding, Nodes
@@ -36,11 +37,14 @@ class ModalPass:
         self.modes: dict[int, ModalNodes] = {}
         self.subspaces: dict[int, Nodes] = {}
 
-    def _run(
-        self, name: str, n: int, guard: Guarding | None = None, **inputs: Sequence[object]
+    def _run(self, name: str, n: int, **inputs: Sequence[Node]) -> dict[str, Nodes]:
+        return self._guarded(None, name, n, **inputs)
+
+    def _guarded(
+        self, guard: Guarding | None, name: str, n: int, **inputs: Sequence[Node]
     ) -> dict[str, Nodes]:
         f = self.fusion
-        return f.inline.run(f.kernels(("sweep", "modal"), name), inputs, guard, n=n)  # type: ignore[arg-type]
+        return f.inline.run(f.kernels(("sweep", "modal"), name), inputs, guard, n=n)
 
     def _coordinates(self, modal: ModalStructure) -> tuple[Nodes, Nodes]:
         f, n = self.fusion, modal.n
@@ -55,9 +59,9 @@ class ModalPass:
         numbers = {name: f.entries(entries) for name, entries in section.numbers}
         found = self._run("section", modal.n, eta=eta, etad=etad, **numbers)
         idle = f.structure.bodies[index].idle
-        motion = self._run(
-            "inward" if section.inward else "outward", modal.n,
+        motion = self._guarded(
             None if idle else lambda c, code: f.fail_unless(c, SECTION, index, code),
+            "inward" if section.inward else "outward", modal.n,
             R_end=f.entries(section.end),
             **{name: found[name] for name in ("x", "Psi", "xd", "Psid", "xdd")},
         )  # fmt: skip
@@ -105,8 +109,8 @@ class ModalPass:
             rows = found["S_rf_I"]
             modes.s_ff = _sum(modes.s_ff, found["S_ff"])
             modes.e_f = _sum(modes.e_f, found["e_f"])
-        found = self._run(
-            "condense", n, lambda condition, code: f.fail_unless(condition, MODES, index, code),
+        found = self._guarded(
+            lambda condition, code: f.fail_unless(condition, MODES, index, code), "condense", n,
             S=inertia, e=load, S_rf=rows, S_ff=modes.s_ff, e_f=modes.e_f,
         )  # fmt: skip
         modes.gain = found["Gg"]

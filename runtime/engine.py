@@ -194,6 +194,11 @@ class Engine:
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
+    def _is_flexible(self, position: int) -> bool:
+        """Whether the body at this place of the topology belongs to a flexible one."""
+        expanded = self.packed.expanded
+        return expanded is not None and expanded.is_node(self.body_name(position))
+
     def body_name(self, position: int) -> str:
         """Name of the body at this place of the topology."""
         packed = self.packed
@@ -203,6 +208,13 @@ class Engine:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
         reason, element = int(failure.reason), int(failure.element)
+        if reason == UNDETERMINED and self._is_flexible(element):
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: what it moves has no positive inertia '
+                f'left: the shapes of the flexible body "{self.body_name(element).split("/")[0]}" '
+                "carry it all, or its deflection is beyond the stiffened model; use fewer shapes, "
+                'frame = "chord" or "mean", quadrature = true, or split it into welded beams'
+            )
         if reason == UNDETERMINED:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '

@@ -173,26 +173,25 @@ def _body(reader: _Reader, index: int) -> BodyStructure:
     )  # fmt: skip
 
 
-#: Fields of `mstmm_moments` in the order of the kernels' inputs: name, field, rows (n: modes).
+#: Fields of `mstmm_moments` in the order of the kernels' inputs: name, field, place in it.
 _MOMENTS = (
-    ("p", "rigid", None), ("C", "c", 3), ("P", "p", 3), ("B", "b", 6),
-    *((f"Z_{ab}", ("z", k), "n") for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))),
-    *((f"Y_{a}", ("y", k), "n") for k, a in enumerate("xyz")),
-    *((f"G_{a}", ("g", k), "n") for k, a in enumerate("xyz")),
-    ("M", "m", "n"),
+    ("p", "rigid", None), ("C", "c", None), ("P", "p", None), ("B", "b", None),
+    *((f"Z_{ab}", "z", k) for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))),
+    *((f"Y_{a}", "y", k) for k, a in enumerate("xyz")),
+    *((f"G_{a}", "g", k) for k, a in enumerate("xyz")),
+    ("M", "m", None),
 )  # fmt: skip
+#: Rows of those that are not n x n.
+_ROWS = {"C": 3, "P": 3, "B": 6}
 
 
 def _moments(reader: _Reader, record: Any, n: int) -> tuple[tuple[str, Entries], ...]:
     found = []
-    for name, field, rows in _MOMENTS:
-        pointer = (
-            getattr(record, field)
-            if isinstance(field, str)
-            else getattr(record, field[0])[field[1]]
-        )
-        count = 10 if rows is None else n * (n if rows == "n" else int(rows))
-        found.append((name, reader.entries(reader.unpack(pointer, count))))
+    for name, field, place in _MOMENTS:
+        pointer = getattr(record, field)
+        count = 10 if name == "p" else n * _ROWS.get(name, n)
+        array = reader.unpack(pointer if place is None else pointer[place], count)
+        found.append((name, reader.entries(array)))
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from mstmm.errors import SceneError
 from mstmm.expression import Expression, parse
-from mstmm.rotations import to_quaternion
+from mstmm.rotations import rows, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split
 from mstmm.scene_parts import End, Load
 
@@ -68,7 +68,8 @@ class _Expansion:
 
     def __init__(self, scene: Scene, bodies: Mapping[str, ModalBody]) -> None:
         self.scene, self.made = scene, Expanded(scene, scene, bodies)
-        self.body, self.internal = list(scene.body), []
+        self.body = list(scene.body)
+        self.internal: list[Hinge] = []
         self.used = {self._full(x) for x in self._references()}
 
     def run(self) -> Expanded:
@@ -156,10 +157,9 @@ class _Expansion:
             self.made.nodes[f"{name}.{held}"] = node
             target = node
         else:
-            end = End(
-                position=tuple(float(x) for x in port.position),
-                orientation=to_quaternion(tuple(tuple(map(float, row)) for row in port.rotation)),
-            )
+            turned = rows([[float(x) for x in row] for row in port.rotation])
+            x, y, z = (float(entry) for entry in port.position)
+            end = End(position=(x, y, z), orientation=to_quaternion(turned))
             frame = frame.model_copy(update={"ends": {held: end}})
             target = f"{name}.{held}"
         self.body.append(frame.model_copy(update={"name": name}))
