@@ -28,6 +28,9 @@ DRIFT, LOSS, SINGULAR = 1e-5, 1e8, 1e-3
 #: A hinge load counts as zero below this part of the largest one.
 _ZERO = 1e-9
 
+#: Part of the stored energy against which rounding is judged where hardly anything moves.
+_AT_REST = 1e-8
+
 #: Bodies that are looked at to learn how far a scene reaches.
 _SOME = 30
 
@@ -149,14 +152,19 @@ def _largest(values: Array) -> float:
 
 
 def _energy(result: Result) -> Drift:
-    """T + V - W against the largest sum of what was exchanged: T, changes of V, W."""
+    """T + V - W against the largest sum of what was exchanged: T, changes of V, W.
+
+    At rest under load nothing is exchanged: then against a part of what is stored.
+    """
     parts, work = result.energies(), result.work
     residual = sum(parts.values(), -work)
     exchanged = parts["kinetic"] + np.abs(work)
     for name in ("gravity", "springs"):
         exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
     start = residual[:1]
-    return Drift("energy", "J", _largest(residual - start), _largest(exchanged), "exchanged")
+    stored = _largest(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
+    scale = max(_largest(exchanged), _AT_REST * stored)
+    return Drift("energy", "J", _largest(residual - start), scale, "exchanged")
 
 
 def _momentum(result: Result) -> list[Drift]:

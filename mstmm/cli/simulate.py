@@ -184,6 +184,7 @@ def use_files(paths: list[str]) -> None:
 def _model(plan: Plan) -> Model:
     """The compiled scene, with every quantity that was asked for in it."""
     import mstmm
+    from mstmm.scene_errors import near
 
     model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep, plan.engine)
     if plan.quantities:
@@ -194,7 +195,10 @@ def _model(plan: Plan) -> Model:
                 if name not in pictures:
                     start.quantity(name)
             except SceneError as error:
-                raise SceneError(f"--quantity {error}") from None
+                hint = near(name, pictures)
+                meant = "did you mean" in hint
+                text = f'"{name}": there is no such quantity or picture{hint}' if meant else error
+                raise SceneError(f"--quantity {text}") from None
     return model
 
 
@@ -239,13 +243,13 @@ def certified(result: Result, progress: Bar) -> Result:
     from dataclasses import replace
 
     from mstmm.runtime.execution import Watch, second_run
-    from mstmm.runtime.result import Result
+    from mstmm.runtime.result import result_of
 
     progress.label("estimating the error")
     watch = Watch(progress, result.settings, runs=2)
     run = result.trajectory
     error = second_run(result.model, run, *result.model.initial_state(), watch)
-    return Result(
+    return result_of(
         result.model, replace(run, notes=(*run.notes, *watch.notes)), error, result.certificate.step
     )
 

@@ -128,7 +128,7 @@ def _gamma(
 
 def _tail(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
     """Bending energy of the difference of the true moments and those of the shapes, over the
-    former, when these are largest."""
+    former."""
     motion = flexible.motion(name).some(some)
     if not len(some):
         return None
@@ -141,15 +141,18 @@ def _tail(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float
 
 
 def missed(motion: Motion, places: Array, weights: Array, moment: Array) -> float | None:
-    """Part of the bending energy of `moment` (n, m, 2) that the shapes miss; None without any."""
+    """Part of the bending energy of `moment` (n, m, 2) that the shapes miss when they are bent
+    most (just after a load was switched on they have not yet followed); None without any."""
     shapes = motion.shapes
     sections = shapes.sections(places)
     softness = weights[:, None] / np.stack([sections.EI_y, sections.EI_z], axis=1)
     bends = np.array([e.bends(motion.body, "z"), e.bends(motion.body, "y")])
     softness = np.where(bends, softness, 0.0)
-    true = np.einsum("tma,ma->t", moment**2, softness)
-    lost = np.einsum("tma,ma->t", (moment - elastic_moment(motion, places)) ** 2, softness)
-    k = int(np.argmax(true))
+    followed = elastic_moment(motion, places)
+    true, held, lost = (
+        np.einsum("tma,ma->t", m**2, softness) for m in (moment, followed, moment - followed)
+    )
+    k = int(np.argmax(held))
     return float(lost[k] / true[k]) if true[k] > 0 else None
 
 

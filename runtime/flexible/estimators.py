@@ -162,8 +162,8 @@ def shear_error(body: ModalBody) -> float | None:
         if not bent or not gyration > 0:
             continue
         phi, bending = shapes.at(x).phi[:, "xyz".index(plane)], shapes.at(x).curvature[:, about]
-        squares = (weights @ bending**2) / (weights @ phi**2)
-        fourth = np.max(squares[bent])  # int phi''^2 / int phi^2 = beta^4
+        squares = (weights @ bending[:, bent] ** 2) / (weights @ phi[:, bent] ** 2)
+        fourth = np.max(squares)  # int phi''^2 / int phi^2 = beta^4
         error = 0.5 * np.sqrt(fourth) * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
         worst = max(worst or 0.0, float(error))
     return worst

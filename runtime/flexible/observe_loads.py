@@ -184,18 +184,26 @@ def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, 
 def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
 
-    The sections' inertia turns with its part of Psi (twist alone without rotary inertia), of the
-    first order in rates: Psi is small where this matters.
+    A point s of a section lies at B s from the axis, B = 1 + theta~ with the part of Psi that turns
+    the sections' inertia (twist alone without rotary inertia), and is accelerated by Q s,
+    Q = (wd~ + w~ w~) B + 2 w~ thetad~ + thetadd~; so int rho (B s) x (Q s) is the axial vector of
+    B (int rho s s^T) Q^T.  Slices that are rigid bodies of their own turn with all of Psi.
     """
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
     shapes = motion.shapes
     theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
+    if motion.body.points:
+        theta = shapes.at(x).theta
     turned, rate, growth = (
-        np.einsum("mak,tk->tma", theta, modal) for modal in (motion.eta, motion.etad, motion.etadd)
+        tilde(np.einsum("mak,tk->tma", theta, modal))
+        for modal in (motion.eta, motion.etad, motion.etadd)
     )
-    w = motion.frame_spin[:, None] + rate
-    wd = motion.frame_spin_rate[:, None] + growth + np.cross(motion.frame_spin[:, None], rate)
-    turn = section_rotations(turned)
-    inertia = turn @ (per_length[:, :, None] * np.eye(3)) @ np.swapaxes(turn, -1, -2)
-    return (inertia @ wd[..., None] + tilde(w) @ (inertia @ w[..., None]))[..., 0]
+    w = tilde(motion.frame_spin)[:, None]
+    placed = np.eye(3) + turned
+    pushed = (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ placed + 2 * w @ rate + growth
+    second = np.zeros((len(x), 3, 3))
+    second[:, 1, 1], second[:, 2, 2] = per_length[:, 2], per_length[:, 1]
+    product = placed @ second @ np.swapaxes(pushed, -1, -2)
+    axial = [product[..., a, b] - product[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))]
+    return np.stack(axial, axis=-1)

@@ -119,7 +119,9 @@ def _deflections(result: Result, name: str, figure: Any, axis: Any) -> None:
     x = np.linspace(0.0, length, _FINE)
     moved = observe.deflection(motion, x)
     k = 1 + int(np.argmax(np.abs(moved[:, :, 1:]).max(axis=(0, 1))))
-    draw_deflections(figure, axis, x, motion.t, moved[:, :, k], f"{name} along {'xyz'[k]}")
+    draw_deflections(
+        figure, axis, x, motion.t, moved[:, :, k], f"deflection of {name}\nalong {'xyz'[k]}"
+    )
 
 
 def _energies(result: Result, name: str, figure: Any, axis: Any) -> None:
