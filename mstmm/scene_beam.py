@@ -98,7 +98,9 @@ def _pair(of: str) -> rules.Rule:
                 raise refuse(f"expected {expected}, more than 0, found {found(entry)}", *place)
         return (values[0], values[-1])
 
-    return rules.Rule(expected, check, inner.schema)
+    number = {"type": "number", "exclusiveMinimum": 0}
+    pair = {"type": "array", "items": number, "minItems": 1, "maxItems": 2}
+    return rules.Rule(expected, check, {"anyOf": [number, pair]})
 
 
 class SectionTable(Table):
@@ -143,7 +145,7 @@ class Beam(FlexibleTable, SectionTable):
         Shorthand(
             "ends by name: x in m, or a table with position and orientation",
             lambda value: _as_ends(value),
-            {"type": "object", "additionalProperties": {"type": "number"}},
+            {"type": "object", "additionalProperties": {"type": ["number", "array", "object"]}},
         ),
     ] = Field(default_factory=dict)
 

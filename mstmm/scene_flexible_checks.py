@@ -155,6 +155,10 @@ def warnings(scene: Scene) -> Iterator[str]:
     for beam in scene.beam:
         if beam.model != "rigid":
             yield from _weak_basis(scene, beam)
+    tangent = {e.name for e in scene.elastic if e.frame == "tangent" and e.model != "rigid"}
+    for hinge in scene.hinge:
+        if hinge.outboard_body in tangent and free_axes(hinge):
+            yield _loose(f'elastic "{hinge.outboard_body}"', hinge)
 
 
 def _called(scene: Scene, name: str) -> str:
@@ -192,12 +196,16 @@ def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[str]:
         return
     for direction, axis in _TURNS.items():
         if _bends(beam, direction) and _share(beam, hinge, axis) > _MOSTLY:
-            yield (
-                f'beam "{beam.name}": frame: a tangent frame at "{at}", which hinge '
-                f'"{hinge.name}" leaves free to turn, keeps little inertia there: the more shapes, '
-                'the smaller the steps; write frame = "auto"'
-            )
+            yield _loose(f'beam "{beam.name}"', hinge)
             return
+
+
+def _loose(body: str, hinge: Hinge) -> str:
+    return (
+        f'{body}: frame: a tangent frame at "{hinge.outboard_end}", which hinge "{hinge.name}" '
+        "leaves free to turn, keeps little inertia there: the more shapes, the smaller the steps; "
+        'write frame = "auto"'
+    )
 
 
 def _weak_basis(scene: Scene, beam: Beam) -> Iterator[str]:

@@ -212,3 +212,16 @@ BAD: list[tuple[Data, str]] = [
 @pytest.mark.parametrize(("data", "fragment"), BAD)
 def test_refused_with_element_key_and_way_out(data: Data, fragment: str) -> None:
     assert fragment in message_of(data)
+
+
+@pytest.mark.parametrize(
+    ("kind", "frame", "count"),
+    [("ball", "tangent", 1), ("fixed", "tangent", 0), ("ball", "auto", 0), ("ball", "mean", 0)],
+)
+def test_a_tangent_frame_where_the_hinge_leaves_the_end_free(
+    kind: str, frame: str, count: int
+) -> None:
+    data = linked(frame=frame) | {"hinge": [HUB | {"type": kind}]}
+    found = Scene(**data).warnings
+    assert len(found) == count
+    assert all(w.startswith('elastic "link": frame: a tangent frame at "root"') for w in found)
