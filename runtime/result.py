@@ -239,6 +239,22 @@ class Result(FlexibleResults):
         return f"<Result: {self.message}; {len(self.t)} samples>"
 
 
+def result_of(
+    model: Model,
+    run: Trajectory,
+    error: ErrorEstimate | None = None,
+    step: StepCheck | None = None,
+) -> Result:
+    """The result of a run: with elastic responses where the model has one-way bodies."""
+    expanded = model._engine.packed.expanded
+    rigid = None if expanded is None else expanded.rigidified
+    if rigid is None or not rigid.one_way:
+        return Result(model, run, error, step)
+    from .flexible.one_way_result import OneWayResult
+
+    return OneWayResult(model, run, error, step)
+
+
 def simulate(
     model: Model,
     settings: Settings,
@@ -258,7 +274,7 @@ def simulate(
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))
-    return Result(model, run, error, step)
+    return result_of(model, run, error, step)
 
 
 def load_result(path: str | Path) -> Result:

@@ -101,7 +101,7 @@ def load(path: Path) -> Result:
 def _rebuilt(data: Any, path: Path) -> Result:
     """Scene and model as they were; what only the run knew comes from the file."""
     from .model import Model
-    from .result import Result
+    from .result import result_of
 
     scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
     elements, definitions = store.known(store.needed(scene))
@@ -117,4 +117,4 @@ def _rebuilt(data: Any, path: Path) -> Result:
         start = np.concatenate([run.q[0], run.u[0]])
         tableau = get(run.settings.method)
         step = check_step(model._engine, tableau, run.settings, start, run.memory[0])
-    return Result(model, run, provenance.error(data), step)
+    return result_of(model, run, provenance.error(data), step)

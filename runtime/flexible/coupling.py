@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mstmm.scene import split
 
 if TYPE_CHECKING:
+    from ..model import Model
     from .observe_bodies import FlexibleBodies
 
 Array = NDArray[np.float64]
@@ -27,11 +28,11 @@ LARGEST = 300
 def couplings(flexible: FlexibleBodies) -> dict[str, Array]:
     """Body -> chi (modes,) at the start of the run; without bodies that no moving hinge carries.
     Empty for scenes with more than LARGEST speeds."""
-    model = flexible.model
-    if model.nu > LARGEST or not len(flexible.run.t):
+    if flexible.model.nu > LARGEST or not len(flexible.run.t):
         return {}
-    inertia = model.mass_matrix(flexible.run.q[0])
-    found, tree = dict[str, Array](), _Tree(flexible)
+    model, q = flexible.coupled_start()
+    inertia = model.mass_matrix(q)
+    found, tree = dict[str, Array](), _Tree(model)
     for name in flexible.known:
         own, others = tree.hinge_of(name)
         if not own:
@@ -60,8 +61,8 @@ def coupling(rows: Array, hinge: Array, modal: Array) -> Array:
 class _Tree:
     """Free speeds of the hinges, and what hangs on what."""
 
-    def __init__(self, flexible: FlexibleBodies) -> None:
-        layout, scene = flexible.model.layout, flexible.model.scene
+    def __init__(self, model: Model) -> None:
+        layout, scene = model.layout, model.scene
         self.speeds: dict[str, list[int]] = {}
         self.inboard: dict[str, str] = {}
         for hinge in scene.hinges:

@@ -60,6 +60,10 @@ class FlexibleBodies:
             )  # fmt: skip
         return self._motions[name]
 
+    def coupled_start(self) -> tuple[Model, Array]:
+        """A model in which all of them are coupled, and its q at the start of the run."""
+        return self.model, self.run.q[0]
+
     @cached_property
     def gravity(self) -> Array:
         """(3,) m/s2, inertial axes."""

@@ -1,0 +1,151 @@
+"""Damped oscillators under loads that are piecewise polynomials: their exact motion.
+
+M etadd + D etad + K eta = p(t).  In the eigenvectors of its first-order form every component is
+yd = lambda y + sum c_j s^j, whose solution over a cell needs no steps: errors come from the
+polynomials alone, whatever the frequencies are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Points at which a load is known in each cell: a polynomial of degree 5.
+POINTS = 6
+#: Eigenvectors further from being a basis than this belong to critically damped oscillators.
+_CRITICAL = 1e7
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Intervals of time on each of which loads are one polynomial.
+
+    `edges` (m + 1,) s, increasing; `breaks` are numbers of edges at which loads may jump.
+    """
+
+    edges: Array
+    breaks: frozenset[int]
+
+    @classmethod
+    def between(cls, times: Array, cells: int) -> Cells:
+        """About `cells` cells between the first and the last of `times`, edges at all of them."""
+        share = np.diff(times) / (times[-1] - times[0])
+        counts = np.maximum(np.ceil(cells * share), 1).astype(int)
+        parts = [
+            np.linspace(a, b, n, endpoint=False)
+            for a, b, n in zip(times[:-1], times[1:], counts, strict=True)
+        ]
+        places = np.cumsum(counts)[:-1]
+        return cls(np.concatenate([*parts, times[-1:]]), frozenset(places.tolist()))
+
+    @property
+    def lengths(self) -> Array:
+        """(m,) s."""
+        return np.diff(self.edges)
+
+    @property
+    def samples(self) -> Array:
+        """(m * POINTS,) times at which the loads are wanted, inside the cells (Gauss points)."""
+        at = (np.polynomial.legendre.leggauss(POINTS)[0] + 1) / 2
+        return np.asarray((self.edges[:-1, None] + self.lengths[:, None] * at).reshape(-1))
+
+    def polynomials(self, values: Array) -> Array:
+        """(m, POINTS, n) coefficients of (s / length)^j from values (m * POINTS, n)."""
+        at = (np.polynomial.legendre.leggauss(POINTS)[0] + 1) / 2
+        inverse = np.linalg.inv(np.vander(at, increasing=True))
+        by_cell = values.reshape(len(self.lengths), POINTS, -1)
+        return np.asarray(np.einsum("jp,cpn->cjn", inverse, by_cell))
+
+    def jumps(self, coefficients: Array) -> Array:
+        """(n,) largest step of the polynomials at edges where loads are smooth: their error."""
+        before, after = coefficients.sum(axis=1)[:-1], coefficients[1:, 0]
+        smooth = [k - 1 for k in range(1, len(self.edges) - 1) if k not in self.breaks]
+        return np.asarray(np.max(np.abs(after - before)[smooth], axis=0, initial=0.0))
+
+    def find(self, times: Array) -> NDArray[np.int64]:
+        """The cell of each time; an edge belongs to the cell behind it, the last to the last."""
+        found = np.searchsorted(self.edges, times, side="right") - 1
+        return np.clip(found, 0, len(self.lengths) - 1)
+
+
+@dataclass(frozen=True)
+class Oscillators:
+    """Coefficients (n, n): stiffness and mass symmetric and definite, damping symmetric."""
+
+    stiffness: Array
+    damping: Array
+    mass: Array
+
+    @cached_property
+    def modes(self) -> tuple[Array, Array]:
+        """Frequencies (n,) in rad/s and shapes (n, n) with unit modal mass, undamped."""
+        from scipy import linalg
+
+        squares, shapes = linalg.eigh(self.stiffness, self.mass)
+        return np.sqrt(squares), shapes
+
+    @cached_property
+    def _first_order(self) -> tuple[Any, Any, Any]:
+        """lambda (2n,), eigenvectors, and their inverse, over [eta; etad] in undamped modes."""
+        omega, shapes = self.modes
+        n, damping = len(omega), shapes.T @ self.damping @ shapes
+        while True:
+            matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -damping]])
+            scale = np.concatenate([np.ones(n), omega])
+            roots, vectors = np.linalg.eig(matrix * scale / scale[:, None])
+            if np.linalg.cond(vectors) < _CRITICAL:
+                vectors = vectors * scale[:, None]
+                return roots, vectors, np.linalg.inv(vectors)
+            damping = damping * (1 + 1e-9) + 1e-12 * np.diag(omega)
+
+    def motion(self, cells: Cells, loads: Array, start: tuple[Array, Array], times: Array) -> Array:
+        """(3, times, n): eta, etad, etadd at `times` from `start` = (eta, etad) at the first edge.
+
+        `loads` (m, POINTS, n) are the polynomials' coefficients.
+        """
+        roots, vectors, inverse = self._first_order
+        shapes = self.modes[1]
+        n = len(shapes)
+        forcing = np.einsum("kj,cpi,ij->cpk", inverse[:, n:], loads, shapes)
+        back = shapes.T @ self.mass
+        state = inverse @ np.concatenate([back @ start[0], back @ start[1]])
+        starts = [state]
+        growth, weights = _propagation(roots, cells.lengths, cells.lengths)
+        for cell in range(len(cells.lengths)):
+            state = growth[cell] * state + np.sum(weights[cell] * forcing[cell], axis=0)
+            starts.append(state)
+        of = cells.find(times)
+        inside = times - cells.edges[of]
+        growth, weights = _propagation(roots, inside, cells.lengths[of])
+        states = growth * np.array(starts)[of] + np.sum(weights * forcing[of], axis=1)
+        shares = (inside / cells.lengths[of])[:, None] ** np.arange(POINTS)
+        now = np.einsum("tp,tpk->tk", shares, forcing[of])
+        rates = states * roots + now
+        found = np.stack([states @ vectors[:n].T, states @ vectors[n:].T, rates @ vectors[n:].T])
+        return np.asarray(found.real @ shapes.T)
+
+
+def _propagation(roots: Any, lengths: Array, whole: Array) -> tuple[Any, Any]:
+    """e^(lambda s) (m, 2n), and (m, POINTS, 2n): int_0^s e^(lambda (s - r)) (r / whole)^j dr."""
+    z = lengths[:, None] * roots
+    growth = np.exp(z)
+    share = (lengths / whole)[:, None]
+    large = np.abs(z) > 2.0
+    safe = np.where(large, z, 1.0)
+    recursive, series, found = (growth - 1) / safe, 0.0, []
+    for j in range(POINTS):
+        if j:
+            recursive = (j * recursive - 1) / safe
+        series, term = np.zeros_like(z), np.full_like(z, 1 / (j + 1))
+        for k in range(30):
+            series = series + term
+            term = term * np.where(large, 0.0, z) / (j + 2 + k)
+        integral = np.where(large, recursive, series)
+        found.append(integral * lengths[:, None] * share**j)
+    return growth, np.stack(found, axis=1)
