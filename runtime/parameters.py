@@ -20,7 +20,13 @@ _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
 def _data(scene: Scene) -> dict[str, Any]:
-    return tomllib.loads(scene.to_toml())
+    """The scene as a file has it, without the ends that every beam has of itself."""
+    data = tomllib.loads(scene.to_toml())
+    for beam in data.get("beam", []):
+        for name in ("root", "tip"):
+            if not any(beam["ends"][name].get("orientation", ())):
+                del beam["ends"][name]
+    return data
 
 
 def _named(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -62,6 +68,9 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
         if not _set(data, path, value):
             known = known or read(scene)
             raise _unknown(path, known)
+    for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
+        if "tip" in beam["ends"]:
+            beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
     return Scene.from_data(data)
 
 
