@@ -9,9 +9,9 @@ from importlib.resources import files
 import numpy as np
 
 from mstmm.ir import KernelIR
-from mstmm.runtime import vectorized
 from mstmm.stored import element_from_json
 
+from .. import vectorized
 from .modal_body import Array
 
 
