@@ -13,11 +13,12 @@ from mstmm.scene_parts import Load
 from .bases import shapes_of
 from .beam_data import BeamData, beam_data
 from .beam_shapes import DIRECTIONS, BeamShapes, Mode
-from .choices import Choice, choices, wants_quadrature
+from .choices import BENDING, Choice, choices, wants_quadrature
 from .frames import in_frame
 from .holding import Holding, Surroundings, holding
 from .modal_body import Array, MassPoint, ModalBody
 from .moments import drag_moments, mass_moments, stiffness
+from .planar import Planar
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -29,15 +30,17 @@ class BeamBodies:
 
     def __init__(self, scene: Scene) -> None:
         self._around = Surroundings(scene)
+        self._plane = Planar(scene) if any(beam.modes is None for beam in scene.beam) else None
         self._known: dict[str, ModalBody] = {}
 
     def body(self, beam: Beam) -> ModalBody:
         """The numbers of one beam.  SceneError for shapes that cannot be told apart."""
         data = beam_data(beam)
         held = holding(self._around, beam, data)
-        key = repr((beam.model_copy(update={"name": ""}), held))
+        idle = self._idle(beam)
+        key = repr((beam.model_copy(update={"name": ""}), held, sorted(idle)))
         if key not in self._known:
-            self._known[key] = _made(beam, data, held)
+            self._known[key] = _made(beam, data, held, idle)
         core = self._known[key]
         assert core.shapes is not None
         spans = {
@@ -46,6 +49,15 @@ class BeamBodies:
             if isinstance(load, Load) and load.force_per_length is not None
         }
         return replace(core, name=beam.name, ports={**core.ports, **spans})
+
+    def _idle(self, beam: Beam) -> frozenset[str]:
+        """Directions in which nothing moves the beam; asked for where the shapes are "auto"."""
+        if self._plane is None or beam.modes is not None:
+            return frozenset()
+        stays = {
+            word for word, axis in (("y", 1), ("z", 2)) if not self._plane.leaves(beam.name, axis)
+        }
+        return frozenset(stays | ({"twist"} if stays else set()))
 
 
 def beam_body(scene: Scene, beam: Beam) -> ModalBody:
@@ -58,10 +70,10 @@ def _span(load: Load, length: float) -> tuple[float, float]:
     return start, min(end, length)
 
 
-def _made(beam: Beam, data: BeamData, held: Holding) -> ModalBody:
-    chosen = choices(beam, data, held)
+def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> ModalBody:
+    chosen = choices(beam, data, held, idle)
     modes: list[Mode] = []
-    notes: list[str] = []
+    notes = [f"{d}: none, because the scene stays in a plane" for d in BENDING if d in idle]
     for choice in chosen:
         shapes = shapes_of(data, choice.direction, choice.basis, choice.count)
         made, said = in_frame(data, choice.direction, shapes, choice.frame)

@@ -12,10 +12,11 @@ where a hinge carries a moment there, or a mass of a tenth of the beam's or more
 Number of shapes per bending direction: three eigenfunctions (four in the mean frame), or all static
 shapes and two more.  Twist and axial shapes join where their stiffness and inertia are given and
 their first frequency is below three times the highest of bending: beyond, they follow the loads at
-once and cost only small steps.
+once and cost only small steps.  A scene that stays in a plane (`planar`) gets the shapes of that
+plane alone.
 
-Quadrature: stiffened beams with a tangent frame at a section that is free to turn and four shapes
-or more in that direction; the moments of second order would lose their definite mass matrix.
+Quadrature: stiffened beams with a tangent frame at a section that is free to turn and two shapes or
+more in that direction; the moments of second order would lose their definite mass matrix.
 """
 
 from __future__ import annotations
@@ -59,14 +60,16 @@ class Choice:
     why: str
 
 
-def choices(beam: Beam, data: BeamData, held: Holding) -> tuple[Choice, ...]:
-    """One choice per direction that has shapes."""
+def choices(
+    beam: Beam, data: BeamData, held: Holding, idle: frozenset[str] = frozenset()
+) -> tuple[Choice, ...]:
+    """One choice per direction that has shapes; "auto" gives the directions in `idle` none."""
     frames = {d: _frame(beam, data, held, d) for d in BENDING}
     made = []
     for direction in BENDING:
         frame, why = frames[direction]
         basis = _basis(beam, data, held, direction, frame)
-        count = _count(beam, direction, frame, basis)
+        count = 0 if _left_out(beam, direction, idle) else _count(beam, direction, frame, basis)
         if count:
             made.append(Choice(direction, frame, basis, count, why))
     highest = max((_frequency(data, c) for c in made), default=0.0)
@@ -74,7 +77,7 @@ def choices(beam: Beam, data: BeamData, held: Holding) -> tuple[Choice, ...]:
         frame = _rod_frame(beam, held, frames["y"][0])
         basis = _basis(beam, data, held, direction, frame)
         count = _rod_count(beam, data, direction, basis, highest)
-        if count:
+        if count and not _left_out(beam, direction, idle):
             made.append(Choice(direction, frame, basis, count, ""))
     return tuple(made)
 
@@ -87,7 +90,7 @@ def wants_quadrature(beam: Beam, held: Holding, chosen: tuple[Choice, ...]) -> b
         c.direction in held.turns
         and c.direction not in held.heavy_rotor | held.sprung
         and c.frame == Frame("tangent", held.x)
-        and c.count >= 4
+        and c.count >= 2
         for c in chosen
     )
 
@@ -157,6 +160,10 @@ def _all_others(data: BeamData, held: Holding, base: float) -> tuple[float, ...]
 
 
 # --- number of shapes -----------------------------------------------------------------------------
+
+
+def _left_out(beam: Beam, direction: str, idle: frozenset[str]) -> bool:
+    return beam.modes is None and direction in idle
 
 
 def _count(beam: Beam, direction: str, frame: Frame, basis: Basis) -> int:

@@ -110,12 +110,12 @@ def test_a_beam_in_equal_pieces_has_the_shapes_of_a_uniform_one(
     basis: str, key: str, exact: list[float]
 ) -> None:
     """The shapes found by elements on a beam whose pieces happen to be equal."""
-    same = [{"from": 0.0, "to": 0.35}, {"from": 0.35, "to": 1.0}]
-    data = {"torsional_stiffness": 0.3, "axial_stiffness": 1.0, "polar_inertia_per_length": 0.3}
-    body, plain = (
-        body_of(HELD, modes={key: 3}, basis=basis, **data, **more)
-        for more in ({"section": same}, {})
-    )
+    data: dict[str, Any] = {
+        "torsional_stiffness": 0.3, "axial_stiffness": 1.0, "polar_inertia_per_length": 0.3,
+        "modes": {key: 3}, "basis": basis,
+    }  # fmt: skip
+    plain = body_of(HELD, **data)
+    body = body_of(HELD, section=[{"from": 0.0, "to": 0.35}, {"from": 0.35, "to": 1.0}], **data)
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(body.Mff, body.K)).real)
     power = 4 if key == "y" else 2
     assert squares ** (1 / power) == pytest.approx(exact, rel=3e-4)
@@ -180,7 +180,7 @@ def test_shapes_that_cannot_be_told_apart_are_refused() -> None:
 
 
 def test_rigid_shapes_leave_nothing_in_any_frame() -> None:
-    beam = {"rotary_inertia": 0.01, "polar_inertia_per_length": None}
+    beam: dict[str, Any] = {"rotary_inertia": 0.01, "polar_inertia_per_length": None}
     shapes = body_of(HELD, **beam).shapes
     assert shapes is not None
     line = Piecewise(np.array([0.0, 1.0]), np.array([[2.0, 3.0]]))
