@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mstmm.scene import Hinge
 
 from . import prebuilt
+from .flexible.pivots import ModalPivots
 from .pack import Packed, kernel_type
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ class _Pivots:
         self.release = records.column("release").astype(np.int64)
         self.rotor = _pointed(packed, "rotor", "real *", count)
         self.imposed = _pointed(packed, "imposed_mask", "int *", count) != 0
+        self.modal = ModalPivots(packed)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
         """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.
@@ -118,8 +120,10 @@ class _Pivots:
         inverse = np.linalg.inv(D)
         given_way = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
         turn = numbers[self.turn].reshape(-1, 3, 3)
-        passed = given_way @ _carried_motion(turn, numbers[self.shift])
+        carried = _carried_motion(turn, numbers[self.shift])
         E = np.abs(np.diagonal(S, axis1=1, axis2=2))[:, :, None] * np.eye(6)
+        self.modal.through(numbers, S, carried, self.parents, E)
+        passed = given_way @ carried
         for i in range(len(self.parents) - 1, -1, -1):
             parent = self.parents[i]
             if parent >= 0:

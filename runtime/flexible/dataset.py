@@ -18,6 +18,9 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 #: Stations along a beam at which its shapes are written.
 STATIONS = 41
 
+#: Flexible bodies up to which the shapes of each are written; of more the scene in the file tells.
+_WRITTEN = 40
+
 
 def labels(result: Result) -> dict[str, tuple[str, list[str], str]]:
     """Name -> (dimension, words, long name)."""
@@ -51,9 +54,9 @@ def variables(result: Result) -> dict[str, Variable]:
         values = np.stack([getattr(result, method)(name) for name in known], axis=1)
         label = _about(about.unit, f"{about.long_name}, inertial axes")
         found[f"flexible_{kind}"] = (("time", "flexible", "axis"), values, label)
-    for name, body in known.items():
-        if body.shapes is not None:
-            found |= _shapes(name, body)
+    if len(known) <= _WRITTEN:
+        for name, body in known.items():
+            found |= {} if body.shapes is None else _shapes(name, body)
     return found
 
 

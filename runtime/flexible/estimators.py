@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .observe import Motion, tilde
+from .observe import Motion, tilde, values_at
 from .observe_energy import modal_energy
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def _all_turns(motion: Motion) -> list[Array]:
     body = motion.body
     if body.shapes is not None:
         places = np.linspace(0.0, body.shapes.length, SECTIONS)
-        return [np.einsum("mak,tk->tma", body.shapes.at(places).theta, motion.eta)]
+        return [np.einsum("mak,tk->tma", values_at(body.shapes, places).theta, motion.eta)]
     return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
 
 
@@ -76,13 +76,13 @@ def second_order(body: ModalBody) -> SecondOrder | None:
     G, X = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
     x, weights = body.shapes.rule()
     mass = weights * body.shapes.sections(x).mass_per_length
-    along = body.shapes.at(x).shortening
+    along = values_at(body.shapes, x).shortening
     G[0] = np.einsum("m,mkl->kl", mass, along)
     X[0, 0] = np.einsum("m,mkl->kl", mass * x, along)
     ends = {}
     for name, port in body.ports.items():
         ends[name] = np.zeros((3, n, n))
-        ends[name][0] = body.shapes.at(port.position[:1]).shortening[0]
+        ends[name][0] = values_at(body.shapes, port.position[:1]).shortening[0]
     return SecondOrder(G, X, ends)
 
 
@@ -161,7 +161,10 @@ def shear_error(body: ModalBody) -> float | None:
         gyration = np.sqrt(np.max(sections.rho_I[about] / sections.mass_per_length))
         if not bent or not gyration > 0:
             continue
-        phi, bending = shapes.at(x).phi[:, "xyz".index(plane)], shapes.at(x).curvature[:, about]
+        phi, bending = (
+            values_at(shapes, x).phi[:, "xyz".index(plane)],
+            values_at(shapes, x).curvature[:, about],
+        )
         squares = (weights @ bending[:, bent] ** 2) / (weights @ phi[:, bent] ** 2)
         fourth = np.max(squares)  # int phi''^2 / int phi^2 = beta^4
         error = 0.5 * np.sqrt(fourth) * gyration**2 * (_SHEAR + float(not shapes.data.rotary))

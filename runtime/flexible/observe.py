@@ -8,7 +8,7 @@ displacement along the beam, v and w across, Psi = (twist, -w', v').
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
-    from .beam_shapes import BeamShapes
+    from .beam_shapes import BeamShapes, ShapeValues
     from .modal_body import ModalBody
 
 Array = NDArray[np.float64]
@@ -128,9 +128,19 @@ def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     return np.asarray(np.clip(places, 0.0, length))
 
 
+def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
+    """Values of the shapes at x (m,), kept for the next who asks for the same places."""
+    return _kept(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=64)
+def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
+    return shapes.at(np.frombuffer(places))
+
+
 def deflection(motion: Motion, places: Array) -> Array:
     """(n, m, 3) elastic displacement in m of the axis at x, frame axes, shortening included."""
-    at = motion.shapes.at(places)
+    at = values_at(motion.shapes, places)
     moved = np.einsum("mak,tk->tma", at.phi, motion.eta)
     if motion.shapes.stiffening:
         moved[:, :, 0] -= 0.5 * bilinear(at.shortening, motion.eta, motion.eta)
@@ -144,7 +154,7 @@ def bilinear(matrices: Array, a: Array, b: Array) -> Array:
 
 def turns(motion: Motion, places: Array) -> Array:
     """(n, m, 3) rotation vectors in rad of the sections against the frame: twist, -w', v'."""
-    return np.einsum("mak,tk->tma", motion.shapes.at(places).theta, motion.eta)
+    return np.einsum("mak,tk->tma", values_at(motion.shapes, places).theta, motion.eta)
 
 
 def slope(motion: Motion, places: Array) -> Array:
@@ -155,7 +165,7 @@ def slope(motion: Motion, places: Array) -> Array:
 
 def curvature(motion: Motion, places: Array) -> Array:
     """(n, m, 2) curvature in 1/m about y, -w'', and about z, v''."""
-    bent = motion.shapes.at(places).curvature[:, 1:]
+    bent = values_at(motion.shapes, places).curvature[:, 1:]
     return np.einsum("mak,tk->tma", bent, motion.eta)
 
 
@@ -196,7 +206,7 @@ def elastic_moment(motion: Motion, places: Array) -> Array:
 
 def elastic_force(motion: Motion, places: Array) -> Array:
     """(n, m) axial force EA s' in N of the axial shapes; SceneError for a beam without them."""
-    at = motion.shapes.at(places)
+    at = values_at(motion.shapes, places)
     if not at.stretch.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '

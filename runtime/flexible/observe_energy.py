@@ -45,7 +45,7 @@ def strain_energy(motion: Motion) -> Array:
 
 def frequencies(body: ModalBody) -> Array:
     """(n,) rad/s, ascending: of the modes while the floating frame stands still."""
-    from scipy.linalg import eigvalsh
-
-    squares = eigvalsh(body.K, modal_mass(body))
+    lower = np.linalg.cholesky(modal_mass(body))
+    half = np.linalg.solve(lower, body.K)
+    squares = np.linalg.eigvalsh(np.linalg.solve(lower, half.T))
     return np.sqrt(np.maximum(squares, 0.0))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .observe import Motion, bilinear, deflection, section_rotations, tilde, turns
+from .observe import Motion, bilinear, deflection, section_rotations, tilde, turns, values_at
 
 Array = NDArray[np.float64]
 
@@ -158,7 +158,7 @@ def _places(motion: Motion, x: Array) -> Array:
 
 def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
     """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
-    body, shapes, at = motion.body, motion.shapes, motion.shapes.at(x)
+    body, shapes, at = motion.body, motion.shapes, values_at(motion.shapes, x)
     sections = shapes.sections(x)
     place = _places(motion, x)
     moving = np.einsum("mak,tk->tma", at.phi, motion.etad)
@@ -194,7 +194,7 @@ def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     shapes = motion.shapes
     theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
     if motion.body.points:
-        theta = shapes.at(x).theta
+        theta = values_at(shapes, x).theta
     turned, rate, growth = (
         tilde(np.einsum("mak,tk->tma", theta, modal))
         for modal in (motion.eta, motion.etad, motion.etadd)
