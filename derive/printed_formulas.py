@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from . import printed_checks as checks
+from . import printed_elastic as elastic
 
 
 @dataclass(frozen=True)
@@ -171,6 +172,27 @@ PRINTED_FORMULAS: tuple[PrintedFormula, ...] = (
         "Neither contains the position or the velocity of the origin.",
         lambda: checks.relative_form() and checks.no_velocity_of_origin(),
     ),
+    PrintedFormula(
+        "(2.81), (2.82), second row", "elastic equations in partitioned form", "misprint",
+        "M_fr ddu_r + M_rf ddu_f + K_ff u_f = F_f", "M_fr ddu_r + M_ff ddu_f + K_ff u_f = F_f",
+        "M_rf has a row per rigid coordinate and does not fit; the text below it names M_ff as the "
+        "mass matrix of the deformation.",
+        elastic.modal_rows,
+    ),
+    PrintedFormula(
+        "(2.84), (2.85)", "shape functions of the rectangle", "convention",
+        "b and c are its length and width", "b and c are half its length and width",
+        "The figure shows edges 2b and 2c; only then is each function 1 at its own node and 0 at "
+        "the others.",
+        elastic.half_edges,
+    ),
+    PrintedFormula(
+        "(2.86), (2.87)", "rectangle in a finite rotation", "convention",
+        "S U^T = R + A x", "S U = R + A x",
+        "U is a column. The element moves as a rigid body without strain, because its shape "
+        "functions sum up to one and reproduce its coordinates.",
+        elastic.finite_rotation,
+    ),
 )  # fmt: skip
 
 
@@ -181,8 +203,9 @@ L. Jing, O. Stephansson, *Fundamentals of Discrete Element Methods for Rock Engi
 angular velocity, `domega` its rate in body axes, `a0` the acceleration of the body's origin `X0`,
 `r_c` the mass centre, `J` the inertia tensor about the origin, `ddX` a second derivative. *Holds*
 means that the derived form agrees identically, *convention* that it agrees when read as the remark
-says, *misprint* that it does not agree. Every verdict is computed by `mstmm.derive.printed_checks`;
-this page is written from `mstmm.derive.printed_formulas`, and the tests repeat the checks.
+says, *misprint* that it does not agree. Every verdict is computed by `mstmm.derive.printed_checks`
+or `mstmm.derive.printed_elastic`; this page is written from `mstmm.derive.printed_formulas`, and
+the tests repeat the checks.
 
 """
 

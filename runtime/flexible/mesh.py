@@ -183,7 +183,7 @@ class MeshStress:
 
     def __call__(self, static: ArrayLike, shapes: ArrayLike) -> Array:
         """(loads, n, n) N/m of shapes (u, n) under the stresses of `static` (u, loads)."""
-        states, modes = self._gradients(np.asarray(static)), self._gradients(np.asarray(shapes))
+        states, modes = self.gradients(np.asarray(static)), self.gradients(np.asarray(shapes))
         weights = np.asarray(self.basis.dx).reshape(-1)
         n = modes.shape[0]
         found = np.zeros((states.shape[0], n, n))
@@ -202,7 +202,7 @@ class MeshStress:
         volume = np.einsum("iip->p", strain)
         return np.asarray(2 * second * strain + first * np.eye(3)[:, :, None] * volume)
 
-    def _gradients(self, fields: Array) -> Array:
+    def gradients(self, fields: Array) -> Array:
         """(k, 3, 3, points): derivative of component c along i at the points of integration."""
         return np.stack([
             np.asarray(self.basis.interpolate(field).grad).reshape(3, 3, -1) for field in fields.T

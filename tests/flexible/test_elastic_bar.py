@@ -7,6 +7,8 @@ import pytest
 from flexible import elastic_bar as bar
 from scipy import linalg
 
+from mstmm.runtime.flexible.mesh import MeshStress
+
 #: Of the clamped bar by beam theory: bending along z, along y, along z, along y, rad/s.
 BEAM = np.array([103.36, 258.40, 647.75, 1619.4])
 
@@ -24,6 +26,21 @@ def test_matrices_carry_rigid_motions() -> None:
     assert force < 2e-15
     assert model.mass.shape == (1107, 1107)
     assert np.allclose(model.inertia[:3, :3], bar.MASS * np.eye(3), rtol=1e-13)
+
+
+def test_elements_turn_without_strain() -> None:
+    """In any finite rotation, as the rectangle of Jing, Stephansson (2.83) to (2.87) does: the
+    displacement gradient is A - 1 everywhere, because coordinates are fields of the elements."""
+    model = bar.model()
+    a, b = np.array([1.0, 2.0, -0.5]), 1.9
+    axis = a / np.linalg.norm(a)
+    tilde = np.cross(np.eye(3), axis)
+    turn = np.eye(3) - np.sin(b) * tilde + (1 - np.cos(b)) * tilde @ tilde
+    assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    moved = (model.nodes @ (turn - np.eye(3)).T).reshape(-1, 1)
+    assert isinstance(model.stress, MeshStress)
+    gradients = model.stress.gradients(moved)[0]
+    assert np.abs(gradients - (turn - np.eye(3))[:, :, None]).max() < 1e-12
 
 
 def test_frequencies_of_the_cantilever() -> None:
