@@ -27,6 +27,7 @@ def scene_of(planar: bool, stiffening: bool, rotary: bool) -> Scene:
         "bending_stiffness": [7.5, 4.0],
         "stiffening": stiffening,
         "frame": "tangent",
+        "quadrature": False,
         "shapes": shapes,
     }
     if not planar:

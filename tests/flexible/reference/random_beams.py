@@ -42,6 +42,7 @@ def random_beam(rng: Generator, name: str, planar: bool = False, stiffening: boo
         "mass_per_length": mass,
         "bending_stiffness": [float(v) for v in rng.uniform(5, 50, 2)],
         "stiffening": stiffening,
+        "quadrature": False,
         "frame": str(rng.choice(["tangent", "tangent@mid", "tangent@tip", "chord", "mean"])),
         "ends": {
             "mid": 0.4 * length,
