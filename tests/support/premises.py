@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import Any
 
 import mpmath
 import sympy as sp
+from sympy.matrices.expressions.matexpr import MatrixElement
 
 from mstmm.derive.derivation import Derivation, Equation
-from mstmm.derive.notation import Matrix, explicit, matrix_symbols
+from mstmm.derive.notation import Perp, Tilde
 
 DIGITS = 80
 #: Step of the differences; their error is its square.
 STEP = mpmath.mpf(10) ** -25
 
 Values = Mapping[str, mpmath.matrix]
+#: First parts of the names of a state's blocks.
+STATE_BLOCKS = ("r", "theta", "psi", "m", "q", "eta")
 
 
 class Premises:
@@ -28,18 +31,17 @@ class Premises:
 
     def __init__(self, derivation: Derivation) -> None:
         given = {q.name for q in derivation.inputs}
-        self.steps = [_compiled(e, _assigns(e, given)) for e in derivation.premises]
+        self.steps = [(e, _assigns(e, given)) for e in derivation.premises]
 
     def residuals(self, values: Values) -> dict[str, mpmath.matrix]:
         """Condition's name -> left minus right."""
         known, found = dict(values), {}
-        for name, target, arguments, function in self.steps:
-            flat = [known[symbol][place] for symbol, place in arguments]
-            result = mpmath.matrix(function(*flat))
+        for equation, target in self.steps:
+            value = matrix(equation.right, known)
             if target is not None:
-                known[target] = result
+                known[target] = value
             else:
-                found[name] = result
+                found[equation.name] = matrix(equation.left, known) - value
         return found
 
     def linearised(self, start: Values, step: Values) -> dict[str, mpmath.matrix]:
@@ -64,29 +66,55 @@ def _assigns(equation: Equation, given: set[str]) -> str | None:
     return None if ends or name in given else name
 
 
-#: First parts of the names of a state's blocks.
-STATE_BLOCKS = ("r", "theta", "psi", "m", "q", "eta")
-
-Step = tuple[str, str | None, list[tuple[str, tuple[int, int]]], Any]
-
-
-def _compiled(equation: Equation, target: str | None) -> Step:
-    value = explicit(equation.right)
-    if target is None:
-        value = Matrix(explicit(equation.left) - value)
-    symbols = sorted(matrix_symbols(value), key=lambda s: str(s.name))
-    entries = [entry for symbol in symbols for entry in symbol.as_explicit()]
-    names = [sp.Dummy(f"x{k}") for k in range(len(entries))]
-    plain = value.xreplace(dict(zip(entries, names, strict=True)))
-    arguments = [
-        (str(s.name), (i, j)) for s in symbols for i in range(s.rows) for j in range(s.cols)
-    ]
-    return equation.name, target, arguments, sp.lambdify(names, plain.tolist(), "mpmath")
+def matrix(e: sp.Basic, known: Values) -> mpmath.matrix:
+    """A matrix expression of named arrays."""
+    if isinstance(e, sp.MatrixSymbol):
+        return known[str(e.name)]
+    if isinstance(e, sp.MatrixBase):
+        return mpmath.matrix([[scalar(x, known) for x in e.row(i)] for i in range(e.rows)])
+    if isinstance(e, sp.ZeroMatrix):
+        return mpmath.zeros(int(e.rows), int(e.cols))
+    for kind, rule in _RULES.items():
+        if isinstance(e, kind):
+            parts: tuple[sp.Basic, ...] = e.args  # type: ignore[attr-defined]
+            return rule([_any(part, known) for part in parts])
+    if isinstance(e, sp.BlockMatrix):
+        stacked = [matrix(e.blocks[k, 0], known) for k in range(e.blocks.rows)]
+        return mpmath.matrix([row for block in stacked for row in block.tolist()])
+    raise NotImplementedError(f"no value of {type(e).__name__}")
 
 
-@cache
-def premises_of(name: str) -> Premises:
-    """Premises of a generated flexible classical matrix."""
-    from mstmm.derive.classical import CLASSICAL
+def _any(e: sp.Basic, known: Values) -> Any:
+    return matrix(e, known) if getattr(e, "is_Matrix", False) else scalar(e, known)
 
-    return Premises(CLASSICAL[name]())
+
+def _tilde(a: mpmath.matrix) -> mpmath.matrix:
+    return mpmath.matrix([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+_RULES: dict[type, Callable[[list[Any]], mpmath.matrix]] = {
+    sp.MatAdd: lambda parts: reduce(lambda a, b: a + b, parts),
+    sp.MatMul: lambda parts: reduce(lambda a, b: a * b, parts),
+    sp.Transpose: lambda parts: parts[0].T,
+    Tilde: lambda parts: _tilde(parts[0]),
+    Perp: lambda parts: mpmath.matrix([-parts[0][1], parts[0][0]]),
+    sp.MatPow: lambda parts: parts[0] ** int(parts[1]),
+}
+
+
+def scalar(e: sp.Basic, known: Values) -> Any:
+    """A scalar expression of entries of named arrays."""
+    if isinstance(e, MatrixElement):
+        return known[str(e.parent.name)][int(e.i), int(e.j)]
+    if isinstance(e, sp.Rational):
+        return mpmath.mpf(int(e.p)) / int(e.q)
+    return _FUNCTIONS[type(e)](*(scalar(part, known) for part in e.args))
+
+
+_FUNCTIONS: dict[type, Callable[..., Any]] = {
+    sp.Add: lambda *a: mpmath.fsum(a),
+    sp.Mul: lambda *a: mpmath.fprod(a),
+    sp.Pow: mpmath.power,
+    sp.cos: mpmath.cos,
+    sp.sin: mpmath.sin,
+}
