@@ -97,7 +97,8 @@ def _one(flexible: FlexibleBodies, name: str, coupling: Array | None) -> Flexibi
     first = float(frequencies(body)[0])
     judged = shapes is not None and slope > _STRAIGHT
     return Flexibility(
-        name, len(body.modes), body.frame, shapes is not None and bool(shapes.stiffening),
+        name, len(body.modes), body.frame,
+        bool(np.any(body.G)) if shapes is None else bool(shapes.stiffening),
         slope, e.largest_turn(motion), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         _tail(flexible, name, some) if judged else None, _leading(motion, coupling),
@@ -219,17 +220,18 @@ def _worst_first(found: Sequence[Flexibility]) -> list[Flexibility]:
 
 
 def _linear(one: Flexibility) -> str:
-    if one.stiffening or one.gamma is None:
+    if one.stiffening:
         return ""
     if one.spin_ratio > SPIN:
+        way_out = "leave stiffening on" if one.gamma else "model it by beams, or from a mesh"
         return (
-            f'beam "{one.name}" has stiffening = false and spins at {one.spin_ratio:.2g} times its '
-            "first frequency: its deflection grows without bound where a real beam stiffens; "
-            "leave stiffening on"
+            f'"{one.name}" has no geometric stiffening and spins at {one.spin_ratio:.2g} times its '
+            "first frequency: its deflection grows without bound where a real body stiffens; "
+            f"{way_out}"
         )
     if one.load_ratio > GAMMA:
         return (
-            f'beam "{one.name}" has stiffening = false, but its loads change its stiffness by '
+            f'"{one.name}" has no geometric stiffening, but its loads change its stiffness by '
             f"{one.load_ratio:.0%} (gamma): deflections err by about as much; leave stiffening on"
         )
     return ""

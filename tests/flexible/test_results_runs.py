@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flexible import elastic_bar
 from numpy.typing import NDArray
 
 import mstmm
@@ -246,3 +247,29 @@ def test_a_table_has_a_column_for_every_mode(run: Result, tmp_path: Path) -> Non
         assert column in header
     text = run.table("blade.tip.deflection.y", "blade.strain_energy", rows=3)
     assert "blade.tip.deflection.y" in text and "[J]" in text
+
+
+def test_an_elastic_body_has_what_needs_no_axis(tmp_path: Path) -> None:
+    bob = {"name": "bob", "mass": 0.1, "inertia": [1e-5] * 3}
+    hinges = [
+        {"name": "pivot", "type": "pin", "axis": [0, 1, 0], "inboard": "ground",
+         "outboard": "bar.root"},
+        {"name": "weld", "type": "fixed", "inboard": "bar.tip", "outboard": "bob"},
+    ]  # fmt: skip
+    box = elastic_bar.table(box=elastic_bar.short(3))
+    scene = mstmm.Scene(gravity=(0, 0, -9.81), elastic=[box], body=[bob], hinge=hinges)
+    run = mstmm.compile(scene, engine="looped").simulate(0.02, output_times=np.linspace(0, 0.02, 6))
+    total = run.momentum_of("bar") + run.momentum_of("bob")
+    np.testing.assert_allclose(total, run.momentum(), atol=1e-14)
+    np.testing.assert_allclose(
+        run.modal_energy("bar").sum(axis=1) >= run.strain_energy("bar"), True
+    )
+    (bar,) = run.certificate.flexible
+    assert bar.gamma is not None and bar.tail is None and run.warnings == ()
+    assert run.pictures() == ("shape", "bar.shape", "bar.modal_energy")
+    assert len(run.plot("shape").axes) == 2
+    again = mstmm.load_result(run.save(tmp_path / "bar.nc"))
+    np.testing.assert_array_equal(again.modal_energy("bar"), run.modal_energy("bar"))
+    for ask in (run.deflection, run.curvature, run.bending_moment):
+        with pytest.raises(mstmm.SceneError, match=r'"bar": \w+ is known along beams'):
+            ask("bar", 0.1)
