@@ -44,7 +44,7 @@ def compile_scene(
         scene: validated scene (`load_scene`, or `Scene(...)`).
         engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
-            up to about 60 bodies), or "auto": fused code that is in the cache is used, and a run
+            up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache is used, and a run
             or batch long enough to repay the compiler has it built.
         sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
             matrices, chains only, guarded).
@@ -66,7 +66,7 @@ def compile_scene(
         raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
     if not accuracy > 0:
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
-    from .fusion import Fusion
+    from .fusion import MOST_ASKED, MOST_BODIES, Fusion
     from .runtime import store
     from .runtime.flexible.rigidified import with_level
     from .runtime.model import Model
@@ -84,9 +84,10 @@ def compile_scene(
             'it goes with engine = "fused"'
         )
     refused = "asked for" if engine == "looped" else ""
+    most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
     def fusing(packed: Packed, known: Known) -> Fusion:
-        return Fusion(packed, known, definitions, refused, bake)
+        return Fusion(packed, known, definitions, refused, bake, most)
 
     model = Model(scene, elements, fusing, product)
     model.refuse_undetermined_start()

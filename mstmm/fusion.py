@@ -29,9 +29,11 @@ if TYPE_CHECKING:
     from .derive.fuse import Fused
     from .runtime.pack import Known, Packed
 
-#: More bodies than this are not fused: the compiler's time grows with their square while the
-#: advantage over the looped engine shrinks.
+#: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
+#: asks for it: the compiler's time grows with their square while the advantage shrinks.
 MOST_BODIES = 64
+#: More than this are not fused at all: the compiler would take many minutes.
+MOST_ASKED = 400
 #: Seconds that a compiler takes for the scalar code, by bodies and their square, and seconds that
 #: one evaluation saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
@@ -63,9 +65,10 @@ class Fusion:
         definitions: Mapping[Key, ElementSpec],
         obstacle: str = "",
         bake: bool = False,
+        most: int = MOST_BODIES,
     ) -> None:
         self._definitions = definitions
-        self.obstacle = obstacle or _obstacle(packed)
+        self.obstacle = obstacle or _obstacle(packed, most)
         self._looped_by_nature = bool(self.obstacle)
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
@@ -209,14 +212,15 @@ def _note(built: Built) -> str:
     return f"its code was compiled in {built.seconds:.2f} s and kept{more}"
 
 
-def _obstacle(packed: Packed) -> str:
+def _obstacle(packed: Packed, most: int) -> str:
     """Why a scene is not fused; empty if it can be."""
     count = int(packed.model.n_bodies)
     if packed.releases:
         names = ", ".join(f'"{name}"' for name in packed.releases)
         return f"hinge {names} is released during the run, which changes the structure"
-    if count > MOST_BODIES:
-        return f"it has {count} bodies; fused code is for {MOST_BODIES} at most"
+    if count > most:
+        asked = f' ({MOST_ASKED} with engine = "fused")' if most < MOST_ASKED else ""
+        return f"it has {count} bodies; fused code is for {most} at most{asked}"
     if packed.model.product != packed.ffi.NULL:
         return "the product of classical matrices is looped"
     if any(packed.model.bodies[i].tape != packed.ffi.NULL for i in range(count)):

@@ -13,8 +13,9 @@ from support.result_scenes import pins
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.fusion import MOST_BODIES, PRINTERS
+from mstmm.fusion import MOST_ASKED, MOST_BODIES, PRINTERS, Fusion
 from mstmm.ir import KernelIR
+from mstmm.runtime.pack import pack
 from mstmm.runtime.structure import structure_of
 
 
@@ -131,7 +132,7 @@ def released() -> mstmm.Scene:
 
 
 def long() -> mstmm.Scene:
-    return chain(MOST_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
+    return chain(MOST_ASKED + 1, PLANAR, FULL, [0, -9.81, 0])
 
 
 @pytest.mark.parametrize(("scene", "reason"), [(released, "released"), (long, "bodies")])
@@ -142,6 +143,12 @@ def test_what_cannot_be_fused_says_why(scene: Any, reason: str) -> None:
     assert reason in model.engine_choice
     with pytest.raises(SceneError, match=reason):
         mstmm.compile(scene(), engine="fused")
+
+
+def test_scenes_too_large_for_auto_are_fused_when_asked_for() -> None:
+    large = chain(MOST_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
+    assert "bodies" in mstmm.compile(large).engine_choice
+    assert not Fusion(pack(large), {}, {}, most=MOST_ASKED).obstacle
 
 
 def test_contradictory_wishes_are_refused() -> None:
