@@ -7,6 +7,7 @@ Floating-frame description with the shapes of a finite-element model (Rui, Wang,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,8 @@ Array = NDArray[np.float64]
 
 #: Fixed-interface modes where the scene leaves their number open.
 AUTO_MODES = 4
+#: Bodies whose numbers are kept.
+KEPT = 8
 #: Entries below this part of the largest of their kind are rounding, and become exact zeros.
 _ROUNDING = 1e-10
 
@@ -52,17 +55,41 @@ def elastic_bodies(scene: Scene) -> dict[str, ModalBody]:
 
 
 def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
-    """The modal body of one [[elastic]] table of a scene, whatever its model."""
-    model = model_of(elastic)
+    """The modal body of one [[elastic]] table of a scene, whatever its model.
+
+    The last few are kept: a scene is compiled again for other parameters of other bodies.
+    """
     holder = _holder(elastic.name, scene)
     held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
-    used = _used(elastic.name, scene) | {held}
-    ports = [
-        port(model, name, end, name in used if end.static_shapes is None else end.static_shapes)
-        for name, end in elastic.ends.items()
-    ]
-    ports = [p if p.name != held else port(model, held, elastic.ends[held], True) for p in ports]
-    frame, why = _frame(elastic, holder, held)
+    used = frozenset(_used(elastic.name, scene) | {held})
+    return _made(_Source(elastic), held, used, *_frame(elastic, holder, held))
+
+
+class _Source:
+    """A table and the file it names, equal where both are the same."""
+
+    def __init__(self, elastic: Elastic) -> None:
+        self.elastic = elastic
+        path = Path(elastic.matrices or elastic.mesh or "")
+        stamp = path.stat() if path.is_file() else None
+        file = None if stamp is None else (stamp.st_mtime_ns, stamp.st_size)
+        self._key = (elastic.model_dump_json(), str(path.absolute()), file)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Source) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@lru_cache(maxsize=KEPT)
+def _made(source: _Source, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
+    elastic = source.elastic
+    model = model_of(elastic)
+    ports = []
+    for name, end in elastic.ends.items():
+        loaded = name in used if end.static_shapes is None else end.static_shapes
+        ports.append(port(model, name, end, loaded or name == held))
     modes = AUTO_MODES if elastic.modes is None else elastic.modes
     notes = [f"frame: {why}"]
     if elastic.modes is None:
