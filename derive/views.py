@@ -78,9 +78,12 @@ def _of_step(kind: str, name: str) -> ElementView:
     return _view(f"{kind}_{name}", title, kernels, (), lambda: element_source(spec()))
 
 
-_TITLES = {"frames": "poses, points and loads", "laws": "laws on hinge coordinates"} | {
-    f"generic{nu}": f"sweep across a hinge with {nu} speeds" for nu in range(MAX_SPEEDS + 1)
-}
+_TITLES = {
+    "frames": "poses, points and loads",
+    "laws": "laws on hinge coordinates",
+    "beam": "Euler-Bernoulli beam",
+    "modal": "flexible bodies",
+} | {f"generic{nu}": f"sweep across a hinge with {nu} speeds" for nu in range(MAX_SPEEDS + 1)}
 
 
 def _spec_of_step(kind: str, name: str) -> ElementSpec:

@@ -1,0 +1,116 @@
+"""The beam's integrands against integrals over a real section, and its second-order displacement
+against the length of the bent axis."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import pytest
+import sympy as sp
+
+from mstmm.derive.evaluate import evaluate
+from mstmm.derive.flexible import beam_fields
+from mstmm.derive.lower import lower
+
+Y, Z = sp.symbols("y z", real=True)
+WIDTH, HEIGHT, DENSITY = sp.Rational(3, 10), sp.Rational(1, 5), sp.Rational(7, 2)
+
+
+def over_rectangle(integrand: sp.Matrix, weight: sp.Expr) -> sp.Matrix:
+    """int weight integrand dA over |y| < WIDTH/2, |z| < HEIGHT/2."""
+    return sp.Matrix(integrand).applyfunc(
+        lambda e: sp.integrate(weight * e, (Y, -WIDTH / 2, WIDTH / 2), (Z, -HEIGHT / 2, HEIGHT / 2))
+    )
+
+
+def outputs(name: str, inputs: dict[str, list[sp.Rational]]) -> dict[str, list[Any]]:
+    kernel = lower(beam_fields.KERNELS[name](), name)
+    given = {key: [str(v.evalf(60)) for v in row] for key, row in inputs.items()}
+    return evaluate(kernel, given)
+
+
+def draw(seed: int) -> dict[str, list[sp.Rational]]:
+    numbers = random.Random(seed)
+    sizes = {"axis": 3, "turn": 3, "strain": 4}
+    return {
+        f"{name}_{k}": [sp.Rational(numbers.randint(-99, 99), 64) for _ in range(size)]
+        for k in "kl"
+        for name, size in sizes.items()
+    } | {"x": [sp.Rational(numbers.randint(1, 99), 32)]}
+
+
+def section() -> dict[str, list[sp.Expr]]:
+    one = sp.Matrix([[1]])
+    inertia = [over_rectangle(one * p, DENSITY)[0] for p in (1, Y**2, Z**2)]
+    young, shear = sp.Rational(21, 2), sp.Rational(4)
+    normal = [over_rectangle(one * p, young)[0] for p in (1, Z**2, Y**2)]
+    # Saint-Venant torsion without warping: G I_p, the constant of a section that keeps plane.
+    twist = over_rectangle(one * (Y**2 + Z**2), shear)[0]
+    return {"inertia": inertia, "stiffness": [normal[0], twist, normal[1], normal[2]]}
+
+
+def points(axis: list[sp.Expr], turn: list[sp.Expr]) -> sp.Matrix:
+    """Displacement of (y, z): the section moves as a rigid body."""
+    a, t = sp.Matrix(axis), sp.Matrix(turn)
+    return a + sp.Matrix([t[1] * Z - t[2] * Y, -t[0] * Z, t[0] * Y])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_integrands_are_those_of_a_rectangular_section(seed: int) -> None:
+    drawn = draw(seed)
+    found = outputs("moments", drawn | section())
+    r0 = sp.Matrix([drawn["x"][0], Y, Z])
+    uk, ul = (points(drawn[f"axis_{k}"], drawn[f"turn_{k}"]) for k in "kl")
+    for name, integrand in (("C", uk), ("E", r0 * uk.T), ("F", uk * ul.T)):
+        exact = over_rectangle(integrand, DENSITY)
+        assert [float(v) for v in found[name]] == pytest.approx(
+            [float(e) for e in exact], rel=1e-14
+        )
+    strains = []
+    for k in "kl":
+        stretch, twist, curved_z, curved_y = drawn[f"strain_{k}"]
+        normal = stretch - Z * curved_z - Y * curved_y
+        strains.append((normal, -Z * twist, Y * twist))
+    energy = sp.Rational(21, 2) * strains[0][0] * strains[1][0]
+    energy += 4 * (strains[0][1] * strains[1][1] + strains[0][2] * strains[1][2])
+    exact = over_rectangle(sp.Matrix([[energy]]), sp.Integer(1))[0]
+    assert float(found["K"][0]) == pytest.approx(float(exact), rel=1e-14)
+
+
+def test_rigid_integrands_are_those_of_a_rectangular_section() -> None:
+    x = sp.Rational(13, 8)
+    found = outputs("rigid", {"x": [x], "inertia": section()["inertia"]})
+    r0 = sp.Matrix([x, Y, Z])
+    upper = [over_rectangle(r0 * r0.T, DENSITY)[i, j] for i in range(3) for j in range(i, 3)]
+    assert [float(v) for v in found["second"]] == pytest.approx([float(e) for e in upper])
+    assert float(found["mass"][0]) == pytest.approx(float(DENSITY * WIDTH * HEIGHT))
+
+
+def test_the_bent_axis_keeps_its_length_to_second_order() -> None:
+    """|d(x + u)/dx| of the displaced axis, expanded by its size."""
+    size, kv, kw, lv, lw = sp.symbols("size kv kw lv lw", real=True)
+    slopes = {"slope_k": [kv, kw], "slope_l": [lv, lw]}
+    numbers = random.Random(3)
+    values = {s: sp.Rational(numbers.randint(-99, 99), 64) for s in (kv, kw, lv, lw)}
+    given = {name: [values[s] for s in row] for name, row in slopes.items()}
+    pairs = (("k", "k"), ("k", "l"), ("l", "k"), ("l", "l"))
+    g = {
+        pair: outputs("shortening", {"slope_k": given[f"slope_{pair[0]}"],
+                                     "slope_l": given[f"slope_{pair[1]}"]})["g"][0]
+        for pair in pairs
+    }  # fmt: skip
+    eta = {"k": sp.Rational(2, 3), "l": -sp.Rational(5, 4)}
+    second = -sum(sp.Float(str(g[p]), 50) * eta[p[0]] * eta[p[1]] for p in pairs) / 2
+    v = sum(values[s] * eta[k] for s, k in ((kv, "k"), (lv, "l")))
+    w = sum(values[s] * eta[k] for s, k in ((kw, "k"), (lw, "l")))
+    length = sp.sqrt((1 + size**2 * second) ** 2 + size**2 * (v**2 + w**2))
+    grown = sp.series(length, size, 0, 3).removeO().coeff(size, 2)
+    assert abs(float(grown)) < 1e-14
+
+
+def test_a_section_turns_with_the_slopes_of_the_axis() -> None:
+    found = outputs("section", {"values": [sp.Integer(v) for v in (1, 2, 3, 4)],
+                                "slopes": [sp.Integer(5), sp.Integer(6)]})  # fmt: skip
+    assert [float(v) for v in found["phi"]] == [1, 2, 3]
+    assert [float(v) for v in found["theta"]] == [4, -6, 5]
