@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.errors import SceneError
 from mstmm.scene import split
 
 from ..curves import curve
@@ -70,8 +71,10 @@ def picture(result: Result, name: str) -> Picture | None:
 
 
 def _good(result: Result) -> NDArray[np.int64]:
-    """Samples to draw."""
+    """Samples to draw; SceneError if there is none."""
     good = np.flatnonzero(np.isfinite(result.q).all(axis=1))
+    if not len(good):
+        raise SceneError("there are no shapes to draw: the run has no sample; ask for other times")
     return good[instants(result.t[good], SHAPES)]
 
 
