@@ -333,11 +333,11 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
         some[:, entries] /= lengths[:, :, None]
     if engine.packed.model.n_drives:
-        now = system.memory.copy()
-        for time, known, row in zip(t, memory, y, strict=True):
-            system.memory[: len(known)] = known
-            engine.lib.mstmm_scene_settle(system.run, time, engine.pointer(row))
-        system.memory[:] = now
+        times, known = np.ascontiguousarray(t), memory.copy()
+        engine.lib.mstmm_scene_settle_many(
+            system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),
+            engine.pointer(y),
+        )  # fmt: skip
     return y, residual
 
 
