@@ -71,6 +71,11 @@ class Flexibility:
     said: tuple[str, ...] = ()
 
     @property
+    def frame_error(self) -> float:
+        """kappa^2 / 2, at most 1: what one floating frame may err by, relative to the deflection."""
+        return min(self.slope**2 / 2, 1.0)
+
+    @property
     def load_ratio(self) -> float:
         """gamma: the larger of the two ratios in size."""
         return 0.0 if self.gamma is None else max(abs(x) for x in self.gamma)
@@ -183,7 +188,7 @@ def rows(found: Sequence[Flexibility]) -> list[tuple[str, str]]:
 
 
 def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
-    went = [f"slope {one.slope:.2g} (the frame errs by up to {one.slope**2 / 2:.0e})"]
+    went = [f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e})"]
     went.append(f"spin {one.spin_ratio:.2g} of omega_1 = {one.first_frequency:.4g} rad/s")
     if one.gamma is not None:
         low, high = one.gamma
@@ -242,7 +247,7 @@ def _steep(one: Flexibility) -> str:
         return ""
     return (
         f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{SLOPE:g} one frame is too little (error up to {one.slope**2 / 2:.0%}): split the body "
+        f"{SLOPE:g} one frame is too little (error up to {one.frame_error:.0%}): split the body "
         "into welded parts"
     )
 
@@ -252,7 +257,7 @@ def _turned(one: Flexibility) -> str:
         return ""
     return (
         f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
-        "model ends at 1.5 rad: split the body into welded parts"
+        "model has no meaning beyond 1.5 rad: split the body into welded parts"
     )
 
 
