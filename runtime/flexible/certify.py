@@ -72,7 +72,7 @@ class Flexibility:
 
     @property
     def frame_error(self) -> float:
-        """kappa^2 / 2, at most 1: what one floating frame may err by, relative to the deflection."""
+        """kappa^2 / 2, at most 1: what one frame may err by, as a part of the deflection."""
         return min(self.slope**2 / 2, 1.0)
 
     @property
