@@ -13,7 +13,7 @@ from mstmm.scene_parts import Load
 from .bases import shapes_of
 from .beam_data import BeamData, beam_data
 from .beam_shapes import DIRECTIONS, BeamShapes, Mode
-from .choices import BENDING, Choice, choices, wants_quadrature
+from .choices import BENDING, Choice, choices, wants_quadrature, warnings
 from .frames import in_frame
 from .holding import Holding, Surroundings, holding
 from .modal_body import Array, MassPoint, ModalBody
@@ -48,7 +48,8 @@ class BeamBodies:
             for _, load in self._around.acts.get(beam.name, ())
             if isinstance(load, Load) and load.force_per_length is not None
         }
-        return replace(core, name=beam.name, ports={**core.ports, **spans})
+        said = tuple(f'beam "{beam.name}": {text}' for text in core.warnings)
+        return replace(core, name=beam.name, ports={**core.ports, **spans}, warnings=said)
 
     def _idle(self, beam: Beam) -> frozenset[str]:
         """Directions in which nothing moves the beam; asked for where the shapes are "auto"."""
@@ -109,6 +110,7 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
         shapes=shapes_all,
         frame="/".join(dict.fromkeys(frame.kind for frame in frames)),
         notes=tuple(notes),
+        warnings=warnings(chosen),
     )
 
 

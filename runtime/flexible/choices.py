@@ -9,6 +9,8 @@ Basis: one that can carry the loads of the hinges.  Clamped-free, simply support
 shapes have no bending moment at a free, supported or free end, so that static end shapes come first
 where a hinge carries a moment there, or a mass of a tenth of the beam's or more hangs.
 
+Twist and tension follow the section that is held, or the mean where the hinge lets the beam spin.
+
 Number of shapes per bending direction: three eigenfunctions (four in the mean frame), or all static
 shapes and two more.  Twist and axial shapes join where their stiffness and inertia are given and
 their first frequency is below three times the highest of bending: beyond, they follow the loads at
@@ -74,7 +76,7 @@ def choices(
             made.append(Choice(direction, frame, basis, count, why))
     highest = max((_frequency(data, c) for c in made), default=0.0)
     for direction in ("twist", "axial"):
-        frame = _rod_frame(beam, held, frames["y"][0])
+        frame = _rod_frame(beam, held, direction, frames["y"][0])
         basis = _basis(beam, data, held, direction, frame)
         count = _rod_count(beam, data, direction, basis, highest)
         if count and not _left_out(beam, direction, idle):
@@ -93,6 +95,19 @@ def wants_quadrature(beam: Beam, held: Holding, chosen: tuple[Choice, ...]) -> b
         and c.count >= 2
         for c in chosen
     )
+
+
+def warnings(chosen: tuple[Choice, ...]) -> tuple[str, ...]:
+    """Static shapes that are missing because fewer shapes were asked for."""
+    found = []
+    for c in chosen:
+        static = static_count(c.basis, c.direction)
+        if c.count < static:
+            found.append(
+                f"modes: {c.count} in direction {c.direction} cannot carry all forces and moments "
+                f"at the ends, which takes {static} static shapes; give {static} or more"
+            )
+    return tuple(found)
 
 
 # --- frame ----------------------------------------------------------------------------------------
@@ -117,11 +132,13 @@ def _frame(beam: Beam, data: BeamData, held: Holding, direction: str) -> tuple[F
     return Frame("chord"), f"{held.said} leaves the section free to turn"
 
 
-def _rod_frame(beam: Beam, held: Holding, bending: Frame) -> Frame:
-    """Twist and tension follow the held section, or the mean of a beam that nothing holds."""
-    if bending.kind == "mean":
+def _rod_frame(beam: Beam, held: Holding, direction: str, bending: Frame) -> Frame:
+    """Twist and tension follow the held section; where nothing holds them, the mean."""
+    asked = beam.frame_kind != "auto" or beam.basis in _NATURAL
+    if bending.kind == "mean" or (asked and bending.kind == "tangent"):
         return bending
-    return bending if bending.kind == "tangent" else Frame("tangent", held.x)
+    free = direction in held.turns - held.heavy_rotor - held.sprung
+    return Frame("mean") if free and not asked else Frame("tangent", held.x)
 
 
 # --- basis ----------------------------------------------------------------------------------------

@@ -96,6 +96,27 @@ def test_twist_joins_where_it_is_slow(stiffness: float, inertia: float, joins: b
     assert ("twist1" in body.modes) == joins
 
 
+def test_a_beam_that_may_spin_twists_about_its_mean() -> None:
+    data: dict[str, Any] = {
+        "modes": {"twist": 2},
+        "torsional_stiffness": 1.0,
+        "polar_inertia_per_length": 0.1,
+    }
+    free, fixed = (body_of({"type": kind}, **data) for kind in ("ball", "fixed"))
+    assert abs(free.E[1, 2] - free.E[2, 1]).max() < 1e-14  # no share in the spin of the whole
+    assert free.ports["root"].theta[0] == pytest.approx([2**0.5, 2**0.5])
+    assert not fixed.ports["root"].moves
+    found = np.sqrt(np.linalg.eigvals(np.linalg.solve(free.Mff, free.K)).real)
+    assert np.sort(found) == pytest.approx(np.pi * np.array([1, 2]) * 10**0.5, rel=1e-9)
+
+
+def test_too_few_shapes_for_the_moments_at_the_ends_are_warned_about() -> None:
+    body = body_of(HELD, modes={"y": 1}, more=carrying("fixed"))
+    assert len(body.warnings) == 1
+    assert 'beam "b": modes: 1 in direction y cannot carry' in body.warnings[0]
+    assert not body_of(HELD, modes={"y": 2}, more=carrying("fixed")).warnings
+
+
 def pendulum(**change: Any) -> Scene:
     """Two beams on pins about z that stay in the plane z = 0, or not, by `change`."""
     beam = {"length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 5.0,
