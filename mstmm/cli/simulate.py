@@ -53,6 +53,7 @@ class Plan:
     resume: bool
     sweep: str = "riccati"
     engine: str = "auto"
+    flexibility: str | None = None
 
     @property
     def checkpoint(self) -> Path:
@@ -122,6 +123,11 @@ def simulate(
         typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled for "
                      "this scene."),
     ] = "auto",
+    flexibility: Annotated[
+        str | None,
+        typer.Option("--flexibility", metavar="LEVEL", help="coupled, one-way, or rigid: level of "
+                     "model of all flexible bodies; by default as the scene says."),
+    ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -129,7 +135,7 @@ def simulate(
         scene, t_end, method, step, rtol, atol, times,
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
-        tuple(quantity or ()), certify, resume, sweep, engine,
+        tuple(quantity or ()), certify, resume, sweep, engine, flexibility,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -186,7 +192,8 @@ def _model(plan: Plan) -> Model:
     import mstmm
     from mstmm.scene_errors import near
 
-    model = compiled(plan.scene, mstmm.load_scene(plan.scene), plan.sweep, plan.engine)
+    scene, level = mstmm.load_scene(plan.scene), plan.flexibility
+    model = compiled(plan.scene, scene, plan.sweep, plan.engine, level)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         pictures = start.pictures()
@@ -202,7 +209,13 @@ def _model(plan: Plan) -> Model:
     return model
 
 
-def compiled(path: str, scene: Scene, sweep: str = "riccati", engine: str = "auto") -> Model:
+def compiled(
+    path: str,
+    scene: Scene,
+    sweep: str = "riccati",
+    engine: str = "auto",
+    flexibility: str | None = None,
+) -> Model:
     """The model of a scene file.
 
     SceneError, with the file named, also where the accelerations of the start cannot be computed:
@@ -213,7 +226,7 @@ def compiled(path: str, scene: Scene, sweep: str = "riccati", engine: str = "aut
     import mstmm
 
     try:
-        model = mstmm.compile(scene, engine=engine, sweep=sweep)
+        model = mstmm.compile(scene, engine=engine, sweep=sweep, flexibility=flexibility)
         udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
         lines = str(error).splitlines()
