@@ -102,8 +102,15 @@ def console(file: Any = None) -> Console:
     )  # fmt: skip
 
 
+#: Longest names that a first column is widened for.
+_NAMES = 44
+
+
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **more: Any) -> Table:
-    """A plain table; columns whose heading ends in ">" are aligned to the right."""
+    """A plain table; columns whose heading ends in ">" are aligned to the right.
+
+    The first column holds names and is kept whole as long as it leaves room for the others.
+    """
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -112,13 +119,16 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **m
         title=Text(title, style="bold") if title else None,
         title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, **more,
     )  # fmt: skip
-    for heading in columns:
+    filled = [tuple(printable(cell) for cell in row) for row in rows]
+    longest = max((len(row[0]) for row in filled if row), default=0)
+    for number, heading in enumerate(columns):
         right = heading.endswith(">")
         made.add_column(
-            Text(heading.rstrip(">")), justify="right" if right else "left", overflow="fold"
-        )
-    for row in rows:
-        made.add_row(*(Text(printable(cell)) for cell in row))
+            Text(heading.rstrip(">")), justify="right" if right else "left", overflow="fold",
+            min_width=longest if number == 0 and longest <= _NAMES else None,
+        )  # fmt: skip
+    for row in filled:
+        made.add_row(*map(Text, row))
     return made
 
 
