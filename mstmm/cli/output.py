@@ -125,7 +125,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **m
         right = heading.endswith(">")
         made.add_column(
             Text(heading.rstrip(">")), justify="right" if right else "left", overflow="fold",
-            min_width=longest if number == 0 and longest <= _NAMES else None,
+            no_wrap=number == 0 and longest <= _NAMES,
         )  # fmt: skip
     for row in filled:
         made.add_row(*map(Text, row))
