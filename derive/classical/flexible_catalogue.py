@@ -49,7 +49,7 @@ BODIES = (
     ),
     BodyStatement(
         "beam_spatial_discrete",
-        "spatial beam of Euler and Bernoulli with a mode in each bending plane, "
+        "spatial beam of Euler and Bernoulli, a mode per bending plane, "
         "discrete-time classical matrix",
         SPACE, "beam", 2, "(8.140) to (8.186)", "(8.186)", "yz", (_BENDING[0].format("J_0"),),
     ),
@@ -74,7 +74,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_smooth_planar": (
-        partial(flexible_joint.smooth, number="(8.90), (8.95)"), True,
+        partial(flexible_joint.smooth, number="(8.94), (8.95)"), True,
         {
             "rigid_rigid": ("section 8.5, (7.219), (8.102)", "(7.219)"),
             "rigid_beam": ("section 8.5, (8.90) to (8.101)", "(8.101)"),
@@ -92,7 +92,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_fixed_spatial": (
-        partial(flexible_joint.fixed, number="(8.195)"), False,
+        partial(flexible_joint.fixed, number="(8.194) to (8.196)"), False,
         {
             "rigid_rigid": ("section 8.10", "section 8.10"),
             "rigid_beam": ("section 8.10, (8.187) to (8.193)", "(8.193)"),
