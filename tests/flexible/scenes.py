@@ -17,7 +17,7 @@ STEP = 2e-5
 
 
 def beam(name: str, length: float = 1.0, stiffness: Any = 1.0, **keys: Any) -> Scene:
-    """A [[beam]] of 1 kg/m; `modes` y unless told, in a tangent frame on clamped-free shapes."""
+    """A [[beam]] of 1 kg/m, tangent frame, clamped-free shapes, inertia in its invariant form."""
     given = {
         "name": name,
         "length": length,
@@ -25,6 +25,7 @@ def beam(name: str, length: float = 1.0, stiffness: Any = 1.0, **keys: Any) -> S
         "bending_stiffness": stiffness,
         "frame": "tangent",
         "basis": "clamped-free",
+        "quadrature": False,
     }
     return given | keys
 
@@ -91,3 +92,24 @@ def frequencies(by_q: Array, by_u: Array, count: int) -> Array:
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [by_q, by_u]])
     roots = np.linalg.eigvals(matrix)
     return np.sort(roots.imag[roots.imag > 1e-6])[:count]
+
+
+def spin_up(speed: float, duration: float = 15.0) -> str:
+    """Angle of omega = speed (t/T - sin(2 pi t/T)/(2 pi)) up to T, constant from there, as text."""
+    w = f"(2*pi/{duration})"
+    rising = f"{speed / duration!r}*(t^2/2 + (cos({w}*t) - 1)/{w}^2)"
+    return f"where(t < {duration}, {rising}, {speed}*(t - {duration / 2}))"
+
+
+def javelin(frame: str, basis: str, n: int, **keys: Any) -> Scene:
+    """A javelin thrown by its mid section for a second: 2 m, 1 kg, EI = 150 N m^2."""
+    path = ["7.5*t^2", "10.5*t^2 - 1.96875*t^4", "atan(1.4 - 0.525*t^2)"]
+    body = beam(
+        "javelin", 2.0, 150.0, mass_per_length=0.5, frame=frame, basis=basis, modes={"y": n},
+        ends={"mid": 1.0}, **keys,
+    )  # fmt: skip
+    hand = hinge(
+        "hand", "planar", "ground", "javelin.mid", axis=[0, 0, 1], axis2=[1, 0, 0],
+        drive=path, release="t >= 1",
+    )  # fmt: skip
+    return scene(body, hand, gravity=(0.0, -9.81, 0.0))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flexible.reference import dense, random_beams
-from flexible.reference.beam import flexible_body
+from flexible.reference.beam import flexible_body, mean_section
 from reference.compare import worst
 
 import mstmm
@@ -39,40 +39,40 @@ def compare(
     assert abs(result.energy()[0] - energy) < ACCURACY * max(abs(energy), 1.0)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(8))
 def test_spatial_trees(seed: int) -> None:
     compare(random_beams.random_system(seed), seed)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(6))
 def test_planar_trees(seed: int) -> None:
     compare(random_beams.random_system(seed, planar=True), seed)
 
 
-@pytest.mark.parametrize("draw", range(6))
+@pytest.mark.parametrize("draw", range(4))
 def test_trees_drawn_afresh(draw: int, rng: np.random.Generator) -> None:
     seed = int(rng.integers(2**32))
     compare(random_beams.random_system(seed, planar=draw % 2 == 0), seed)
 
 
-@pytest.mark.parametrize("seed", range(30, 34))
+@pytest.mark.parametrize("seed", range(30, 32))
 def test_long_chains(seed: int) -> None:
     compare(random_beams.random_system(seed, chain=True, most=9), seed)
 
 
-@pytest.mark.parametrize("seed", range(40, 46))
+@pytest.mark.parametrize("seed", range(40, 43))
 def test_without_stiffening_particles_are_the_same(seed: int) -> None:
     """Linear fields: the sum over particles needs no cut at all."""
     scene = random_beams.random_system(seed, most=3, stiffening=False)
     compare(scene, seed, particles=True)
 
 
-@pytest.mark.parametrize("seed", (50, 51))
+@pytest.mark.parametrize("seed", (50,))
 def test_fused_engine(seed: int) -> None:
     compare(random_beams.random_system(seed, most=3), seed, engine="fused")
 
 
-@pytest.mark.parametrize("seed", range(60, 66))
+@pytest.mark.parametrize("seed", range(60, 64))
 def test_numbers_of_a_beam(seed: int) -> None:
     """Moments, stiffness and ends of a beam against sums over its particles, in every frame."""
     scene = random_beams.random_system(seed, planar=seed % 2 == 0)
@@ -102,7 +102,11 @@ def test_numbers_of_a_beam(seed: int) -> None:
         assert worst(made.X[:, 0], moved, floor=1.0) < 1e-12
         assert not made.G[1:].any() and not made.X[:, 1:].any()
         for name, port in made.ports.items():
-            section = body.ends[name]
+            if name in body.ends:
+                section = body.ends[name]
+            else:  # the mean of the sections that a load per length acts on
+                (span,) = (one["span"] for one in scene["load"] if "span" in one)
+                section = mean_section(body, beam, *span)
             assert worst(port.position, section.place) < 1e-13
             assert worst(port.rotation, section.rotation) < 1e-13
             assert worst(port.phi, section.phi, floor=1.0) < 1e-12

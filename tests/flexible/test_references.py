@@ -47,7 +47,7 @@ def test_power_balance_of_the_particles(seed: int, lagrangian: bool) -> None:
     for hinge in scene["hinge"]:
         hinge.pop("law", None)
     for beam in scene["beam"]:
-        beam["damping"] = {"stiffness": 0.0}
+        beam["damping"], beam["viscous_drag"] = {"stiffness": 0.0}, 0.0
     q, u = random_beams.random_state(scene, seed)
     udot = dense.solve(scene, q, u, lagrangian=lagrangian).udot
     tree, qdot = dense.system(scene).tree, np.zeros_like(q)

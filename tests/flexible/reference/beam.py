@@ -53,6 +53,10 @@ class Body:
     ends: Mapping[str, Section]
     K: Array
     D: Array
+    #: Viscous drag of the axis as particles whose `mass` is N s/m; None where there is none.
+    drag: Particles | None = None
+    #: Mean sections on which loads per length act, by (from, to).
+    shapes: Shapes | None = None
 
     @property
     def n(self) -> int:
@@ -109,7 +113,7 @@ class Shapes:
             for text in beam["shapes"].get(word, ())
         ]
         self.n = len(self.modes)
-        self.x, self.w = self._gauss(0.0, self.length)
+        self.x, self.w = self.gauss(0.0, self.length)
         inertia = beam.get("rotary_inertia")
         self.rotary = inertia is not None
         polar = float(beam.get("polar_inertia_per_length") or 0.0)
@@ -120,7 +124,8 @@ class Shapes:
         self.origin: float | None = None
         self.taken, self.origin = self._frame(held)
 
-    def _gauss(self, a: float, b: float) -> tuple[Array, Array]:
+    def gauss(self, a: float, b: float) -> tuple[Array, Array]:
+        """Points and weights between two places; exact for all products that occur."""
         x, w = np.polynomial.legendre.leggauss(24)
         return a + (b - a) * (x + 1) / 2, (b - a) * w / 2
 
@@ -163,7 +168,7 @@ class Shapes:
         return out - self._from_root(self.origin)
 
     def _from_root(self, x: float) -> Array:
-        s, w = self._gauss(0.0, x)
+        s, w = self.gauss(0.0, x)
         slopes = self.rows(s, 1)[:, 1:3]
         return np.einsum("m,mak,mal->kl", w, slopes, slopes)
 
@@ -232,7 +237,35 @@ def flexible_body(beam: Mapping[str, Any], held: str = "root") -> Body:
     K = _stiffness(beam, shapes)
     damping = beam.get("damping") or {}
     D = float(damping.get("stiffness", 0.0)) * K if isinstance(damping, Mapping) else 0.0 * K
-    return Body(beam["name"], Particles(mass, place, field, bends), ends, K, D)
+    made = Particles(mass, place, field, bends)
+    return Body(beam["name"], made, ends, K, D, _drag(beam, shapes, stiff), shapes)
+
+
+def _drag(beam: Mapping[str, Any], shapes: Shapes, stiff: bool) -> Particles | None:
+    if not beam.get("viscous_drag"):
+        return None
+    place = np.zeros((len(shapes.x), 3))
+    place[:, 0] = shapes.x
+    field = shapes.rows(shapes.x)[:, :3]
+    return Particles(
+        shapes.w * float(beam["viscous_drag"]), place, field, shapes.shortening(shapes.x) * stiff
+    )
+
+
+def mean_section(body: Body, beam: Mapping[str, Any], first: float, last: float) -> Section:
+    """Mean of the sections from `first` to `last`: where a constant force per length acts."""
+    shapes = body.shapes
+    assert shapes is not None
+    x, w = shapes.gauss(first, last)
+    w = w / (last - first)
+    stiff = bool(beam.get("stiffening", True))
+    return Section(
+        np.array([w @ x, 0.0, 0.0]),
+        np.eye(3),
+        np.einsum("m,mak->ak", w, shapes.rows(x)[:, :3]),
+        np.einsum("m,mak->ak", w, shapes.rotation(x)),
+        np.einsum("m,mkl->kl", w, shapes.shortening(x)) * stiff,
+    )
 
 
 def _stiffness(beam: Mapping[str, Any], shapes: Shapes) -> Array:

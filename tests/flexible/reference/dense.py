@@ -26,7 +26,7 @@ from reference.algebra import tilde
 from reference.jets import Array, Jet, apply, chain, dot
 from reference.tree import Hinge, Tree, read
 
-from .beam import Body, Section, flexible_body, rigid_body
+from .beam import Body, Particles, Section, flexible_body, mean_section, rigid_body
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class System:
     flexible: tuple[int, ...]
     lagrangian: bool
     loads: tuple[Mapping[str, Any], ...]
+    beams: Mapping[str, Mapping[str, Any]]
     #: Names of the inboard and outboard end of every hinge.
     ends: tuple[tuple[str, str], ...]
 
@@ -91,7 +92,8 @@ def system(scene: Mapping[str, Any], lagrangian: bool = True) -> System:
         for hinge in scene["hinge"]
     )
     loads = tuple(scene.get("load") or ())
-    return System(read(plain), bodies, numbers, lagrangian, loads, ends)
+    named = {beam["name"]: beam for beam in beams}
+    return System(read(plain), bodies, numbers, lagrangian, loads, named, ends)
 
 
 def _stand_in(beam: Mapping[str, Any]) -> dict[str, Any]:
@@ -146,10 +148,15 @@ def frame_jet(state: State, a: Array, alpha: Array) -> tuple[Jet, Jet]:
 
 def end_jet(body: Body, end: str, state: State, y: Array) -> tuple[Jet, Jet]:
     """Place and attitude of an end for accelerations y = (a, alpha, etadd), (..., 6 + n)."""
+    return section_motion(body.ends[end], state, y)
+
+
+def section_motion(section: Section, state: State, y: Array) -> tuple[Jet, Jet]:
+    """Place and attitude of a section for accelerations y = (a, alpha, etadd), (..., 6 + n)."""
     origin, A = frame_jet(state, y[..., :3], y[..., 3:6])
     shape = y[..., 6:].shape
     eta = Jet(np.broadcast_to(state.eta, shape), np.broadcast_to(state.etad, shape), y[..., 6:])
-    place, turned = section_jet(body.ends[end], eta)
+    place, turned = section_jet(section, eta)
     return origin + apply(A, place), A @ turned
 
 
@@ -210,8 +217,12 @@ def motion(system: System, q: Array, u: Array) -> dict[int, State]:
 def _modes(body: Body, eta: Array) -> tuple[Array, Array, Array]:
     """J0, J1(eta), J2(eta) (m, 3, 6 + n): velocities of the particles from (v, w, etad) in body
     axes by order in the modes."""
-    p, n = body.particles, body.n
-    count = len(p.mass)
+    return modes_of(body.particles, eta)
+
+
+def modes_of(p: Particles, eta: Array) -> tuple[Array, Array, Array]:
+    """The same for any particles that move with the shapes."""
+    count, n = len(p.mass), len(eta)
     first = p.phi @ eta
     second = np.zeros((count, 3), dtype=np.result_type(eta, float))
     second[:, 0] = -0.5 * np.einsum("mkl,k,l->m", p.shortening, eta, eta)
@@ -232,11 +243,15 @@ def _cross(a: Array) -> Array:
 
 def mass_matrix(body: Body, eta: Array, lagrangian: bool) -> Array:
     """(6 + n, 6 + n) in body axes."""
-    J0, J1, J2 = _modes(body, eta)
-    mass = body.particles.mass
+    return moments(body.particles, eta, lagrangian)
+
+
+def moments(p: Particles, eta: Array, lagrangian: bool) -> Array:
+    """sum m J^T J, cut after the second order in the modes or not."""
+    J0, J1, J2 = modes_of(p, eta)
 
     def product(a: Array, b: Array) -> Array:
-        return np.einsum("m,mai,maj->ij", mass, a, b)
+        return np.einsum("m,mai,maj->ij", p.mass, a, b)
 
     if not lagrangian:
         J = J0 + J1 + J2
@@ -307,11 +322,8 @@ def solve(
         rows = slice(starts[i], starts[i + 1])
         matrix[rows, rows], right[rows] = _body_rows(this, body, states[i])
     for load in this.loads:
-        name, _, end = load["on"].partition(".")
-        i = tree.body_number(name)
-        J, _ = _affine(*end_jet(this.bodies[i], end, states[i], _units(sizes[i])))
-        wrench = np.concatenate([load.get("force", (0, 0, 0)), load.get("moment", (0, 0, 0))])
-        right[starts[i] : starts[i + 1]] += J.T @ wrench
+        i, force = _load(this, load, states)
+        right[starts[i] : starts[i + 1]] += force
     for j, hinge in enumerate(tree.hinges):
         at = slice(total + 6 * j, total + 6 * j + 6)
         own = slice(total + 6 * hinges + hinge.u.start, total + 6 * hinges + hinge.u.stop)
@@ -325,10 +337,36 @@ def solve(
     return Accelerations(np.concatenate([speeds, *modes]), wrenches[:, :3], wrenches[:, 3:])
 
 
+def _load(this: System, load: Mapping[str, Any], states: Mapping[int, State]) -> tuple[int, Array]:
+    """Number of the body and force on its frame and modes of a load with constant entries."""
+    name, _, end = load["on"].partition(".")
+    i = this.tree.body_number(name)
+    body, state = this.bodies[i], states[i]
+    section, factor = body.ends.get(end), 1.0
+    if "force_per_length" in load:
+        beam = this.beams[name]
+        first, last = load.get("span", (0.0, beam["length"]))
+        section, factor = mean_section(body, beam, first, last), last - first
+    assert section is not None
+    J, _ = _affine(*section_motion(section, state, _units(6 + body.n)))
+    force = np.asarray(load.get("force_per_length", load.get("force", (0, 0, 0))), float)
+    wrench = np.concatenate([factor * force, load.get("moment", (0, 0, 0))])
+    if load.get("axes") == "body":
+        turned = state.A
+        if "force_per_length" not in load:
+            _, attitude = section_motion(section, state, np.zeros((1, 6 + body.n)))
+            turned = attitude.x[0] @ section.rotation.T
+        wrench = scipy.linalg.block_diag(turned, turned) @ wrench
+    return i, J.T @ wrench
+
+
 def _body_rows(this: System, body: Body, state: State) -> tuple[Array, Array]:
     M = mass_matrix(body, state.eta, this.lagrangian)
     h = bias(body, state, this.lagrangian) - M[:, :3] @ (state.A.T @ this.tree.gravity)
     h[6:] += body.K @ state.eta + body.D @ state.etad
+    if body.drag is not None:
+        speeds = np.concatenate([state.A.T @ state.v, state.A.T @ state.w, state.etad])
+        h += moments(body.drag, state.eta, this.lagrangian) @ speeds
     T = _rotated(state.A, body.n)
     return T @ M @ T.T, -T @ h
 

@@ -49,6 +49,7 @@ def random_beam(rng: Generator, name: str, planar: bool = False, stiffening: boo
             "skew": {"position": 0.7 * length, "orientation": _attitude(rng, planar)},
         },
         "damping": {"stiffness": 0.01},
+        "viscous_drag": float(rng.choice([0.0, 0.4])),
     }
     if rng.random() < 0.5 and not planar:
         beam["rotary_inertia"] = [float(v) for v in rng.uniform(0.01, 0.05, 2) * mass]
@@ -97,6 +98,7 @@ def random_system(
     force, moment = rng.uniform(-5, 5, 3), rng.uniform(-2, 2, 3)
     if planar:
         force[2] = moment[0] = moment[1] = 0.0
+    axes = {"axes": str(rng.choice(["inertial", "body"]))}
     gravity = rng.uniform(-10, 10, 3)
     if planar:
         gravity[2] = 0.0
@@ -106,7 +108,15 @@ def random_system(
         "body": bodies,
         "beam": beams,
         "hinge": [hinges[i] for i in rng.permutation(count)],
-        "load": [{"on": loaded, "force": force.tolist(), "moment": moment.tolist()}],
+        "load": [
+            {"on": loaded, "force": force.tolist(), "moment": moment.tolist()} | axes,
+            {
+                "on": beams[-1]["name"],
+                "force_per_length": force[::-1].tolist() if not planar else force.tolist(),
+                "span": [0.2 * beams[-1]["length"], 0.7 * beams[-1]["length"]],
+            }
+            | axes,
+        ],
     }
 
 
