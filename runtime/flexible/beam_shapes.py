@@ -61,8 +61,6 @@ def gauss_between(places: Iterable[float], density: float) -> tuple[Array, Array
         nodes, weights = gauss(8 + int(np.ceil(3.0 * h * density)))
         xs.append((a + h * (np.arange(cuts)[:, None] + nodes)).ravel())
         ws.append(np.tile(h * weights, cuts))
-    if not xs:
-        return np.zeros(0), np.zeros(0)
     return np.concatenate(xs), np.concatenate(ws)
 
 
@@ -180,8 +178,6 @@ class BeamShapes:
     def _slopes_between(self, ends: Array) -> list[tuple[Array, Array]]:
         """(rate (m, n, n), weights) of each interval between neighbouring ends."""
         rules = [gauss_between(pair, self.density) for pair in pairwise(ends)]
-        if not rules:
-            return []
         rates = self.shortening_rate(np.concatenate([places for places, _ in rules]))
         cuts = np.cumsum([len(places) for places, _ in rules])[:-1]
         pieces = np.split(rates, cuts)

@@ -55,10 +55,10 @@ class BeamBodies:
         """Directions in which nothing moves the beam; asked for where the shapes are "auto"."""
         if self._plane is None or beam.modes is not None:
             return frozenset()
-        stays = {
-            word for word, axis in (("y", 1), ("z", 2)) if not self._plane.leaves(beam.name, axis)
-        }
-        return frozenset(stays | ({"twist"} if stays else set()))
+        axes = {"y": 1, "z": 2}
+        stays = [word for word, axis in axes.items() if not self._plane.leaves(beam.name, axis)]
+        # A beam that nothing bends at all keeps the shapes along y, to show that it stays straight.
+        return frozenset([stays[-1], "twist"] if stays else [])
 
 
 def beam_body(scene: Scene, beam: Beam) -> ModalBody:
@@ -80,11 +80,6 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
         made, said = in_frame(data, choice.direction, shapes, choice.frame)
         modes += made
         notes += [_described(choice, len(made)), *said]
-    if not modes:
-        raise SceneError(
-            f'beam "{beam.name}": there is no shape in any direction; give modes = 3, or write '
-            'model = "rigid"'
-        )
     frames = [c.frame for c in chosen]
     shapes_all = BeamShapes(data, tuple(modes), beam.stiffening, frames[0].origin)
     points: tuple[MassPoint, ...] = ()

@@ -186,8 +186,6 @@ def _left_out(beam: Beam, direction: str, idle: frozenset[str]) -> bool:
 def _count(beam: Beam, direction: str, frame: Frame, basis: Basis) -> int:
     if beam.modes is not None:
         return int(getattr(beam.modes, direction))
-    if basis.kind == GIVEN:
-        return len(basis.given)
     static = static_count(basis, direction)
     return static + 2 if static else (4 if frame.kind == "mean" else 3)
 
@@ -195,8 +193,6 @@ def _count(beam: Beam, direction: str, frame: Frame, basis: Basis) -> int:
 def _rod_count(beam: Beam, data: BeamData, direction: str, basis: Basis, highest: float) -> int:
     if beam.modes is not None:
         return int(getattr(beam.modes, direction))
-    if basis.kind == GIVEN:
-        return len(basis.given)
     first = _rod_frequency(data, direction)
     if first == 0.0 or first > 3 * highest:
         return 0

@@ -101,11 +101,9 @@ def _references(element: Chain | Spring | Load) -> tuple[str, ...]:
 
 
 def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
-    """Read from the hinges, springs and loads of the scene; a beam without hinge floats."""
+    """Read from the hinges, springs and loads of the scene; every beam is held by one hinge."""
     ends = tuple(sorted(set(_ends(around, beam, data)), key=lambda end: end.x))
-    hinge = around.holds.get(beam.name)
-    if hinge is None:
-        return Holding("root", 0.0, frozenset(AXES), True, ends=ends, said="no hinge")
+    hinge = around.holds[beam.name]
     at = hinge.outboard_end or "root"
     x, turn = data.ends[at]
     free = _directions(turn, free_axes(hinge))

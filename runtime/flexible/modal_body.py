@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,10 +108,3 @@ class ModalBody(Moments):
     def Mff(self) -> Array:
         """(n, n) mass matrix of the modes alone, the frame held."""
         return np.einsum("aakl->kl", self.F)
-
-    def describe(self) -> dict[str, Any]:
-        """Name, modes, frame, notes and warnings, for reports."""
-        return {
-            "name": self.name, "modes": list(self.modes), "frame": self.frame,
-            "notes": list(self.notes), "warnings": list(self.warnings),
-        }  # fmt: skip

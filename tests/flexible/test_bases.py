@@ -199,6 +199,11 @@ def test_a_list_must_fit_the_shapes_there_are() -> None:
                 initial={"eta": [0.1, 0.2]})  # fmt: skip
 
 
+def test_a_list_of_damping_ratios_must_fit_too() -> None:
+    with pytest.raises(SceneError, match=r'"b": damping: expected one modal.* or 4.*found 2'):
+        body_of(HELD, at="b.mid", ends={"mid": 0.4}, modes={"y": 2}, damping=[0.1, 0.2])
+
+
 # --- damping, loads, points -----------------------------------------------------------------------
 
 

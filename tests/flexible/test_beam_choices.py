@@ -163,6 +163,45 @@ def test_a_body_beside_the_plane_brings_the_other_shapes_back() -> None:
         assert any(name.startswith("z") for name in names) != planar
 
 
+def test_a_beam_that_nothing_bends_keeps_one_plane() -> None:
+    scene = Scene(
+        gravity=[-9.81, 0, 0],
+        beam=[{"name": "b", "length": 1, "mass_per_length": 1, "bending_stiffness": 1}],
+        hinge=[{"name": "h", "type": "fixed", "inboard": "ground", "outboard": "b"}],
+    )
+    assert modal_bodies(scene)["b"].modes == ("y1", "y2", "y3")
+
+
+def test_what_is_not_known_to_stay_in_the_plane_counts_as_leaving_it() -> None:
+    plain = pendulum()
+    disc = {"name": "d", "mass": 1.0, "inertia": [1, 1, 1], "ends": {"rim": [0, 0.1, 0]}}
+    chain = {"name": "rope", "count": 3, "inboard": "b.tip", "body": {"mass": 0.1, "ends": {
+        "tip": [0.1, 0, 0]}}, "hinge": {"type": "pin"}}  # fmt: skip
+    ball = {"name": "s", "type": "ball", "inboard": "b.tip", "outboard": "d"}
+    slider = ball | {"type": "prismatic", "axis": [0, 1, 0]}
+    push = {"on": "d.rim", "force": [1, 1, 0], "axes": "b"}
+    gravity, beam, hinge = plain.gravity, plain.beam, plain.hinge
+    for scene, planar in (
+        (Scene(gravity=gravity, beam=beam, hinge=hinge, chain=[chain]), False),
+        (Scene(gravity=gravity, beam=beam, hinge=[*hinge, ball], body=[disc]), False),
+        (Scene(gravity=gravity, beam=beam, hinge=[*hinge, slider], body=[disc]), True),
+        (Scene(gravity=gravity, beam=beam, hinge=[*hinge, slider], body=[disc], load=[push]), True),
+        # Hinges in any order; a beam turned about its own axis.
+        (Scene(gravity=gravity, beam=beam, hinge=hinge[::-1]), True),
+    ):
+        names = modal_bodies(scene)["a"].modes
+        assert any(name.startswith("z") for name in names) != planar
+    turned = modal_bodies(pendulum(pin={"orientation": [np.pi / 2, 0, 0], "axis": [0, 1, 0]}))
+    assert [body.modes[0] for body in turned.values()] == ["y1", "z1"]
+
+
+def test_a_chain_on_a_beam_is_heavy() -> None:
+    chain = {"name": "rope", "count": 3, "inboard": "b.tip", "body": {"mass": 0.01, "ends": {
+        "tip": [0.1, 0, 0]}}, "hinge": {"type": "pin"}}  # fmt: skip
+    body = body_of(HELD, more={"chain": [chain]})
+    assert " static+fixed-interface shapes" in body.notes[0]
+
+
 def test_quadrature_is_taken_where_the_frame_hangs_on_a_pin() -> None:
     assert body_of(PIN, frame="tangent", modes={"y": 4}).points
     assert not body_of(PIN, frame="tangent", modes={"y": 4}, stiffening=False).points
