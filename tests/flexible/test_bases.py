@@ -167,6 +167,22 @@ def test_given_shapes_may_use_functions_and_lose_their_rigid_part() -> None:
     assert body.K[1, 1] == pytest.approx((e**2 - 1) / 2, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "where(x < L/3, 0, (x - L/3)^2)",
+        "max(x - L/3, 0)^2",
+        "(x - L/3)*(x - L/3 + abs(x - L/3))/2",
+        "where(sin(x) <= sin(L/3), 0, (x - L/3)^2)",
+    ],
+)
+def test_given_shapes_may_be_in_pieces(text: str) -> None:
+    body = body_of(HELD, modes="auto", shapes={"y": [text]}, length=1.5)
+    assert body.K[0, 0] == pytest.approx(4.0, rel=1e-9)  # v'' = 2 on one metre
+    assert body.Mff[0, 0] == pytest.approx(1 / 5, rel=1e-9)
+    assert body.ports["tip"].shortening[0, 0, 0] == pytest.approx(4 / 3, rel=1e-9)
+
+
 def test_a_shape_that_is_a_sum_of_others_is_left_out() -> None:
     body = body_of(HELD, modes="auto", shapes={"y": ["x^2", "x^3", "2*x^2 - x^3"]})
     assert body.modes == ("y1", "y2")
