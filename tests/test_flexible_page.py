@@ -1,0 +1,70 @@
+"""The page on flexible bodies: its Python runs as it stands, and what it says of numbers is so."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import pytest
+
+PAGE = Path(__file__).parents[1] / "docs" / "use" / "flexible.md"
+TEXT = PAGE.read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The names that the page leaves behind, in a folder of its own."""
+    matplotlib.use("Agg")
+    names: dict[str, Any] = {"__name__": "page"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("page"))
+        for block in re.findall(r"^```python\n(.*?)^```", TEXT, re.M | re.S):
+            exec(compile(block, PAGE.name, "exec"), names)
+        names["picture"] = Path("rod.png").stat().st_size
+    return names
+
+
+def test_the_spun_blade_bends_as_published(page: dict[str, Any]) -> None:
+    assert page["tip"].min() == pytest.approx(-0.57375, abs=1e-3)
+    assert page["spun"].warnings == ()
+    assert page["picture"] > 10000
+
+
+def test_the_certificate_is_the_one_shown(page: dict[str, Any]) -> None:
+    shown = re.findall(r"^(blade(?: shapes)?) {2,}(.*)$", TEXT, re.M)
+    said = str(page["spun"].certificate)
+    assert len(shown) == 2
+    for name, text in shown:
+        words = next(line for line in said.splitlines() if line.startswith(name + " "))
+        assert re.sub(r"[\d.e-]+", "0", words) == re.sub(r"[\d.e-]+", "0", f"{name:<21}{text}")
+
+
+def test_the_linear_blade_is_warned_about(page: dict[str, Any]) -> None:
+    assert any("first frequency" in text for text in page["lost"].warnings)
+    assert page["lost"].deflection("blade", "tip")[:, 1].min() < -2
+
+
+def test_notes_are_those_shown(page: dict[str, Any]) -> None:
+    shown = re.findall(r"^```text\n(?=[yz]:)(.*?)\n```", TEXT, re.M | re.S)
+    chosen = page["mstmm"].compile(page["scene"]).flexible["rod"].notes
+    assert "\n".join(chosen) == shown[0]
+    assert page["mstmm"].compile(page["carrying"]).flexible["arm"].notes[-1] == shown[1]
+
+
+def test_the_static_start_is_the_closed_form(page: dict[str, Any]) -> None:
+    assert page["sway"].deflection("arm", "tip")[0, 1] == pytest.approx(-9.81 / 400, rel=5e-4)
+    assert page["sway"].bending_moment("arm", 0.0)[0, 1] == pytest.approx(-9.81 / 2, rel=1e-3)
+
+
+def test_parts_bend_like_the_exact_cantilever(page: dict[str, Any]) -> None:
+    """Bisshopp and Drucker, Q. Appl. Math. 3 (1945): 0.30172 L under EI/L^2."""
+    tips = {n: run.position(f"part{n - 1}.tip")[0, 1] for n, run in page["bent"].items()}
+    errors = [abs(tips[n] - 0.30172) for n in (1, 2, 4, 8)]
+    assert errors[3] < 1e-4
+    assert all(fine < coarse / 3 for coarse, fine in pairwise(errors))
+    table = re.findall(r"^\| (\d) \| [\d.]+ \| ([\d.]+) m \|", TEXT, re.M)
+    assert {int(n): float(tip) for n, tip in table} == {n: round(t, 4) for n, t in tips.items()}
+    assert [bool(page["bent"][n].warnings) for n in (1, 2, 4, 8)] == [True, True, False, False]
