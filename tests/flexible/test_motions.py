@@ -109,6 +109,19 @@ def test_welded_beams() -> None:
         assert 2.2e-4 < tip_error(linear, "welded") < 5e-4
 
 
+@pytest.mark.parametrize(
+    ("data", "case", "error"),
+    [
+        (pendulum("chord", 1, model="rigid"), "pendulum", 1.16e-2),
+        (two_pinned("chord", 1, model="rigid"), "two pinned", 8.3e-3),
+        (welded("clamped-free", 1, model="rigid"), "welded", 1.28e-2),
+    ],
+    ids=("pendulum", "two pinned", "welded"),
+)
+def test_what_a_rigid_model_misses(data: Scene, case: str, error: float) -> None:
+    assert abs(tip_error(data, case) / error - 1) < 5e-3
+
+
 KANE = (8.0, 6.8952e10 * 8.2189e-9), 2766.67 * 7.2968e-5
 SPINNING = {
     "simo": ((10.0, 1.4e4), 1.2, 6.0, [4.6e-3, 4e-4, 8e-4, 7e-4]),
