@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from mstmm.errors import SceneError
 from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene import split
 
 from ..observed import Observed
+from ..pack import releasable
 from ..quantities import Quantities
 from ..result import Result
 from .coupling import couplings
@@ -41,6 +43,18 @@ def _too_coupled(share: tuple[str, float]) -> str:
         f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
         "the inertia there (chi), so that the one-way response may err by "
         f'{3 * chi / (1 - chi):.1f} of its deflection; take flexibility = "coupled"'
+    )
+
+
+def _let_go(model: Model) -> tuple[str, ...]:
+    """A sentence for each one-way body whose hinge releases it."""
+    letting = set(releasable(model.scene))
+    holders = {split(h.outboard)[0]: h.name for h in model.scene.hinge if h.name in letting}
+    return tuple(
+        f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held body; '
+        'take flexibility = "coupled"'
+        for name in rigidity(model).one_way
+        if name in holders
     )
 
 
@@ -87,8 +101,8 @@ class OneWayResult(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """As of any result, and where the response is not to be trusted."""
-        shares = self.couplings
-        return (*super().warnings, *self._one_way.warnings, *map(_too_coupled, shares.items()))
+        found = (*super().warnings, *self._one_way.warnings, *_let_go(self.model))
+        return (*found, *map(_too_coupled, self.couplings.items()))
 
     @cached_property
     def couplings(self) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,11 @@ from scipy.integrate import solve_ivp
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.runtime.flexible.modal_body import ModalBody
+from mstmm.runtime.flexible.one_way import modal_loads, rigidity
 from mstmm.runtime.flexible.one_way_result import OneWayResult
 from mstmm.runtime.flexible.oscillators import Cells, Oscillators
+from mstmm.runtime.observed import Observed
 
 Array = NDArray[np.float64]
 
@@ -210,6 +214,67 @@ def test_one_body_of_two() -> None:
     assert np.allclose(found.position("first.tip"), found.position("second.root"), atol=1e-12)
     assert np.abs(moved).max() > 1e-3
     assert np.abs(found.deflection("second", "tip")).max() > 1e-3
+
+
+def rigid_shapes(body: ModalBody) -> ModalBody:
+    """The same body with its six rigid-body motions for shapes."""
+    eps = np.zeros((3, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        eps[i, j, k], eps[i, k, j] = 1.0, -1.0
+    none, unit = np.zeros((6, 6)), np.eye(3)
+    moved = np.einsum("a,bk->abk", body.first, unit)
+    turned = np.einsum("bkc,ac->abk", eps, body.second)
+    return replace(
+        body, modes=tuple("123456"), K=none, D=none, G=np.zeros((3, 6, 6)),
+        C=np.hstack([body.mass * unit, np.einsum("bkc,c->bk", eps, body.first)]),
+        E=np.concatenate([moved, turned], axis=2), F=np.zeros((3, 3, 6, 6)),
+        X=np.zeros((3, 3, 6, 6)),
+        ports={
+            name: replace(
+                port,
+                phi=np.hstack([unit, np.einsum("bkc,c->bk", eps, port.position)]),
+                theta=np.hstack([np.zeros((3, 3)), unit]),
+            )
+            for name, port in body.ports.items()
+        },
+    )  # fmt: skip
+
+
+def test_loads_are_in_balance() -> None:
+    """What acts on a rigid body, less its inertia, does no work in its rigid motions: every load
+    on every end is there, and none twice, in space, with skew ends and all kinds of loads."""
+    ends = {"side": {"position": 0.3, "orientation": [0.4, -0.2, 0.9]}}
+    tree = mstmm.Scene(
+        gravity=[1.0, -9.81, 2.0], body=[HUB, BOB, BOB | {"name": "other"}],
+        beam=[arm(ends=ends, rotary_inertia=[2e-3, 3e-3], polar_inertia_per_length=5e-3)],
+        hinge=[
+            {"name": "axle", "type": "ball", "inboard": "ground", "outboard": "hub",
+             "initial": {"u": [1.0, -2.0, 0.7]}},
+            {"name": "root", "type": "prismatic", "axis": [0.3, 1, 0.2], "inboard": "hub.rim",
+             "outboard": "arm", "law": {"stiffness": 100.0, "damping": 1.0}},
+            {"name": "joint", "type": "universal", "axis": [0, 1, 0], "axis2": [1, 0, 0],
+             "inboard": "arm.tip", "outboard": "bob"},
+            {"name": "second", "type": "prismatic", "axis": [0, 1, 1], "inboard": "arm.side",
+             "outboard": "other", "law": {"stiffness": 50.0}, "initial": {"q": [0.1]}},
+        ],
+        load=[*LOADS, {"on": "arm.side", "moment": [0.3, "sin(t)", 0.1], "axes": "body"}],
+        spring=[SPRING],
+    )  # fmt: skip
+    found = mstmm.compile(tree, "looped", flexibility="one-way").simulate(0.5)
+    assert isinstance(found, OneWayResult)
+    (body,) = rigidity(found.model).one_way.values()
+    observed = Observed(found.model, found.trajectory)
+    left = modal_loads(found.model, rigid_shapes(body), observed)
+    assert np.abs(found.force("root")).max() > 5
+    assert np.abs(left).max() < 1e-9
+
+
+def test_a_hinge_that_lets_go_is_told() -> None:
+    hinge = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "arm",
+             "release": "t >= 0.1"}  # fmt: skip
+    thrown = mstmm.Scene(gravity=[0, 0, 0], hinge=[hinge], beam=[arm()])
+    found = mstmm.compile(thrown, "looped", flexibility="one-way").simulate(0.2)
+    assert any('hinge "wall" lets go of "arm"' in warning for warning in found.warnings)
 
 
 # --- oscillators ----------------------------------------------------------------------------------
