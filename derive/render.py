@@ -24,6 +24,10 @@ from mstmm.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 from .c_text import C_OPERATIONS, KernelText, comment, string
 
 
+#: Run-time sizes for which the compiler unrolls the loops of a kernel.
+_OWN_SIZES = (1, 2, 3, 4)
+
+
 def element_source(spec: ElementSpec) -> str:
     """C file of one element: a function and a trampoline per kernel, and the descriptor."""
     return _render("element.c.jinja", element=_element_view(spec))
@@ -198,6 +202,7 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
         "name": kernel.name,
         "function": abi.kernel_symbol(spec.kind, spec.name, kernel.name),
         "prototype": abi.prototype(spec.kind, spec.name, kernel),
+        "sized": _sized_view(spec, kernel) if kernel.size_symbol else None,
         "purpose": kernel.purpose,
         "sources": list(kernel.sources),
         "inputs": [_port_view(port) for port in kernel.inputs],
@@ -214,6 +219,17 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
             if isinstance(s, (Guard, Solve))
         ],
         "hash": kernel.hash(),
+    }
+
+
+def _sized_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
+    """The function that is compiled for some sizes of their own, and its arguments but the size."""
+    names = abi.parameter_names(kernel)
+    return {
+        "prototype": abi.prototype(spec.kind, spec.name, kernel, "_sized"),
+        "sizes": _OWN_SIZES,
+        "arguments": [names[port.name] for port in kernel.inputs]
+        + [names.get(port.name, port.name) for port in abi.c_outputs(kernel)],
     }
 
 

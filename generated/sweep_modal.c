@@ -68,29 +68,40 @@ int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *re
 #define MSTMM_SOLVE_LDL
 /* x = a^-1 b by a = L D L^T without pivoting: a is n x n (lower triangle read), b and x are n x m.
  * `work` (n x n) keeps L below and D on its diagonal.  Returns 1 if a pivot is not above
- * relative_pivot times its own diagonal entry (NaN included), else 0. */
-static int mstmm_solve_ldl(int n, int m, const real *restrict a, const real *restrict b,
-                           real *restrict x, real *restrict work, real relative_pivot)
+ * relative_pivot times its own diagonal entry (NaN included), else 0.  Where n is a number that the
+ * compiler knows, the loops are unrolled. */
+static inline __attribute__((always_inline))
+int mstmm_solve_ldl(
+    int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
+    real *restrict work, real relative_pivot)
 {
+#pragma GCC unroll 4
     for (int i = 0; i < n; ++i) {
+#pragma GCC unroll 4
         for (int j = 0; j < i; ++j) {
             real rest = a[i * n + j];
+#pragma GCC unroll 4
             for (int k = 0; k < j; ++k) rest -= work[i * n + k] * work[j * n + k] * work[k * n + k];
             work[i * n + j] = rest / work[j * n + j];
         }
         real pivot = a[i * n + i];
+#pragma GCC unroll 4
         for (int k = 0; k < i; ++k) pivot -= work[i * n + k] * work[i * n + k] * work[k * n + k];
         if (!(pivot > relative_pivot * fabs(a[i * n + i]))) return 1;
         work[i * n + i] = pivot;
     }
     for (int column = 0; column < m; ++column) {
+#pragma GCC unroll 4
         for (int i = 0; i < n; ++i) {
             real rest = b[i * m + column];
+#pragma GCC unroll 4
             for (int k = 0; k < i; ++k) rest -= work[i * n + k] * x[k * m + column];
             x[i * m + column] = rest;
         }
+#pragma GCC unroll 4
         for (int i = n - 1; i >= 0; --i) {
             real rest = x[i * m + column] / work[i * n + i];
+#pragma GCC unroll 4
             for (int k = i + 1; k < n; ++k) rest -= work[k * n + i] * x[k * m + column];
             x[i * m + column] = rest;
         }
@@ -132,7 +143,8 @@ static int mstmm_solve_ldl(int n, int m, const real *restrict a, const real *res
  * out e[6] (N, N*m) force part of f = S a + e, at P
  * out e_f[n] load that the modes need
  */
-int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_residual_sized(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
     const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
@@ -770,6 +782,25 @@ int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restri
     return 0;
 }
 
+int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
+    real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_residual_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+    case 2: return mstmm_sweep_modal_residual_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+    case 3: return mstmm_sweep_modal_residual_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+    case 4: return mstmm_sweep_modal_residual_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+    default: return mstmm_sweep_modal_residual_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+    }
+}
+
 static int mstmm_sweep_modal_residual_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_residual(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], out[0], out[1], out[2], out[3], out[4], out[5]);
@@ -841,7 +872,8 @@ static const mstmm_port mstmm_sweep_modal_residual_outputs[] = {
  * out h_f[n] modal momentum
  * out T[1] (J) kinetic energy
  */
-int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restrict C,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_momentum_sized(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
     const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
@@ -1247,6 +1279,25 @@ int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restri
     return 0;
 }
 
+int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
+    real *restrict h, real *restrict h_f, real *restrict T)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_momentum_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+    case 2: return mstmm_sweep_modal_momentum_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+    case 3: return mstmm_sweep_modal_momentum_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+    case 4: return mstmm_sweep_modal_momentum_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+    default: return mstmm_sweep_modal_momentum_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+    }
+}
+
 static int mstmm_sweep_modal_momentum_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_momentum(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], out[0], out[1], out[2], out[3], out[4], out[5]);
@@ -1296,7 +1347,8 @@ static const mstmm_port mstmm_sweep_modal_momentum_outputs[] = {
  * out V[1] (J) strain energy
  * out W_d[1] (W) power lost in damping
  */
-int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_strain_energy_sized(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d)
 {
     real t3 = 0;
@@ -1323,6 +1375,18 @@ int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *r
     }
     W_d[0] = t8;
     return 0;
+}
+
+int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_strain_energy_sized(1, K, D, eta, etad, V, W_d);
+    case 2: return mstmm_sweep_modal_strain_energy_sized(2, K, D, eta, etad, V, W_d);
+    case 3: return mstmm_sweep_modal_strain_energy_sized(3, K, D, eta, etad, V, W_d);
+    case 4: return mstmm_sweep_modal_strain_energy_sized(4, K, D, eta, etad, V, W_d);
+    default: return mstmm_sweep_modal_strain_energy_sized(n, K, D, eta, etad, V, W_d);
+    }
 }
 
 static int mstmm_sweep_modal_strain_energy_call(int n, const real *const *in, real *const *out)
@@ -1361,7 +1425,8 @@ static const mstmm_port mstmm_sweep_modal_strain_energy_outputs[] = {
  * out Psid[3] (rad/s) rate of Psi
  * out xdd[3] (m/s2) second rate of x at etadd = 0
  */
-int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_section_sized(int n, const real *restrict r, const real *restrict phi,
     const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
     const real *restrict g_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
@@ -1539,6 +1604,21 @@ int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restric
     const real t65 = -t64;
     xdd[2] = t65;
     return 0;
+}
+
+int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
+    real *restrict Psid, real *restrict xdd)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    case 4: return mstmm_sweep_modal_section_sized(4, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    default: return mstmm_sweep_modal_section_sized(n, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    }
 }
 
 static int mstmm_sweep_modal_section_call(int n, const real *const *in, real *const *out)
@@ -2527,7 +2607,8 @@ static const mstmm_guard mstmm_sweep_modal_inward_guards[] = {
  * in  Phi[6][n] rates of point and rotation vector per modal speed
  * out H[6][n] motion subspace of the modes, rows v then w, outboard axes
  */
-int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_subspace_sized(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H)
 {
     for (int k = 0; k < n; ++k) {
@@ -2617,6 +2698,18 @@ int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restr
     return 0;
 }
 
+int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
+    real *restrict H)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_subspace_sized(1, H6, Phi, H);
+    case 2: return mstmm_sweep_modal_subspace_sized(2, H6, Phi, H);
+    case 3: return mstmm_sweep_modal_subspace_sized(3, H6, Phi, H);
+    case 4: return mstmm_sweep_modal_subspace_sized(4, H6, Phi, H);
+    default: return mstmm_sweep_modal_subspace_sized(n, H6, Phi, H);
+    }
+}
+
 static int mstmm_sweep_modal_subspace_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_subspace(n, in[0], in[1], out[0]);
@@ -2640,7 +2733,8 @@ static const mstmm_port mstmm_sweep_modal_subspace_outputs[] = {
  * in  c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
  * out c_s[6] relative acceleration
  */
-int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_imposed_sized(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s)
 {
     real t1 = 0;
@@ -2688,6 +2782,18 @@ int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restric
     return 0;
 }
 
+int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, real *restrict c_s)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_imposed_sized(1, H, s, c, c_s);
+    case 2: return mstmm_sweep_modal_imposed_sized(2, H, s, c, c_s);
+    case 3: return mstmm_sweep_modal_imposed_sized(3, H, s, c, c_s);
+    case 4: return mstmm_sweep_modal_imposed_sized(4, H, s, c, c_s);
+    default: return mstmm_sweep_modal_imposed_sized(n, H, s, c, c_s);
+    }
+}
+
 static int mstmm_sweep_modal_imposed_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_imposed(n, in[0], in[1], in[2], out[0]);
@@ -2716,7 +2822,8 @@ static const mstmm_port mstmm_sweep_modal_imposed_outputs[] = {
  * out S_ff[n][n] rows and columns of the modes, added to what is there
  * out e_f[n] load that the modes need, added to what is there
  */
-int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
 {
@@ -2930,6 +3037,19 @@ int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restric
     return 0;
 }
 
+int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
+    real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_absorb_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 2: return mstmm_sweep_modal_absorb_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 3: return mstmm_sweep_modal_absorb_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 4: return mstmm_sweep_modal_absorb_sized(4, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    default: return mstmm_sweep_modal_absorb_sized(n, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    }
+}
+
 static int mstmm_sweep_modal_absorb_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_absorb(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
@@ -2961,7 +3081,8 @@ static const mstmm_port mstmm_sweep_modal_absorb_outputs[] = {
  * out S_ff[n][n] rows and columns of the modes, added to what is there
  * out e_f[n] load that the modes need, added to what is there
  */
-int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_rebase_sized(int n, const real *restrict H, const real *restrict S,
     const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
     real *restrict e_f)
 {
@@ -3100,6 +3221,19 @@ int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict
     return 0;
 }
 
+int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
+    const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
+    real *restrict e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_rebase_sized(1, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+    case 2: return mstmm_sweep_modal_rebase_sized(2, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+    case 3: return mstmm_sweep_modal_rebase_sized(3, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+    case 4: return mstmm_sweep_modal_rebase_sized(4, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+    default: return mstmm_sweep_modal_rebase_sized(n, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+    }
+}
+
 static int mstmm_sweep_modal_rebase_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_rebase(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
@@ -3132,7 +3266,8 @@ static const mstmm_port mstmm_sweep_modal_rebase_outputs[] = {
  * out e_c[6] (N, N*m) e without modes
  * out work[n][n] factor L, D of solve
  */
-int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restrict e,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_condense_sized(int n, const real *restrict S, const real *restrict e,
     const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
     real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
     real *restrict work)
@@ -3352,6 +3487,20 @@ int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restri
     return 0;
 }
 
+int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restrict e,
+    const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
+    real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
+    real *restrict work)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_condense_sized(1, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+    case 2: return mstmm_sweep_modal_condense_sized(2, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+    case 3: return mstmm_sweep_modal_condense_sized(3, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+    case 4: return mstmm_sweep_modal_condense_sized(4, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+    default: return mstmm_sweep_modal_condense_sized(n, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+    }
+}
+
 static int mstmm_sweep_modal_condense_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_condense(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
@@ -3384,7 +3533,8 @@ static const mstmm_guard mstmm_sweep_modal_condense_guards[] = {
  * in  delta_I[6] deviation of the frame without the modes' part
  * out etadd[n] modal accelerations
  */
-int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_recover_sized(int n, const real *restrict Gg, const real *restrict delta_I,
     real *restrict etadd)
 {
     for (int k = 0; k < n; ++k) {
@@ -3404,6 +3554,18 @@ int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restri
         etadd[k] = t12;
     }
     return 0;
+}
+
+int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict etadd)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_recover_sized(1, Gg, delta_I, etadd);
+    case 2: return mstmm_sweep_modal_recover_sized(2, Gg, delta_I, etadd);
+    case 3: return mstmm_sweep_modal_recover_sized(3, Gg, delta_I, etadd);
+    case 4: return mstmm_sweep_modal_recover_sized(4, Gg, delta_I, etadd);
+    default: return mstmm_sweep_modal_recover_sized(n, Gg, delta_I, etadd);
+    }
 }
 
 static int mstmm_sweep_modal_recover_call(int n, const real *const *in, real *const *out)
@@ -3428,7 +3590,8 @@ static const mstmm_port mstmm_sweep_modal_recover_outputs[] = {
  * in  delta_I[6] deviation of the frame without the modes' part
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_displaced_sized(int n, const real *restrict H, const real *restrict etadd,
     const real *restrict delta_I, real *restrict delta)
 {
     real t1 = 0;
@@ -3476,6 +3639,18 @@ int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restr
     return 0;
 }
 
+int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+    const real *restrict delta_I, real *restrict delta)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_displaced_sized(1, H, etadd, delta_I, delta);
+    case 2: return mstmm_sweep_modal_displaced_sized(2, H, etadd, delta_I, delta);
+    case 3: return mstmm_sweep_modal_displaced_sized(3, H, etadd, delta_I, delta);
+    case 4: return mstmm_sweep_modal_displaced_sized(4, H, etadd, delta_I, delta);
+    default: return mstmm_sweep_modal_displaced_sized(n, H, etadd, delta_I, delta);
+    }
+}
+
 static int mstmm_sweep_modal_displaced_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_displaced(n, in[0], in[1], in[2], out[0]);
@@ -3500,7 +3675,8 @@ static const mstmm_port mstmm_sweep_modal_displaced_outputs[] = {
  * out e[6] (N, N*m) force part of f = S a + e, at P, added to what is there
  * out e_f[n] load that the modes need, added to what is there
  */
-int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_prescribed_sized(int n, const real *restrict S_rf, const real *restrict S_ff,
     const real *restrict s, real *restrict e, real *restrict e_f)
 {
     for (int k = 0; k < n; ++k) {
@@ -3550,6 +3726,18 @@ int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *r
     return 0;
 }
 
+int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+    const real *restrict s, real *restrict e, real *restrict e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_prescribed_sized(1, S_rf, S_ff, s, e, e_f);
+    case 2: return mstmm_sweep_modal_prescribed_sized(2, S_rf, S_ff, s, e, e_f);
+    case 3: return mstmm_sweep_modal_prescribed_sized(3, S_rf, S_ff, s, e, e_f);
+    case 4: return mstmm_sweep_modal_prescribed_sized(4, S_rf, S_ff, s, e, e_f);
+    default: return mstmm_sweep_modal_prescribed_sized(n, S_rf, S_ff, s, e, e_f);
+    }
+}
+
 static int mstmm_sweep_modal_prescribed_call(int n, const real *const *in, real *const *out)
 {
     return mstmm_sweep_modal_prescribed(n, in[0], in[1], in[2], out[0], out[1]);
@@ -3574,7 +3762,8 @@ static const mstmm_port mstmm_sweep_modal_prescribed_outputs[] = {
  * in  e_f[n] load that the modes need
  * out tau[n] efforts on the modes
  */
-int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_modal_effort_sized(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau)
 {
     for (int k = 0; k < n; ++k) {
@@ -3593,6 +3782,18 @@ int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *re
         tau[k] = t11;
     }
     return 0;
+}
+
+int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
+    const real *restrict e_f, real *restrict tau)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_modal_effort_sized(1, H, e, e_f, tau);
+    case 2: return mstmm_sweep_modal_modal_effort_sized(2, H, e, e_f, tau);
+    case 3: return mstmm_sweep_modal_modal_effort_sized(3, H, e, e_f, tau);
+    case 4: return mstmm_sweep_modal_modal_effort_sized(4, H, e, e_f, tau);
+    default: return mstmm_sweep_modal_modal_effort_sized(n, H, e, e_f, tau);
+    }
 }
 
 static int mstmm_sweep_modal_modal_effort_call(int n, const real *const *in, real *const *out)

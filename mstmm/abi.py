@@ -165,8 +165,8 @@ def c_outputs(kernel: KernelIR) -> tuple[Port, ...]:
     return (*kernel.outputs, Port(work_name(kernel), (size, size), meaning="factor L, D of solve"))
 
 
-def prototype(kind: str, name: str, kernel: KernelIR) -> str:
-    """C declaration of a kernel's function, without the semicolon."""
+def prototype(kind: str, name: str, kernel: KernelIR, suffix: str = "") -> str:
+    """C declaration of a kernel's function, without the semicolon; `suffix` ends its name."""
     names = parameter_names(kernel)
     parameters = ["int n"] if kernel.size_symbol else []
     parameters += [f"const real *restrict {names[port.name]}" for port in kernel.inputs]
@@ -174,5 +174,5 @@ def prototype(kind: str, name: str, kernel: KernelIR) -> str:
         f"real *restrict {names.get(port.name, port.name)}" for port in c_outputs(kernel)
     ]
     words = ", ".join(parameter.replace(" ", "\0") for parameter in parameters) or "void"
-    text = f"int\0{kernel_symbol(kind, name, kernel.name)}({words})"
+    text = f"int\0{kernel_symbol(kind, name, kernel.name)}{suffix}({words})"
     return textwrap.fill(text, 100, subsequent_indent="    ").replace("\0", " ")
