@@ -178,10 +178,11 @@ def _kernels(view: ElementView) -> list[Item]:
     items: list[Item] = []
     for kernel in view.kernels():
         counts = ", ".join(f"{count} {name}" for name, count in kernel.operation_counts().items())
+        once = "; what stands inside loops is counted once" if kernel.size_symbol else ""
         items += [
             Heading(f"kernel {kernel.name}", 2),
             Paragraph(kernel.purpose or kernel.name),
-            Paragraph(f"{kernel.flops()} floating-point operations ({counts})", "note"),
+            Paragraph(f"{kernel.flops()} floating-point operations ({counts}){once}", "note"),
             *_sources(tuple(s for s in kernel.sources if s not in _all_sources(view))),
             Heading("reads", 3),
             _ports(kernel.inputs),

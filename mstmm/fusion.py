@@ -23,7 +23,7 @@ from .runtime.columns import ColumnsLibrary, open_columns
 from .runtime.fused import FusedLibrary, open_library
 from .runtime.structure import structure_of
 from .spec import ElementSpec
-from .structure import Key, Structure
+from .structure import BodyStructure, Key, Structure
 
 if TYPE_CHECKING:
     from .derive.fuse import Fused
@@ -39,6 +39,8 @@ MOST_ASKED = 400
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
 _SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.1, 0.03, 0.0015
 _SAVED_PER_BODY = 6e-8
+#: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
+_MODES_PER_BODY = 24
 
 #: What decides the text besides structure and kernels: the modules that print it.
 PRINTERS = {
@@ -137,9 +139,10 @@ class Fusion:
         return found
 
     def _break_even(self) -> float:
-        n = len(self.structure.bodies)
+        modes = modes_at(self.structure)
+        n = sum(1 + count**2 / _MODES_PER_BODY for count in modes)
         seconds = _SECONDS + n * (_SECONDS_PER_BODY + n * _SECONDS_PER_PAIR)
-        return seconds / (_SAVED_PER_BODY * max(1, n))
+        return seconds / (_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
 
     def _get(self, part: str, build: bool) -> FusedLibrary | None:
         attribute = "library" if part == "scalar" else "lanes"
@@ -203,6 +206,16 @@ class Fusion:
         from .derive.fuse import fuse
 
         return fuse(structure, kernels_of(self._definitions))
+
+
+def modes_at(structure: Structure) -> list[int]:
+    """Body by body, how many modes of a flexible body its own equations or connection carry."""
+
+    def count(body: BodyStructure) -> int:
+        frame = body if body.section is None else structure.bodies[body.section.frame]
+        return 0 if frame.modal is None or body.idle else frame.modal.n
+
+    return [count(body) for body in structure.bodies]
 
 
 def _note(built: Built) -> str:

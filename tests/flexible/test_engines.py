@@ -16,6 +16,7 @@ from support.complex_arithmetic import complex_step
 import mstmm
 from mstmm.derive.evaluate import evaluate_floats
 from mstmm.errors import SceneError
+from mstmm.fusion import Fusion, modes_at
 from mstmm.ir import KernelIR
 from mstmm.runtime.structure import structure_of
 
@@ -200,3 +201,23 @@ def test_numbers_of_beams_are_parameters() -> None:
     assert np.array_equal(heavier.accelerations(q, u, TIME), expected)
     with pytest.raises(SceneError, match="there is no such number"):
         model.with_parameters({f"{name}.modes.y": 3})
+
+
+def test_compiling_is_weighed_by_modes() -> None:
+    """Frame and sections carry the modes, ends that nothing hangs on do not; more shapes, more
+    evaluations until a compiler run pays."""
+    counts, least = [], []
+    for shapes in (1, 8):
+        beam = {"name": "b", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
+                "modes": {"y": shapes}, "frame": "chord", "quadrature": False}  # fmt: skip
+        rod = {"name": "rod", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
+        pins = [{"name": name, "type": "pin", "inboard": a, "outboard": b, "axis": [0, 0, 1]}
+                for name, a, b in (("one", "ground", "b"), ("two", "b.tip", "rod"))]  # fmt: skip
+        model = compiled(
+            {"gravity": [0, 0, 0], "beam": [beam], "body": [rod], "hinge": pins}, "looped"
+        )
+        fusion = Fusion(model._engine.packed, {}, {})
+        counts.append(sorted(modes_at(fusion.structure)))
+        least.append(fusion._break_even() * sum(1 + 2 * n for n in counts[-1]))
+    assert counts == [[0, 0, 1, 1], [0, 0, 8, 8]]  # held section, rod, frame, tip
+    assert least[1] > 1.5 * least[0]
