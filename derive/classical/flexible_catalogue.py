@@ -8,7 +8,7 @@ many for the hinges beside them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 
 from ..derivation import Derivation
 from . import flexible_body, flexible_joint, flexible_spring
@@ -136,11 +136,11 @@ def _hinge(name: str, which: str) -> Derivation:
     return make(pair, f"{name}_{which}", *numbers[which])
 
 
-#: Name -> derivation.
+#: Name -> derivation, made once.
 FLEXIBLE: dict[str, Callable[[], Derivation]] = {
-    **{body.element: partial(flexible_body.derivation, body) for body in BODIES},
+    **{body.element: cache(partial(flexible_body.derivation, body)) for body in BODIES},
     **{
-        f"{name}_{which}": partial(_hinge, name, which)
+        f"{name}_{which}": cache(partial(_hinge, name, which))
         for name, (_, _, numbers) in HINGES.items()
         for which in numbers
     },

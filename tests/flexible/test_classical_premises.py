@@ -9,10 +9,12 @@ from __future__ import annotations
 import dataclasses
 from functools import cache
 
+import mpmath
 import numpy as np
 import pytest
 from crosscheck.mutations import mutants
-from support.hinge_premises import body_residual, hinge_residual
+from support.discrete_bodies import DIGITS, kernel_inputs
+from support.hinge_premises import body_residual, hinge_residual, matrices
 from support.premises import Premises
 from support.random_bodies import random_body
 
@@ -54,6 +56,15 @@ def test_body_satisfies_its_premises(body: BodyStatement, rng: np.random.Generat
         Premises(derivation), lower(derivation, "transfer"), sample, rng, body.space
     )
     assert error < LIMIT
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: b.element)
+def test_determinant_is_one_at_any_motion(body: BodyStatement, rng: np.random.Generator) -> None:
+    ir = lower(derived(body.element), "transfer")
+    sample = random_body(rng, body.space.planar, body.kind, body.modes, body.planes)
+    with mpmath.workdps(DIGITS):
+        whole = matrices(ir, kernel_inputs(sample, ir))["U"]
+        assert abs(mpmath.det(whole) - 1) < LIMIT
 
 
 def pair_of(name: str, which: str) -> Pairing:
