@@ -22,8 +22,9 @@ def blocks(language: str) -> list[str]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The files the README names, in an empty folder with a kernel store of its own."""
     (tmp_path / "pendulum.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    run, knee = blocks("python")
+    run, beam, knee = blocks("python")
     (tmp_path / "run.py").write_text(run, encoding="utf-8")
+    (tmp_path / "beam.py").write_text(beam, encoding="utf-8")
     (tmp_path / "knee.py").write_text(knee, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "kernels"))
@@ -33,6 +34,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_python_block_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(folder / "run.py"))
     assert "finished at t = 5 s" in capsys.readouterr().out
+
+
+def test_the_beam_bends(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = runpy.run_path(str(folder / "beam.py"))
+    assert "frame chord" in capsys.readouterr().out
+    assert names["result"].warnings == ()
+    assert (folder / "rod.png").stat().st_size > 10000
 
 
 def test_every_command_succeeds(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
