@@ -68,7 +68,7 @@ def compile_scene(
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
     from .fusion import MOST_ASKED, MOST_BODIES, Fusion
     from .runtime import store
-    from .runtime.flexible.rigidified import with_level
+    from .runtime.flexible.one_way.rigidified import with_level
     from .runtime.model import Model
 
     scene = with_level(scene, flexibility)

@@ -12,9 +12,9 @@ from mstmm.scene import Hinge, Scene
 
 from .conditioning import LARGEST, PivotLoss, SingularDistance, pivot_loss, singular_distance
 from .error_estimate import ANGLE, PART, SAFETY, ErrorEstimate
-from .flexible import certify
-from .flexible.certify import Flexibility
-from .flexible.observe_momentum import undeformed
+from .flexible.results import certify
+from .flexible.results.certify import Flexibility
+from .flexible.results.observe_momentum import undeformed
 from .stability import StepCheck
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mstmm.scene import Hinge
 
 from . import prebuilt
-from .flexible.pivots import ModalPivots
+from .flexible.results.pivots import ModalPivots
 from .pack import Packed, kernel_type
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from mstmm.errors import EnvironmentFailure
 from mstmm.hinge_types import effort_unit
 
 from . import provenance
-from .flexible import dataset as flexible
+from .flexible.results import dataset as flexible
 from .quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
 
 if TYPE_CHECKING:

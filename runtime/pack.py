@@ -85,7 +85,7 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     if not (scene.beam or scene.elastic):
         return Expanded(scene, scene, {})
     from .flexible.bodies import modal_bodies
-    from .flexible.rigidified import rigidified
+    from .flexible.one_way.rigidified import rigidified
 
     rigid = rigidified(scene)
     expanded = expand(rigid.scene, modal_bodies(rigid.scene) if flexible is None else flexible)

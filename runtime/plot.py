@@ -14,7 +14,7 @@ from mstmm.errors import SceneError
 from .curves import curve
 from .dataset import extra
 from .files import replacing
-from .flexible.pictures import Picture, picture
+from .flexible.results.pictures import Picture, picture
 from .table import default_names, default_pictures
 
 if TYPE_CHECKING:

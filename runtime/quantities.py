@@ -21,7 +21,7 @@ from .layout import HingeSlots
 from .observed import quaternions
 
 if TYPE_CHECKING:
-    from .flexible.results import FlexibleResults
+    from .flexible.results.results import FlexibleResults
     from .observed import Observed
 
 Array = NDArray[np.float64]
@@ -207,7 +207,7 @@ class Quantities:
             )  # fmt: skip
         if reference in self.layout.modal:
             self._modal(table, self.layout.modal[reference])
-        from .flexible.names import add_body
+        from .flexible.results.names import add_body
 
         add_body(table, self._flexible, reference)
 

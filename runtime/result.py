@@ -16,7 +16,7 @@ from mstmm.hinge_types import HINGE_TYPES
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
 from .execution import Watch, first_run, second_run
-from .flexible.results import FlexibleResults
+from .flexible.results.results import FlexibleResults
 from .integrate import Statistics, Status
 from .layout import HingeSlots
 from .observed import Observed
@@ -192,7 +192,7 @@ class Result(FlexibleResults):
     def pictures(self) -> tuple[str, ...]:
         """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
         them), "blade.shape", "blade.deflection" (along the beam), "blade.modal_energy"."""
-        from .flexible.pictures import names
+        from .flexible.results.pictures import names
 
         return tuple(names(self))
 
@@ -250,7 +250,7 @@ def result_of(
     rigid = None if expanded is None else expanded.rigidified
     if rigid is None or not rigid.one_way:
         return Result(model, run, error, step)
-    from .flexible.one_way_result import OneWayResult
+    from .flexible.one_way.result import OneWayResult
 
     return OneWayResult(model, run, error, step)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .beams import BeamBodies
+from .beam.beams import BeamBodies
 from .modal_body import ModalBody
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def modal_bodies(scene: Scene) -> dict[str, ModalBody]:
     beams = BeamBodies(scene)
     found = {b.name: beams.body(b) for b in scene.beam if b.model != "rigid"}
     if scene.elastic:
-        from .elastic import elastic_bodies
+        from .elastic.bodies import elastic_bodies
 
         found |= elastic_bodies(scene)
     return found

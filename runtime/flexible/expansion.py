@@ -18,7 +18,7 @@ from mstmm.scene import Body, Hinge, Scene, split
 from mstmm.scene_parts import End, Load
 
 from .modal_body import MassPoint, ModalBody, ModalPort
-from .rigidified import Rigidified
+from .one_way.rigidified import Rigidified
 
 HELD, POINT = "held", "point"
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .beam_shapes import BeamShapes
+    from .beam.beam_shapes import BeamShapes
 
 Array: TypeAlias = NDArray[np.float64]
 

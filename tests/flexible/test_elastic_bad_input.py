@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mstmm.errors import SceneError
-from mstmm.runtime.flexible.elastic_matrices import save_matrices
+from mstmm.runtime.flexible.elastic.matrices import save_matrices
 
 Array = NDArray[np.float64]
 Arrays = dict[str, Any]

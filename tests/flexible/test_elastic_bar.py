@@ -7,7 +7,7 @@ import pytest
 from flexible import elastic_bar as bar
 from scipy import linalg
 
-from mstmm.runtime.flexible.mesh import MeshStress
+from mstmm.runtime.flexible.elastic.mesh import MeshStress
 
 #: Of the clamped bar by beam theory: bending along z, along y, along z, along y, rad/s.
 BEAM = np.array([103.36, 258.40, 647.75, 1619.4])

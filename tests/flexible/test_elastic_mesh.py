@@ -12,7 +12,7 @@ from flexible import elastic_bar as bar
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
-from mstmm.runtime.flexible.elastic import elastic_bodies
+from mstmm.runtime.flexible.elastic.bodies import elastic_bodies
 
 meshio = pytest.importorskip("meshio", reason="comes with the extra test")
 skfem = pytest.importorskip("skfem", reason="comes with the extra test")

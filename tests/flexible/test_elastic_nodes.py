@@ -11,9 +11,9 @@ from flexible import elastic_bar as bar
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.craig_bampton import reduce
-from mstmm.runtime.flexible.elastic import model_of
-from mstmm.runtime.flexible.elastic_ports import port
+from mstmm.runtime.flexible.elastic.bodies import model_of
+from mstmm.runtime.flexible.elastic.craig_bampton import reduce
+from mstmm.runtime.flexible.elastic.ports import port
 
 Array = NDArray[np.float64]
 

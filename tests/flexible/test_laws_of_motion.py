@@ -215,3 +215,32 @@ def test_drag_slows_a_sliding_beam() -> None:
     )
     result = compiled(data).simulate(1.5, rtol=1e-10)
     assert abs(result.velocity("plank")[-1, 1] - 2 * np.exp(-1.05)) < 1e-8
+
+
+def test_work_of_everything_that_is_not_stored() -> None:
+    """Damping, drag, a follower force, a load per length and a drive: energy less their work is
+    constant."""
+    data = scene(
+        beam(
+            "arm", 1.0, [6.0, 8.0], modes={"y": 2, "z": 1, "twist": 1}, basis="auto",
+            torsional_stiffness=5.0, polar_inertia_per_length=0.01, viscous_drag=0.3,
+            damping={"stiffness": 0.002},
+        ),
+        beam(
+            "hand", 0.6, 5.0, modes={"y": 2, "z": 1}, frame="chord", basis="auto", damping=0.01,
+            polar_inertia_per_length=0.01,
+        ),
+        hinge("shoulder", "pin", "ground", "arm", axis=[0, 1, 1], drive="0.8*sin(3*t)"),
+        hinge("wrist", "universal", "arm.tip", "hand", axis=[0, 0, 1], axis2=[0, 1, 0],
+              law={"stiffness": [1.0, 1.0], "damping": [0.05, 0.05]}),
+        gravity=DOWN,
+        load=[
+            {"on": "hand.tip", "force": [0.5, "sin(4*t)", 0.3], "axes": "body"},
+            {"on": "arm", "force_per_length": [0.0, 0.4, 0.2], "span": [0.3, 0.9]},
+        ],
+    )  # fmt: skip
+    result = compiled(data).simulate(1.0, rtol=1e-10, atol=1e-13)
+    assert result.success, result.message
+    balance = np.asarray(result.energy()) - result.work
+    assert np.ptp(result.work) > 0.1
+    assert np.ptp(balance) < 1e-8 * np.ptp(result.work)

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.one_way import modal_loads, rigidity
-from mstmm.runtime.flexible.one_way_result import OneWayResult
-from mstmm.runtime.flexible.oscillators import Cells, Oscillators
+from mstmm.runtime.flexible.one_way.oscillators import Cells, Oscillators
+from mstmm.runtime.flexible.one_way.response import modal_loads, rigidity
+from mstmm.runtime.flexible.one_way.result import OneWayResult
 from mstmm.runtime.observed import Observed
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from support.beam_motions import LENGTH, MASS, beam, moving
 
-from mstmm.runtime.flexible import observe
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.modal_kernels import momentum
-from mstmm.runtime.flexible.observe import Motion
-from mstmm.runtime.flexible.observe_momentum import equivalent, undeformed
+from mstmm.runtime.flexible.results import observe
+from mstmm.runtime.flexible.results.modal_kernels import momentum
+from mstmm.runtime.flexible.results.observe import Motion
+from mstmm.runtime.flexible.results.observe_momentum import equivalent, undeformed
 
 Array = NDArray[np.float64]
 

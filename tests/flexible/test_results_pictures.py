@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 
 import mstmm
-from mstmm.runtime.flexible.plot_shapes import Strip, instants, plane, strip_height
+from mstmm.runtime.flexible.results.plot_shapes import Strip, instants, plane, strip_height
 from mstmm.runtime.result import Result
 
 

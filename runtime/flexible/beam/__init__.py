@@ -1,0 +1,1 @@
+"""Beams: shapes, frames, moments and the choices that a scene leaves open."""

@@ -1,0 +1,176 @@
+"""How a scene holds a beam and what it loads it with: what frames and bases are chosen from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.scene_flexible_checks import free_axes
+from mstmm.scene_parts import Load, Spring
+from mstmm.scene_rules import split
+
+from ..modal_body import Array
+from .data import BeamData
+from .static_shapes import stiffness_of
+
+if TYPE_CHECKING:
+    from mstmm.scene import Chain, Scene
+    from mstmm.scene_beam import Beam
+    from mstmm.scene_parts import Hinge
+
+#: Deflection along y turns the section about z, along z about y, and twist turns it about x.
+AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}
+#: So much of an axis must lie among the free ones for a hinge to leave the rotation free.
+MOSTLY = 0.7
+#: A mass beyond an end is heavy from this share of the beam's mass on, a rotor at the held end from
+#: this share of the beam's inertia about it, a spring from this share of the beam's own stiffness.
+HEAVY = 0.1
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class End:
+    """What acts at one section: moments per direction, and whether a heavy load does."""
+
+    x: float
+    moments: frozenset[str] = frozenset()
+    heavy: bool = False
+
+
+@dataclass(frozen=True)
+class Holding:
+    """How a beam is held: at `x` by a hinge that leaves `turns` (directions) free and translations
+    if `moves`; `sprung` are the directions among them in which a spring or rotor resists."""
+
+    name: str  #: end by which it is held
+    x: float
+    turns: frozenset[str]
+    moves: bool
+    heavy_rotor: frozenset[str] = frozenset()
+    sprung: frozenset[str] = frozenset()
+    ends: tuple[End, ...] = ()
+    said: str = ""  #: the hinge in words
+
+
+class Surroundings:
+    """What acts on which body of a scene, found once for all its beams."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.holds = {hinge.outboard_body: hinge for hinge in scene.hinge}
+        self.carries: dict[str, list[Hinge]] = {}
+        for hinge in scene.hinge:
+            self.carries.setdefault(hinge.inboard_body, []).append(hinge)
+        self.acts: dict[str, list[tuple[str, Chain | Spring | Load]]] = {}
+        acting: list[Chain | Spring | Load] = [*scene.chain, *scene.spring, *scene.load]
+        for element in acting:
+            for reference in _references(element):
+                name, end = split(reference)
+                self.acts.setdefault(name, []).append((end or "root", element))
+        self._masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
+        self._masses |= {b.name: b.mass for b in scene.beam}
+        for chain in scene.chain:
+            name = split(chain.inboard)[0]
+            self._masses[name] = np.inf
+        self._beyond: dict[str, float] = {}
+
+    def mass_beyond(self, body: str) -> float:
+        """Mass of a body and of all that hangs on it; infinite where that is not known."""
+        waiting = [body]
+        while waiting:
+            name = waiting[-1]
+            children = [hinge.outboard_body for hinge in self.carries.get(name, ())]
+            missing = [child for child in children if child not in self._beyond]
+            if missing:
+                waiting += missing
+                continue
+            waiting.pop()
+            own = self._masses.get(name, np.inf)
+            self._beyond[name] = own + sum(self._beyond[child] for child in children)
+        return self._beyond[body]
+
+
+def _references(element: Chain | Spring | Load) -> tuple[str, ...]:
+    """The bodies and ends that an element acts on."""
+    if isinstance(element, Load):
+        return (element.on,)
+    return (element.from_, element.to) if isinstance(element, Spring) else (element.inboard,)
+
+
+def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
+    """Read from the hinges, springs and loads of the scene; every beam is held by one hinge."""
+    ends = tuple(sorted(set(_ends(around, beam, data)), key=lambda end: end.x))
+    hinge = around.holds[beam.name]
+    at = hinge.outboard_end or "root"
+    x, turn = data.ends[at]
+    free = _directions(turn, free_axes(hinge))
+    stiff, rotors = _resisted(hinge, data)
+    return Holding(
+        at,
+        x,
+        free,
+        hinge.type in ("free", "planar", "elastic"),
+        heavy_rotor=free if rotors else frozenset(),
+        sprung=free if stiff else frozenset(),
+        ends=ends,
+        said=f"the {hinge.type} hinge",
+    )
+
+
+def _directions(turn: Array, axes: tuple[Vector, ...]) -> frozenset[str]:
+    """The directions whose rotation lies among free axes given in the axes of the end."""
+    if not axes:
+        return frozenset()
+    span, values, _ = np.linalg.svd(turn @ np.array(axes).T, full_matrices=False)
+    span = span[:, values > 1e-9]
+    return frozenset(
+        word for word, axis in AXES.items() if np.linalg.norm(span.T @ np.array(axis)) > MOSTLY
+    )
+
+
+def _resisted(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
+    """(springs, rotors) that matter beside the beam's own stiffness and inertia."""
+    bending = min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()) / data.length
+    inertia = data.mass * data.length**2 / 3
+    law = hinge.law
+    rotary = slice(3, None) if hinge.type in ("free", "elastic") else slice(None)
+    stiffness = max(law.stiffness[rotary], default=0.0)
+    return stiffness > HEAVY * bending, max(law.inertia[rotary], default=0.0) > HEAVY * inertia
+
+
+# --- what acts at the other sections --------------------------------------------------------------
+
+
+def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
+    for hinge in around.carries.get(beam.name, ()):
+        x, turn = data.ends[hinge.inboard_end or "root"]
+        free = _directions(turn @ np.array(hinge.rotation), free_axes(hinge))
+        if any(hinge.law.stiffness) or any(hinge.law.inertia) or _acts(hinge):
+            free = frozenset()
+        heavy = around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
+        yield End(x, frozenset(AXES) - free, heavy)
+    for end, element in around.acts.get(beam.name, ()):
+        x = data.ends[end][0]
+        if isinstance(element, Load):
+            if element.force_per_length is None:
+                turning = any(not m.is_zero for m in element.moment)
+                yield End(x, frozenset(AXES if turning else ()))
+        elif isinstance(element, Spring):
+            yield End(x, frozenset(), _is_stiff(element, data))
+        else:
+            yield End(x, frozenset(AXES), True)
+
+
+def _is_stiff(spring: Spring, data: BeamData) -> bool:
+    """Stiff beside the beam as a cantilever, or of a user's type."""
+    own = 3 * min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()) / data.length**3
+    return spring.type != "spring" or spring.law.stiffness > HEAVY * own
+
+
+def _acts(hinge: Hinge) -> bool:
+    """A drive or an effort: a moment whatever the beam does."""
+    driven = hinge.drive is not None and any(d is not None for d in hinge.drive)
+    return driven or any(not e.is_zero for e in hinge.law.effort)

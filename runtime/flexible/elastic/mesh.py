@@ -1,0 +1,209 @@
+"""Elastic bodies from meshes of solid elements, by scikit-fem and meshio (extra: fem)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import SceneError
+
+from ...dataset import extra
+from .model import ElasticModel
+
+Array = NDArray[np.float64]
+
+#: Cells of solids as meshio calls them, and the mesh that scikit-fem makes of them.
+SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
+#: Points of integration that are taken together.
+_TOGETHER = 20_000
+
+LOCKING = (
+    "elements of degree 1 are too stiff in bending (by 30 % in frequency with two layers); "
+    "take order = 2, or check against a mesh with many layers"
+)
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material: young (Pa), poisson, density (kg/m3)."""
+
+    young: float
+    poisson: float
+    density: float
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame's constants lambda and mu, Pa."""
+        e, nu = self.young, self.poisson
+        return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
+
+
+def _library(what: str) -> Any:
+    try:
+        import skfem
+    except ImportError as error:
+        raise extra("fem", what, error) from None
+    return skfem
+
+
+def box_mesh(size: Sequence[float], divisions: Sequence[int], corner: Sequence[float]) -> Any:
+    """Hexahedra of a block: size (m), divisions along x, y, z, corner of least x, y, z (m)."""
+    skfem = _library("an elastic block")
+    lines = [
+        np.linspace(c, c + s, int(d) + 1) for s, d, c in zip(size, divisions, corner, strict=True)
+    ]
+    return skfem.MeshHex.init_tensor(*lines)
+
+
+def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
+    """The solid cells of any file that meshio reads, lengths times `scale`.
+
+    Raises SceneError for a file that is no mesh, has no solid cells or several kinds of them,
+    EnvironmentFailure without the extra.
+    """
+    skfem = _library("a mesh")
+    try:
+        import meshio
+        from skfem.io.meshio import from_meshio
+    except ImportError as error:
+        raise extra("fem", "a mesh", error) from None
+    if not path.exists():
+        raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
+    try:
+        read = meshio.read(path)
+    except (meshio.ReadError, OSError, ValueError, SystemExit) as error:
+        raise SceneError(f"{where}: {path.name} is no mesh that meshio reads: {error}") from None
+    kinds = sorted({block.type for block in read.cells if block.dim == 3})
+    if len(kinds) != 1 or kinds[0] not in SOLIDS:
+        raise SceneError(
+            f"{where}: {path.name}: expected solid cells of one kind out of {', '.join(SOLIDS)}, "
+            f"found {', '.join(kinds) or 'none'}; write the mesh with one of them"
+        )
+    mesh = from_meshio(read, ignore_orientation=True)
+    assert isinstance(mesh, skfem.Mesh)
+    if (
+        not _curved(skfem, mesh) and len(np.unique(mesh.t)) < mesh.nvertices
+    ):  # such as the centres of arcs
+        mesh = mesh.remove_unused_nodes()
+    return mesh.scaled(scale) if scale != 1.0 else mesh
+
+
+def _curved(skfem: Any, mesh: Any) -> bool:
+    """Cells with nodes between their corners."""
+    return isinstance(mesh, (skfem.MeshTet2, skfem.MeshHex2))
+
+
+def mesh_model(mesh: Any, material: Material, order: int, where: str) -> ElasticModel:
+    """Matrices of a mesh of solid elements with displacements of degree `order` (1 or 2).
+
+    Raises SceneError for elements without volume, and for degree 1 on cells of degree 2, where
+    rotations of the body would strain it.
+    """
+    skfem = _library("an elastic mesh")
+    if order == 1 and _curved(skfem, mesh):
+        raise SceneError(
+            f"{where}: order: expected 2 on cells of degree 2, found 1; leave order out"
+        )
+    element = _element(skfem, mesh, order)
+    vector = skfem.Basis(mesh, skfem.ElementVector(element), intorder=2 * order)
+    scalar = vector.with_element(element)
+    _refuse_inverted(scalar, where)
+    density = material.density
+    mass = skfem.BilinearForm(lambda u, v, w: density * u * v).assemble(scalar)
+    return ElasticModel(
+        where=where,
+        mass=_each_direction(mass),
+        stiffness=_stiffness(skfem, vector, material),
+        nodes=np.ascontiguousarray(scalar.doflocs.T),
+        scalar_mass=mass.tocsr(),
+        sets=_sets(mesh, scalar),
+        stress=MeshStress(vector, material),
+        notes=(f"{mesh.nelements} elements of degree {order}, {vector.N} unknowns",),
+        warnings=(f"{where}: {LOCKING}",) if order == 1 else (),
+    )
+
+
+def _element(skfem: Any, mesh: Any, order: int) -> Any:
+    hexahedra = isinstance(mesh, skfem.MeshHex)
+    if order == 1:
+        return skfem.ElementHex1() if hexahedra else skfem.ElementTetP1()
+    return skfem.ElementHex2() if hexahedra else skfem.ElementTetP2()
+
+
+def _refuse_inverted(scalar: Any, where: str) -> None:
+    volumes = scalar.dx.sum(axis=1)
+    flat = np.flatnonzero(~(volumes > 0))
+    if len(flat):
+        raise SceneError(
+            f"{where}: expected elements with a volume, found {len(flat)} without (the first is "
+            f"element {flat[0]}, counted from 0); mend the mesh"
+        )
+
+
+def _each_direction(scalar: Any) -> Any:
+    """scalar (x) 1_3, node by node."""
+    from scipy import sparse
+
+    return sparse.csr_array(sparse.kron(sparse.csr_array(scalar), sparse.eye_array(3)))
+
+
+def _stiffness(skfem: Any, basis: Any, material: Material) -> Any:
+    """Stiffness of (8.25) to (8.32) of Rui, Wang, Zhang in their weak form."""
+    from scipy import sparse
+    from skfem.helpers import ddot, sym_grad, trace
+
+    first, second = material.lame
+
+    def energy(u: Any, v: Any, w: Any) -> Any:
+        strain, virtual = sym_grad(u), sym_grad(v)
+        return first * trace(strain) * trace(virtual) + 2 * second * ddot(strain, virtual)
+
+    return sparse.csr_array(skfem.BilinearForm(energy).assemble(basis))
+
+
+def _sets(mesh: Any, scalar: Any) -> Mapping[str, Any]:
+    boundaries = mesh.boundaries or {}
+    return {
+        name: np.unique(scalar.get_dofs(np.asarray(facets)).flatten())
+        for name, facets in boundaries.items()
+    }
+
+
+@dataclass(frozen=True)
+class MeshStress:
+    """Stiffness under stress of a mesh: int sigma_ij u_c,i u_c,j."""
+
+    basis: Any
+    material: Material
+
+    def __call__(self, static: ArrayLike, shapes: ArrayLike) -> Array:
+        """(loads, n, n) N/m of shapes (u, n) under the stresses of `static` (u, loads)."""
+        states, modes = self.gradients(np.asarray(static)), self.gradients(np.asarray(shapes))
+        weights = np.asarray(self.basis.dx).reshape(-1)
+        n = modes.shape[0]
+        found = np.zeros((states.shape[0], n, n))
+        for begin in range(0, len(weights), _TOGETHER):
+            some = slice(begin, begin + _TOGETHER)
+            part = modes[..., some]
+            for load, gradient in enumerate(states[..., some]):
+                stress = self._stress(gradient) * weights[some]
+                turned = np.einsum("ijp,ncjp->ncip", stress, part)
+                found[load] += part.reshape(n, -1) @ turned.reshape(n, -1).T
+        return found
+
+    def _stress(self, gradient: Array) -> Array:
+        first, second = self.material.lame
+        strain = (gradient + gradient.transpose(1, 0, 2)) / 2
+        volume = np.einsum("iip->p", strain)
+        return np.asarray(2 * second * strain + first * np.eye(3)[:, :, None] * volume)
+
+    def gradients(self, fields: Array) -> Array:
+        """(k, 3, 3, points): derivative of component c along i at the points of integration."""
+        return np.stack([
+            np.asarray(self.basis.interpolate(field).grad).reshape(3, 3, -1) for field in fields.T
+        ])  # fmt: skip

@@ -1,0 +1,97 @@
+"""Geometric stiffening of an elastic body: its stiffness under the stresses of unit loads.
+
+A modal body's displacement is u = phi eta - 1/2 eta^T g eta.  The virtual work of a load per volume
+rho b on the second-order part is -b . int rho g eta deta: the load adds b . int rho g to the
+stiffness.  The finite elements give the same stiffness as that of the static stresses under the
+load (tension stiffens), so that
+
+    G_a     = int rho g_a       = the stiffness under the load rho e_a
+    X_ab    = int rho r0_a g_b  = the stiffness under the load rho r0_a e_b
+    shortening_a of a port      = the stiffness under a unit force along a at the port
+
+and a unit acceleration of the frame along a, whose load is -rho e_a, adds -G_a.  In a tangent frame
+the held section carries the reaction.  In a mean frame every load is taken with the acceleration
+that the free body would have under it, so that G = 0 and the mass centre stays in its place to
+second order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .craig_bampton import Reduction
+from .ports import Port
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """G (3, n, n) kg, X (3, 3, n, n) kg m, and the shortening (3, n, n) 1/m of every port."""
+
+    G: Array
+    X: Array
+    shortening: Mapping[str, Array]
+
+
+def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
+    """The second-order fields' moments; zeros where the model has no stresses."""
+    model, n = reduction.sections.model, reduction.shapes.shape[1]
+    if model.stress is None:
+        none = {port.name: np.zeros((3, n, n)) for port in ports}
+        return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)
+    moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held]
+    loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
+    if reduction.frame == "mean":
+        loads = _relieved(reduction, loads)
+    static = reduction.sections.clamped([reduction.held]).statics(loads)
+    families = model.stress(reduction.sections.expand @ static, reduction.shapes)
+    families = (families + families.transpose(0, 2, 1)) / 2
+    if reduction.frame == "mean":
+        families[:3] = 0.0  # rounding: a free body under its own acceleration has no stress
+    ends = families[12:].reshape(-1, 3, n, n)
+    shortening = {port.name: ends[i] for i, port in enumerate(moving)}
+    if reduction.frame != "mean":
+        shortening[reduction.held.name] = np.zeros((3, n, n))
+    return SecondOrder(families[:3], families[3:12].reshape(3, 3, n, n), shortening)
+
+
+def _body_loads(reduction: Reduction) -> Array:
+    """(w, 12): rho e_a, then rho r0_a e_b with b running fastest."""
+    model = reduction.sections.model
+    weights = [np.ones(len(model.nodes)), *model.nodes.T]
+    columns = [model.body_load(b, weight) for weight in weights for b in range(3)]
+    return np.asarray(reduction.sections.expand.T @ np.stack(columns, axis=1))
+
+
+def _port_loads(reduction: Reduction, port: Port) -> Array:
+    """(w, 3): unit forces at the port's point."""
+    return np.asarray(reduction.sections.rows[port.name].toarray().T[:, :3])
+
+
+def _relieved(reduction: Reduction, loads: Array) -> Array:
+    """Loads with the inertia of the rigid-body acceleration they cause: in balance."""
+    sections, model = reduction.sections, reduction.sections.model
+    accelerations = np.linalg.solve(model.inertia, _rigid(reduction).T @ loads)
+    inertia = sections.expand.T @ (model.mass @ (model.rigid @ accelerations))
+    return np.asarray(loads - inertia)
+
+
+def _rigid(reduction: Reduction) -> Array:
+    """(w, 6): unit rigid-body motions of the body over its sections."""
+    sections, model = reduction.sections, reduction.sections.model
+    places = [port for port in sections.ports if port.stiff]
+    found = np.zeros((sections.expand.shape[1], 6))
+    taken = np.concatenate([*(port.unknowns(model) for port in places), []]).astype(int)
+    for k, port in enumerate(places):
+        for axis in range(3):
+            found[6 * k + axis, axis] = 1.0
+            found[6 * k + 3 + axis, 3 + axis] = 1.0
+            found[6 * k : 6 * k + 3, 3 + axis] = np.cross(np.eye(3)[axis], port.position)
+    rest = np.setdiff1d(np.arange(model.mass.shape[0]), taken)
+    found[6 * len(places) :] = model.rigid[rest]
+    return found

@@ -1,0 +1,165 @@
+"""An elastic body's unknowns with sections in place of the nodes of rigid ports, and its solutions.
+
+The unknowns w are six per rigid port (displacement of its point, rotation of its section, body
+axes), then those of every node outside; u = T w.  A port of mean coupling is a row w -> motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import ElasticModel
+from .ports import Port
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Sections:
+    """A model whose rigid ports move as sections."""
+
+    model: ElasticModel
+    ports: tuple[Port, ...]
+
+    @cached_property
+    def _stiff(self) -> list[Port]:
+        return [port for port in self.ports if port.stiff]
+
+    @cached_property
+    def expand(self) -> Any:
+        """T: sparse (u, w)."""
+        from scipy import sparse
+
+        model, stiff = self.model, self._stiff
+        taken = [port.unknowns(model) for port in stiff]
+        rest = np.setdiff1d(np.arange(model.mass.shape[0]), np.concatenate([*taken, []]))
+        rows, columns, values = (
+            [rest],
+            [6 * len(stiff) + np.arange(len(rest))],
+            [np.ones(len(rest))],
+        )
+        for k, port in enumerate(stiff):
+            section = port.section(model)
+            rows.append(np.repeat(taken[k], 6))
+            columns.append(np.tile(6 * k + np.arange(6), len(section)))
+            values.append(section.reshape(-1))
+        shape = (model.mass.shape[0], 6 * len(stiff) + len(rest))
+        places = (np.concatenate(rows).astype(int), np.concatenate(columns))
+        return sparse.csr_array((np.concatenate(values), places), shape=shape)
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Sparse (w, w), N/m."""
+        return self.expand.T @ self.model.stiffness @ self.expand
+
+    @cached_property
+    def mass(self) -> Any:
+        """Sparse (w, w), kg."""
+        return self.expand.T @ self.model.mass @ self.expand
+
+    @cached_property
+    def rows(self) -> dict[str, Any]:
+        """Each port's motion (6, w): displacement of its point, rotation, body axes."""
+        from scipy import sparse
+
+        width, found = self.expand.shape[1], {}
+        for port in self.ports:
+            if port.stiff:
+                places = 6 * self._stiff.index(port) + np.arange(6)
+                unit = (np.ones(6), (np.arange(6), places))
+                found[port.name] = sparse.csr_array(unit, shape=(6, width))
+            else:
+                mean = sparse.csr_array(port.mean(self.model))
+                found[port.name] = mean @ self.expand[port.unknowns(self.model)]
+        return found
+
+    def clamped(self, held: Sequence[Port]) -> Clamped:
+        """The same body with the sections of some ports held."""
+        return Clamped(self, tuple(held))
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """Solutions of a body some of whose sections are held or moved as prescribed."""
+
+    sections: Sections
+    held: tuple[Port, ...]
+
+    @cached_property
+    def free(self) -> Integers:
+        """Places of w that are not sections of held rigid ports."""
+        stiff = [port for port in self.sections.ports if port.stiff]
+        gone = [6 * stiff.index(port) + np.arange(6) for port in self.held if port.stiff]
+        return np.setdiff1d(np.arange(self.sections.expand.shape[1]), np.concatenate([*gone, []]))
+
+    @cached_property
+    def rows(self) -> Any:
+        """Rows (6 m, free) whose values held ports of mean coupling prescribe; None without."""
+        from scipy import sparse
+
+        soft = [self.sections.rows[port.name] for port in self.held if not port.stiff]
+        return sparse.vstack(soft).tocsc()[:, self.free] if soft else None
+
+    @property
+    def count(self) -> int:
+        """Unknowns that are left to move."""
+        return len(self.free) - (0 if self.rows is None else self.rows.shape[0])
+
+    @cached_property
+    def inverse(self) -> Callable[[Array, Array | None], Array]:
+        """(loads (free, k), prescribed rows (6 m, k)) -> displacements (free, k)."""
+        from scipy import sparse
+        from scipy.sparse.linalg import splu
+
+        free, rows = self.free, self.rows
+        matrix = self.sections.stiffness.tocsc()[free][:, free]
+        #  rows of the size of the stiffness, or pivoting would take them first
+        scale = float(np.max(np.abs(matrix.diagonal())))
+        if rows is not None:
+            matrix = sparse.block_array([[matrix, scale * rows.T], [scale * rows, None]])
+        try:
+            lu = splu(sparse.csc_array(matrix))
+        except RuntimeError:
+            raise self.sections.model.refuse(
+                "stiffness: expected a body that is stiff once an end is held, found one that "
+                "moves without strain; look for a mechanism inside it"
+            ) from None
+
+        def solve(loads: Array, prescribed: Array | None = None) -> Array:
+            if rows is None:
+                return np.asarray(lu.solve(np.ascontiguousarray(loads)))
+            below = np.zeros((rows.shape[0], loads.shape[1]))
+            if prescribed is not None:
+                below = scale * prescribed
+            return np.asarray(lu.solve(np.vstack([loads, below]))[: len(free)])
+
+        return solve
+
+    def full(self, displacements: Array) -> Array:
+        """(w, k) from (free, k), held sections at rest."""
+        found = np.zeros((self.sections.expand.shape[1], displacements.shape[1]))
+        found[self.free] = displacements
+        return found
+
+    def statics(self, loads: Array) -> Array:
+        """(w, k) under loads (w, k), held sections at rest."""
+        return self.full(self.inverse(loads[self.free], None))
+
+    def constraint_shapes(self, port: Port) -> Array:
+        """(w, 6): static displacements in unit motions of one held section, the others at rest."""
+        sections = self.sections
+        if port.stiff:
+            whole = sections.rows[port.name].T.toarray()
+            loads = -(sections.stiffness @ whole)[self.free]
+            return whole + self.full(self.inverse(loads, None))
+        soft = [p.name for p in self.held if not p.stiff]
+        unit = np.zeros((6 * len(soft), 6))
+        unit[6 * soft.index(port.name) :][:6] = np.eye(6)
+        return self.full(self.inverse(np.zeros((len(self.free), 6)), unit))

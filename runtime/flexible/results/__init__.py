@@ -1,0 +1,1 @@
+"""What results say of flexible bodies: sections, energies, estimators, pictures."""

@@ -1,0 +1,176 @@
+"""How far a flexible body went from where its model holds, from what it did.
+
+Per body: slope kappa, spin ratio, stiffening gamma, share of the last shape, bending that the
+shapes could not follow, coupling chi, shear.  Thresholds and reasons stand beside the numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .observe import Motion, tilde, values_at
+from .observe_energy import modal_energy
+
+if TYPE_CHECKING:
+    from ..modal_body import ModalBody
+
+Array = NDArray[np.float64]
+
+#: Sections of a beam that are looked at.
+SECTIONS = 33
+
+
+def largest_slope(motion: Motion) -> float:
+    """kappa = max |phi' eta|: slope of the deflected axis against the frame; of an elastic body the
+    largest rotation of an end across its frame."""
+    return max((float(np.max(np.hypot(t[..., 1], t[..., 2]), initial=0.0))
+                for t in _all_turns(motion)), default=0.0)  # fmt: skip
+
+
+def largest_turn(motion: Motion) -> float:
+    """max |Psi| in rad of a section or an end against the frame, twist included."""
+    return max((float(np.max(np.linalg.norm(t, axis=-1), initial=0.0))
+                for t in _all_turns(motion)), default=0.0)  # fmt: skip
+
+
+def _all_turns(motion: Motion) -> list[Array]:
+    """Rotation vectors (n, m, 3) of sections along a beam, or of the ends of an elastic body."""
+    body = motion.body
+    if body.shapes is not None:
+        places = np.linspace(0.0, body.shapes.length, SECTIONS)
+        return [np.einsum("mak,tk->tma", values_at(body.shapes, places).theta, motion.eta)]
+    return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
+
+
+def cross_spin(motion: Motion) -> float:
+    """Largest spin in rad/s of the frame about what lies across a beam; about any axis else.
+
+    Spin about a beam's own axis neither stretches nor bends it.
+    """
+    first = 1 if motion.body.shapes is not None else 0
+    return float(np.max(np.linalg.norm(motion.frame_spin[:, first:], axis=1), initial=0.0))
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Moments of the second-order displacement: G (3, n, n) = int rho g_a, X (3, 3, n, n) =
+    int rho r0_a g_b, and its values (3, n, n) at the ends."""
+
+    G: Array
+    X: Array
+    ends: dict[str, Array]
+
+
+def second_order(body: ModalBody) -> SecondOrder | None:
+    """Of a beam the shortening of its bent axis, also where its kinematics leave it out; of another
+    body what it has; None if it has nothing."""
+    if body.shapes is None:
+        ends = {name: port.shortening for name, port in body.ports.items()}
+        known = np.any(body.G) or any(np.any(g) for g in ends.values())
+        return SecondOrder(body.G, body.X, ends) if known else None
+    n = len(body.modes)
+    G, X = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
+    x, weights = body.shapes.rule()
+    mass = weights * body.shapes.sections(x).mass_per_length
+    along = values_at(body.shapes, x).shortening
+    G[0] = np.einsum("m,mkl->kl", mass, along)
+    X[0, 0] = np.einsum("m,mkl->kl", mass * x, along)
+    ends = {}
+    for name, port in body.ports.items():
+        ends[name] = np.zeros((3, n, n))
+        ends[name][0] = values_at(body.shapes, port.position[:1]).shortening[0]
+    return SecondOrder(G, X, ends)
+
+
+def stiffness_from_loads(
+    motion: Motion, gravity: Array, ports: dict[str, Array], second: SecondOrder
+) -> Array:
+    """(n, modes, modes) K_g of the loads on the undeformed body.
+
+    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port), with the acceleration a = a_o + W r0 of
+    the rigid motion, W = wd~ + w~ w~, and g the second-order displacement: for a beam
+    (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L).  `ports` are forces (n, 3) in N on
+    the ends, inertial axes.
+    """
+    force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
+    spin = tilde(motion.frame_spin)
+    turning = tilde(motion.frame_spin_rate) + spin @ spin
+    total = -np.einsum("ta,akl->tkl", force, second.G)
+    total -= np.einsum("tab,bakl->tkl", turning, second.X)
+    for name, load in ports.items():
+        total += np.einsum("ta,akl->tkl", motion.inward(load), second.ends[name])
+    return total
+
+
+def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
+    """(smallest, largest) eigenvalue of K^-1 K_g over the samples.
+
+    gamma is the larger of the two in size; at -1 the loads alone buckle the body.
+    """
+    lower = np.linalg.cholesky(stiffness)
+    half = np.linalg.solve(lower, from_loads)
+    both = np.linalg.solve(lower, np.swapaxes(half, -1, -2))
+    values = np.linalg.eigvalsh((both + np.swapaxes(both, -1, -2)) / 2)
+    return float(values.min(initial=0.0)), float(values.max(initial=0.0))
+
+
+def last_shape_share(motion: Motion) -> tuple[float, str]:
+    """Largest share of the energy of all modes that a family's last shape held, and its name.
+
+    Families are the mode names without their number: y, z, twist, axial.  A family that holds less
+    than a thousandth of the energy throughout does not count, nor one with a single shape.
+    """
+    energy = modal_energy(motion)
+    total = float(np.max(energy.sum(axis=1), initial=0.0))
+    families: dict[str, list[int]] = {}
+    for k, name in enumerate(motion.body.modes):
+        families.setdefault(name.rstrip("0123456789"), []).append(k)
+    worst = (0.0, "")
+    for members in families.values():
+        own = float(np.max(energy[:, members].sum(axis=1), initial=0.0))
+        if len(members) < 2 or total <= 0 or own < 1e-3 * total:
+            continue
+        share = float(np.max(energy[:, members[-1]], initial=0.0)) / own
+        worst = max(worst, (share, motion.body.modes[members[-1]]))
+    return worst
+
+
+def bends(body: ModalBody, plane: str) -> bool:
+    """Whether a beam has shapes of deflection along y or z."""
+    return any(name.startswith(plane) for name in body.modes)
+
+
+def shear_error(body: ModalBody) -> float | None:
+    """Relative error of the highest bending frequency of a beam for want of shear (and of rotary
+    inertia where the model has none); None where the section's radius of gyration is not known.
+
+    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the highest
+    shape in 1/m, r the radius of gyration in m; the 1 is rotary inertia.
+    """
+    shapes = body.shapes
+    if shapes is None:
+        return None
+    x, weights = shapes.rule()
+    sections, worst = shapes.sections(x), None
+    for plane, about in (("y", 2), ("z", 1)):
+        bent = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
+        gyration = np.sqrt(np.max(sections.rho_I[about] / sections.mass_per_length))
+        if not bent or not gyration > 0:
+            continue
+        phi, bending = (
+            values_at(shapes, x).phi[:, "xyz".index(plane)],
+            values_at(shapes, x).curvature[:, about],
+        )
+        squares = (weights @ bending[:, bent] ** 2) / (weights @ phi[:, bent] ** 2)
+        fourth = np.max(squares)  # int phi''^2 / int phi^2 = beta^4
+        error = 0.5 * np.sqrt(fourth) * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
+        worst = max(worst or 0.0, float(error))
+    return worst
+
+
+#: E / (k G) of a rectangular section, nu = 0.3, k = 5/6.
+_SHEAR = 2 * (1 + 0.3) * 6 / 5
