@@ -52,6 +52,11 @@ class Chain:
     offset: Array
     gravity: float = 0.0
     base: Callable[[float], tuple[float, float, float]] | None = None
+    #: Acceleration of the root over time.
+    lift: Callable[[float], tuple[float, float]] | None = None
+    #: Particles (spectral form): their masses, and the paths from the root to them.
+    mass: Array | None = None
+    path: Array | None = None
 
     def angles(self, t: float, a: Array, rate: Array) -> tuple[Array, Array, float]:
         """Absolute angles, their rates and the base's angular acceleration."""
@@ -64,7 +69,9 @@ class Chain:
         c, s = np.cos(theta), np.sin(theta)
         inertia = self.K * (np.outer(c, c) + np.outer(s, s))
         turning = self.K * (np.outer(s, c) - np.outer(c, s))
-        load = turning @ omega**2 + inertia.sum(1) * alpha + self.gravity * self.first * c
+        ax, ay = self.lift(t) if self.lift else (0.0, 0.0)
+        weight = self.first * ((self.gravity + ay) * c - ax * s)
+        load = turning @ omega**2 + inertia.sum(1) * alpha + weight
         mass = self.B.T @ inertia @ self.B
         return -np.asarray(
             scipy.linalg.solve(mass, self.B.T @ load + self.S @ a, assume_a="pos"), float
@@ -102,6 +109,15 @@ class Chain:
         """Tip over time (times, 2) from undeformed rest."""
         a, _ = self.run(times, rtol)
         return np.array([self.position(t, row) for t, row in zip(times, a, strict=True)])
+
+    def particles(self, t: float, a: Array, rate: Array) -> tuple[Array, Array, Array]:
+        """Masses (m,), places and velocities (m, 2) of the particles against the root."""
+        assert self.mass is not None
+        assert self.path is not None
+        theta, omega, _ = self.angles(t, a, rate)
+        c, s = np.cos(theta), np.sin(theta)
+        place = self.path @ np.array([c, s]).T
+        return self.mass, place, self.path @ (np.array([-s, c]) * omega).T
 
     def driven(self, base: Callable[[float], tuple[float, float, float]]) -> Chain:
         """The chain on a base that turns as t -> (angle, rate, acceleration)."""
@@ -152,7 +168,7 @@ def spectral(
         till = reach * (np.arange(count) < (b + 1) * nodes)
         K = K + beam.tip_mass * np.outer(till, till)
         first_moment = first_moment + beam.tip_mass * till
-    return Chain(K, B, S, first_moment, reach, offset, gravity)
+    return Chain(K, B, S, first_moment, reach, offset, gravity, mass=mass, path=path)
 
 
 def _integrated(k: int, xi: Array) -> Array:

@@ -1,14 +1,15 @@
 """Converged motions of inextensible beams, kept in converged.json for the tests.
 
-    python -m flexible.reference.record          (in tests/; about five minutes)
+    python -m flexible.reference.record          (in tests/; about ten minutes)
 
 Chains of 8, 16 and 32 rigid segments per beam, extrapolated; `correction` is the last step of the
-extrapolation, over all times.  Spin-ups by the spectral form.
+extrapolation, over all times.  Spin-ups and the javelin by the spectral form.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +57,43 @@ def released(beams: list[Beam], end: float, count: int) -> dict[str, Any]:
     return {"t": times.tolist(), "tip": limit.tolist(), "correction": correction}
 
 
+def thrown(order: int) -> dict[str, float]:
+    """The javelin's equivalent velocity and spin and its mass centre after a second in the hand: two
+    halves of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section."""
+
+    def hand(t: float) -> tuple[float, float, float]:
+        tangent, rate, second = 1.4 - 0.525 * t * t, -1.05 * t, -1.05
+        square = 1 + tangent**2
+        turning = second / square - 2 * tangent * rate**2 / square**2
+        return float(np.arctan(tangent)), rate / square, turning
+
+    def lift(t: float) -> tuple[float, float]:
+        return 15.0, 21.0 - 12 * 1.96875 * t * t
+
+    masses, places, velocities = [], [], []
+    for turned in (0.0, np.pi):
+        half = Beam(1.0, 150.0, 0.5, angle=turned)
+        chain = replace(spectral([half], order, 9.81, clamped=True).driven(hand), lift=lift)
+        a, rates = chain.run([0.0, 1.0], 1e-8)
+        mass, place, velocity = chain.particles(1.0, a[-1], rates[-1])
+        masses.append(mass)
+        places.append(place)
+        velocities.append(velocity)
+    mass, place, velocity = (np.concatenate(x) for x in (masses, places, velocities))
+    place, velocity = place + [7.5, 10.5 - 1.96875], velocity + [15.0, 21.0 - 4 * 1.96875]
+    center, mean = mass @ place / mass.sum(), mass @ velocity / mass.sum()
+    x, y = (place - center).T
+    spin = mass @ (x * velocity[:, 1] - y * velocity[:, 0]) / (mass.sum() * 4 / 12)
+    found = [*mean, spin, *center]
+    return dict(zip(("vx", "vy", "spin", "x", "y"), map(float, found), strict=True))
+
+
 def main() -> None:
     """Compute everything and write the file."""
     record: dict[str, Any] = {name: released(*case) for name, case in RELEASED.items()}
     for name, (beam, speed) in SPIN_UPS.items():
         record[name] = peak(spectral([beam], 7, clamped=True), speed)
+    record["javelin"] = thrown(6)
     FILE.write_text(json.dumps(record, indent=1) + "\n")
 
 
