@@ -45,8 +45,8 @@ _MODES_PER_BODY = 24
 #: What decides the text besides structure and kernels: the modules that print it.
 PRINTERS = {
     "mstmm": (
-        "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "ir.py", "structure.py",
-        "tangent.py",
+        "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "graph_writer.py", "ir.py",
+        "structure.py", "tangent.py",
     ),
     "mstmm.derive": (
         "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fused_c.py", "fused_loads.py",
