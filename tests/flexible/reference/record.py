@@ -58,8 +58,8 @@ def released(beams: list[Beam], end: float, count: int) -> dict[str, Any]:
 
 
 def thrown(order: int) -> dict[str, float]:
-    """The javelin's equivalent velocity and spin and its mass centre after a second in the hand: two
-    halves of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section."""
+    """The javelin's equivalent velocity, spin and mass centre after a second in the hand: two halves
+    of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section."""
 
     def hand(t: float) -> tuple[float, float, float]:
         tangent, rate, second = 1.4 - 0.525 * t * t, -1.05 * t, -1.05
@@ -80,7 +80,8 @@ def thrown(order: int) -> dict[str, float]:
         places.append(place)
         velocities.append(velocity)
     mass, place, velocity = (np.concatenate(x) for x in (masses, places, velocities))
-    place, velocity = place + [7.5, 10.5 - 1.96875], velocity + [15.0, 21.0 - 4 * 1.96875]
+    place = place + np.array([7.5, 10.5 - 1.96875])
+    velocity = velocity + np.array([15.0, 21.0 - 4 * 1.96875])
     center, mean = mass @ place / mass.sum(), mass @ velocity / mass.sum()
     x, y = (place - center).T
     spin = mass @ (x * velocity[:, 1] - y * velocity[:, 0]) / (mass.sum() * 4 / 12)
