@@ -63,6 +63,14 @@ def test_the_static_start_is_the_closed_form(page: dict[str, Any]) -> None:
     assert page["sway"].bending_moment("arm", 0.0)[0, 1] == pytest.approx(-9.81 / 2, rel=1e-3)
 
 
+def test_the_hanging_rod_vibrates_as_a_pinned_beam(page: dict[str, Any]) -> None:
+    """Pinned-free: beta^2 sqrt(EI / rho A) / L^2, raised by the weight."""
+    found = sorted(abs(page["np"].linalg.eigvals(page["small"].state_matrix).imag))[::2]
+    for got, beta in zip(found[1:3], (3.926602, 7.068583), strict=True):
+        assert 0 < got / (beta**2 * 10**0.5) - 1 < 0.03
+    assert all(f"{f:.3g}" in TEXT for f in found)
+
+
 def test_parts_bend_like_the_exact_cantilever(page: dict[str, Any]) -> None:
     """Bisshopp and Drucker, Q. Appl. Math. 3 (1945): 0.30172 L under EI/L^2."""
     tips = {n: run.position(f"part{n - 1}.tip")[0, 1] for n, run in page["runs"].items()}
