@@ -1,6 +1,6 @@
 """The picture of this example.
 
-    python examples/javelin/picture.py [FILE]
+python examples/javelin/picture.py [FILE]
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import mstmm
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
 FRAMES: dict[str, dict[str, Any]] = {

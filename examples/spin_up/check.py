@@ -49,7 +49,7 @@ class ExactBeam:
         self.shape = s[:, None] ** powers
         bend = powers * s[:, None] ** (powers - 1) / LENGTH
         self.K = STIFFNESS * bend.T @ (self.w[:, None] * bend)
-        # Integrals from the root to every point and, last, to the tip, of interpolating polynomials.
+        # Integrals of interpolating polynomials from the root to every point and, last, the tip.
         to = np.r_[s, 1.0]
         degrees = np.arange(points)
         antiderivatives = to[:, None] ** (degrees + 1) / (degrees + 1)

@@ -1,6 +1,6 @@
 """The picture of this example.
 
-    python examples/spin_up/picture.py [FILE]
+python examples/spin_up/picture.py [FILE]
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import mstmm
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
 
@@ -32,7 +32,9 @@ def draw(path: Path) -> None:
     """Deflection over time; the beam every second as it turns."""
     stiff, linear = run(True), run(False)
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.4), width_ratios=(1.25, 1))
-    left.plot(stiff.t, stiff.deflection("blade", "tip")[:, 1], color="#c1121f", label="with stiffening")
+    left.plot(
+        stiff.t, stiff.deflection("blade", "tip")[:, 1], color="#c1121f", label="with stiffening"
+    )
     early = linear.t < 9.0
     left.plot(
         linear.t[early], linear.deflection("blade", "tip")[early, 1], "--", color="#7f7f7f",
