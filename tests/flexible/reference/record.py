@@ -58,8 +58,10 @@ def released(beams: list[Beam], end: float, count: int) -> dict[str, Any]:
 
 
 def thrown(order: int) -> dict[str, float]:
-    """The javelin's equivalent velocity, spin and mass centre after a second in the hand: two halves
-    of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section."""
+    """The javelin's equivalent velocity, spin and mass centre after a second in the hand.
+
+    Two halves of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section.
+    """
 
     def hand(t: float) -> tuple[float, float, float]:
         tangent, rate, second = 1.4 - 0.525 * t * t, -1.05 * t, -1.05
