@@ -154,8 +154,8 @@ class Engine:
     ) -> Observation:
         """What `parts` name of n states.
 
-        A state that cannot be evaluated gives nan in its row and a sentence in `failures`; arrays
-        that are not asked for have no columns.
+        A state that cannot be evaluated gives nan in its row; `failures` has a sentence for the
+        first of each kind.  Arrays that are not asked for have no columns.
         """
         n, place = len(t), {name: i for i, name in enumerate(PARTS)}
         bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
@@ -172,7 +172,8 @@ class Engine:
         records = self.probes(probes)
         wanted.n_probes, wanted.probes = len(probes), records
         failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
-        failures, first = [], 0
+        failures: dict[tuple[int, int], list[str]] = {}
+        first = 0
         while first < n:
             for name in parts:
                 setattr(wanted, name, self.pointer(arrays[place[name]][first:]))
@@ -182,10 +183,13 @@ class Engine:
             )  # fmt: skip
             if not code:
                 break
-            failures.append(self.failure_text(failure, float(states[0][first + int(at[0])])))
+            text = self.failure_text(failure, float(states[0][first + int(at[0])]))
+            failures.setdefault((int(failure.reason), int(failure.element)), []).append(text)
             first += int(at[0]) + 1
         points, loads, efforts, udot, sums = arrays
-        return Observation(points, loads, efforts, udot, sums, tuple(failures))
+        return Observation(
+            points, loads, efforts, udot, sums, tuple(map(_first, failures.values()))
+        )
 
     # --- words ----------------------------------------------------------------------------------
 
@@ -250,3 +254,9 @@ class Engine:
                 'use sweep = "riccati"'
             )
         return f"an expression of the scene cannot be evaluated {at}"
+
+
+def _first(texts: list[str]) -> str:
+    """The first of equal failures, with how many follow."""
+    more = len(texts) - 1
+    return texts[0] + (f" ({more} more samples alike)" if more else "")
