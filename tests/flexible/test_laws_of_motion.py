@@ -16,7 +16,8 @@ DOWN = (0.0, -9.81, 0.0)
 
 def power(data: Scene, q: Array, u: Array, udot: Array) -> tuple[float, float]:
     """Rate of the reference's energy along the engine's motion, and of its kinetic part alone."""
-    tree, qdot = dense.system(data).tree, np.zeros_like(q)
+    this, qdot = dense.system(data), np.zeros_like(q)
+    tree = this.tree
     for one in tree.hinges:
         own = u[one.u]
         qdot[one.q] = hinges.coordinate_jet(one, q[one.q], own, 0 * own).dx
@@ -24,7 +25,7 @@ def power(data: Scene, q: Array, u: Array, udot: Array) -> tuple[float, float]:
 
     def rate(with_rates: float) -> float:
         def energy(h: float) -> float:
-            return dense.energy(data, q + h * with_rates * qdot, u + h * udot)
+            return dense.energy(this, q + h * with_rates * qdot, u + h * udot)
 
         h = 1e-4
         return (8 * (energy(h) - energy(-h)) - energy(2 * h) + energy(-2 * h)) / (12 * h)

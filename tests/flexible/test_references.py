@@ -39,7 +39,7 @@ def test_references_run_without_the_engine() -> None:
 
 
 @pytest.mark.parametrize("lagrangian", (True, False))
-@pytest.mark.parametrize("seed", (2, 6, 8))
+@pytest.mark.parametrize("seed", (2, 6))
 def test_power_balance_of_the_particles(seed: int, lagrangian: bool) -> None:
     """Without laws, damping and loads the energy's rate along the motion is zero."""
     scene = random_beams.random_system(seed, most=3)
@@ -50,14 +50,15 @@ def test_power_balance_of_the_particles(seed: int, lagrangian: bool) -> None:
         beam["damping"], beam["viscous_drag"] = {"stiffness": 0.0}, 0.0
     q, u = random_beams.random_state(scene, seed)
     udot = dense.solve(scene, q, u, lagrangian=lagrangian).udot
-    tree, qdot = dense.system(scene).tree, np.zeros_like(q)
+    this, qdot = dense.system(scene, lagrangian), np.zeros_like(q)
+    tree = this.tree
     for hinge in tree.hinges:
         own = u[hinge.u]
         qdot[hinge.q] = hinges.coordinate_jet(hinge, q[hinge.q], own, 0 * own).dx
     qdot[tree.nq :] = u[tree.nu :]
 
     def energy(h: float) -> float:
-        return dense.energy(scene, q + h * qdot, u + h * udot, lagrangian)
+        return dense.energy(this, q + h * qdot, u + h * udot)
 
     h = 2e-4
     rate = (8 * (energy(h) - energy(-h)) - energy(2 * h) + energy(-2 * h)) / (12 * h)

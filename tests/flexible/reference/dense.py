@@ -74,8 +74,11 @@ class System:
         return out
 
 
-def system(scene: Mapping[str, Any], lagrangian: bool = True) -> System:
-    """Read a scene with [[body]], [[beam]] (shapes of its own), [[hinge]] and loads on ends."""
+def system(scene: Mapping[str, Any] | System, lagrangian: bool = True) -> System:
+    """Read a scene with [[body]], [[beam]] (shapes of its own), [[hinge]] and loads; a system that
+    has been read stays as it is."""
+    if isinstance(scene, System):
+        return scene
     beams = list(scene.get("beam") or ())
     held = {}
     for hinge in scene["hinge"]:
@@ -417,14 +420,14 @@ def _refined(matrix: Array, right: Array) -> Array:
     return np.asarray(x * scale_c, float)
 
 
-def energy(scene: Mapping[str, Any], q: Array, u: Array, lagrangian: bool = True) -> float:
+def energy(scene: Mapping[str, Any] | System, q: Array, u: Array, lagrangian: bool = True) -> float:
     """Kinetic energy, gravity (zero at the origin), strain energy and springs of hinges."""
     this = system(scene, lagrangian)
     states = motion(this, np.asarray(q, float), np.asarray(u, float))
     total = sum(laws.hinge_potential(h, np.asarray(q)[: this.tree.nq]) for h in this.tree.hinges)
     for i, body in enumerate(this.bodies):
         state, p = states[i], body.particles
-        total += kinetic_energy(body, state, lagrangian)
+        total += kinetic_energy(body, state, this.lagrangian)
         total += 0.5 * float(state.eta @ body.K @ state.eta)
         place = p.place + p.phi @ state.eta
         place[:, 0] -= 0.5 * np.einsum("mkl,k,l->m", p.shortening, state.eta, state.eta)
