@@ -1,6 +1,6 @@
 """The picture of this example.
 
-    python examples/satellite_panels/picture.py [FILE]
+python examples/satellite_panels/picture.py [FILE]
 """
 
 from __future__ import annotations
