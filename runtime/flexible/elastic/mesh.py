@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +77,8 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
     try:
-        read = meshio.read(path)
+        with redirect_stdout(StringIO()):  # it prints empty lines
+            read = meshio.read(path)
     except (meshio.ReadError, OSError, ValueError, SystemExit) as error:
         raise SceneError(f"{where}: {path.name} is no mesh that meshio reads: {error}") from None
     kinds = sorted({block.type for block in read.cells if block.dim == 3})
