@@ -55,7 +55,7 @@ def draw(path: Path) -> None:
         places = np.cos(angle) * x - np.sin(angle) * z, np.sin(angle) * x + np.cos(angle) * z
         left.plot(*places, color=shade, label=f"{times[k]:.2f} s")
         left.plot(places[0][-1], places[1][-1], "o", color=shade)
-    left.set(xlabel="x, m", ylabel="z, m", aspect="equal",
+    left.set(xlabel="x, m", ylabel="z, m", aspect="equal", xlim=(-0.03, 0.72),
              title=f"deflections times {MAGNIFIED:.0f}")  # fmt: skip
     left.legend(fontsize=7, loc="upper right")
     right.plot(times, 1e3 * bent[:, 2], color="#1d3557", label="coupled, 10 shapes")
