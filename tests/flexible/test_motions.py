@@ -141,10 +141,10 @@ def spinning(case: str, n: int, **keys: Any) -> Scene:
     return scene(body, hinge("drive", "pin", "ground", "blade", drive=spin_up(speed)))
 
 
-def deflection(data: Scene, end: float = 8.0) -> tuple[Array, Array]:
+def deflection(data: Scene, end: float = 8.0, engine: str = "looped") -> tuple[Array, Array]:
     """Times and deflection of the tip across the root's tangent."""
     times = np.linspace(0.0, end, int(end / 0.01) + 1)
-    result = compiled(data).simulate(end, output_times=times, rtol=1e-8, atol=1e-10)
+    result = compiled(data, engine).simulate(end, output_times=times, rtol=1e-8, atol=1e-10)
     assert result.success, result.message
     tip, angle = result.position("blade.tip"), result.q[:, 0]
     return times, np.cos(angle) * tip[:, 1] - np.sin(angle) * tip[:, 0]
@@ -161,6 +161,11 @@ def test_spin_up(case: str) -> None:
         assert abs(across[lowest] - reference["deflection"]) < bound
         assert abs(times[lowest] - reference["time"]) < 0.03
     assert worst(across[::20], reference["across"]) < 8e-3
+
+
+def test_both_engines_spin_up_alike() -> None:
+    looped, fused = (deflection(spinning("simo", 2), engine=e)[1] for e in ("looped", "fused"))
+    assert np.abs(fused - looped).max() < 1e-9
 
 
 def test_spin_up_by_the_reference_at_low_cost() -> None:
