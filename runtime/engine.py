@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ class Engine:
             place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
             where = f"{name}[{', '.join(map(str, place))}]"
             raise SceneError(f"{where} = {array[place]}: expected a finite number")
-        return array.reshape(int(np.prod(array.shape[:-1], dtype=int)), width)
+        return array.reshape(prod(array.shape[:-1]), width)
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
@@ -164,7 +165,7 @@ class Engine:
             (int(self.lib.MSTMM_SUM_NUMBERS),),
         ]  # fmt: skip
         arrays = [
-            np.full((n, *shape) if name in parts else (n, *shape[:-1], 0), np.nan)
+            np.full((n, *shape), np.nan) if name in parts else np.empty((n, *shape[:-1], 0))
             for name, shape in zip(PARTS, shapes, strict=True)
         ]
         states = [np.ascontiguousarray(x, dtype=np.float64) for x in (t, q, u, memory)]

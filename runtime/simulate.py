@@ -294,8 +294,9 @@ def split(
     fail_time: float | None = None,
 ) -> Trajectory:
     """Trajectory of samples; with output times only those, not the events between."""
-    if settings.output_times is not None:
-        wanted = _among(samples.t, np.asarray(settings.output_times)) & (samples.event >= 0)
+    times = settings.output_times
+    if times is not None and (samples.t.tolist() != list(times) or samples.event.any()):
+        wanted = _among(samples.t, np.asarray(times)) & (samples.event >= 0)
         behind = np.append(samples.t[1:] != samples.t[:-1], True)  # an event at such a time
         keep = wanted & behind[: len(wanted)]
         samples = Samples(
@@ -325,7 +326,8 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
     tolerance.  Also returns the largest distance of a quaternion's length from 1.
     """
     engine, y, residual = system.engine, y.copy(), 0.0
-    entries = engine.packed.layout.quaternions[:, None] + np.arange(4)
+    quaternions = engine.packed.layout.quaternions
+    entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
     rows = max(1, _QUATERNIONS // max(1, len(entries)))
     for first in range(0, len(y) if len(entries) else 0, rows):
         some = y[first : first + rows]
