@@ -192,7 +192,7 @@ def test_quadrature_form_keeps_terms_of_higher_order() -> None:
         assert abs(across[:740].min() - value) < 6e-4
 
 
-#: V_RB at release, w_RB, mass centre: linear beam (rows of the seed's problem).
+#: V_RB at release, w_RB, mass centre: linear beam (rows of the published throw).
 THROWN = {
     ("tangent", "clamped-free", 1): [14.961981, 13.168813, -0.599344, 7.499735, 8.531553],
     ("tangent", "clamped-free", 2): [14.960111, 13.170955, -0.599366, 7.499732, 8.531557],
@@ -238,7 +238,7 @@ def test_javelin_is_the_same_in_every_frame_on_the_basis_of_its_mid_section() ->
 
 
 def test_stiffened_javelin_is_that_of_exact_beams() -> None:
-    """Two geometrically exact halves; the linear rows of the seed's problem are 2e-3 m/s off."""
+    """Two geometrically exact halves; the linear rows of the published throw are 2e-3 m/s off."""
     exact = list(CONVERGED["javelin"].values())
     _, found = thrown(javelin("tangent@mid", "clamped-free", 4))
     assert np.abs(np.array(found) - exact).max() < 1.5e-5
