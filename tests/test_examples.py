@@ -8,6 +8,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 CHECKS = sorted(EXAMPLES.glob("*/check.py"))
+PICTURES = sorted(EXAMPLES.glob("*/picture.py"))
 
 
 @pytest.mark.parametrize("script", CHECKS, ids=lambda script: script.parent.name)
@@ -21,6 +22,21 @@ def test_example(script: Path, tmp_path: Path) -> None:
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert run.stdout, "an example says what it measured"
+
+
+@pytest.mark.parametrize("script", PICTURES, ids=lambda script: script.parent.name)
+def test_picture(script: Path, tmp_path: Path) -> None:
+    target = tmp_path / "new.png"
+    run = subprocess.run(
+        [sys.executable, "-W", "error", str(script), str(target)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+    assert target.read_bytes().startswith(b"\x89PNG"), "a picture was drawn"
+    assert (script.parent / "picture.png").is_file(), "the README shows one"
 
 
 def test_every_example_is_whole() -> None:

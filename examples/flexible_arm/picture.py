@@ -28,10 +28,10 @@ def draw(path: Path) -> None:
     payload = result.position("payload")
     left.plot(payload[:, 0], payload[:, 1], color="#c1121f", lw=0.8)
     for row in range(0, 481, 40):
-        colour = plt.colormaps["viridis"](row / 520)
+        shade = plt.colormaps["viridis"](row / 520)
         for line in lines.values():
-            left.plot(line[row, :, 0], line[row, :, 1], color=colour, lw=1.8)
-        left.plot(*payload[row, :2], "o", color=colour, ms=5)
+            left.plot(line[row, :, 0], line[row, :, 1], color=shade, lw=1.8)
+        left.plot(*payload[row, :2], "o", color=shade, ms=5)
     left.set(xlabel="x, m", ylabel="y, m", title="Every 0.1 s, and the payload's path")
     left.set_aspect("equal", adjustable="datalim")
     for name, length, colour in (("upper", 0.6, "#1d3557"), ("lower", 0.5, "#f4791f")):

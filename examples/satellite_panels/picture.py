@@ -36,13 +36,12 @@ def draw(path: Path) -> None:
     lower.set(xlabel="time, s", ylabel="rate about z, rad/s")
     lower.legend(frameon=False, ncol=2)
     space = figure.add_subplot(122, projection="3d")
-    for row, shade in ((0, 0.2), (250, 0.55), (600, 0.9)):
-        colour = plt.colormaps["viridis"](shade)
+    for row, shade in ((0, "#472d7b"), (250, "#21918c"), (600, "#a0da39")):
         for panel in ("east", "west"):
             line = result.shape(panel)[row]
-            space.plot(*line.T, color=colour, lw=2.5)
-        space.plot([], [], color=colour, lw=2.5, label=f"{result.t[row]:.0f} s")
-        space.scatter(*result.position("hub")[row], color=colour, s=60, marker="s")
+            space.plot(*line.T, color=shade, lw=2.5)
+        space.plot([], [], color=shade, lw=2.5, label=f"{result.t[row]:.0f} s")
+        space.scatter(*result.position("hub")[row], color=shade, s=60, marker="s")
     space.set(xlabel="x, m", ylabel="y, m", zlabel="z, m", title="Hub and panels")
     space.set_box_aspect((1, 1, 0.6))
     space.legend(frameon=False, loc="upper left")
