@@ -3,10 +3,10 @@
 Statements: (1) rigid-body equivalent velocities, mass centre, apex and range are those of a program
 that shares nothing with mstmm, on the same shapes, for tangent, chord and mean frames; a rigid
 javelin has the closed form.  (2) The hinge's impulse is the momentum.  (3) In flight the equivalent
-velocities are those of a rigid body, whatever the frame.  (4) The same throw by
-acceleration constraints with Baumgarte's stabilisation on the free javelin, written below, as in
-Escalona, Valverde, Mayo and Dominguez (2003), ends in the same state.  (5) With stiffening, the default, the javelin does as two geometrically exact
-beams do that are clamped to the grip: the rows above are of the linear beam.
+velocities are those of a rigid body, whatever the frame.  (4) The same throw by acceleration
+constraints with Baumgarte's stabilisation on the free javelin, written below, as in Escalona et
+al. (2003), ends in the same state.  (5) With stiffening, the default, the javelin does as two
+geometrically exact beams clamped to the grip do: the rows above are of the linear beam.
 """
 
 from __future__ import annotations
