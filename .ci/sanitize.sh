@@ -24,4 +24,4 @@ cd "$scratch/checkout"
 "$VENV/bin/python" setup.py -q build_ext --inplace
 # libstdc++ as well: extensions of other packages throw C++ exceptions
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
-    tests/generated tests/runtime tests/integrators
+    tests/generated tests/runtime tests/integrators tests/flexible/test_engines.py
