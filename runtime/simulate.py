@@ -111,7 +111,9 @@ class SceneSystem:
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
         works = bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
-        works |= any(body.D.any() or body.drag is not None for body in packed.flexible.values())
+        works = works or any(
+            body.D.any() or body.drag is not None for body in packed.flexible.values()
+        )
         run.with_power = int(with_power and works)
         run.memory = engine.pointer(self.memory)
         first = np.append(packed.layout.quaternions, 0).astype(np.int32)
