@@ -23,7 +23,9 @@ sys.path.insert(0, str(HERE))
 
 from common import measure  # noqa: E402
 
-FOLDERS = ("forward_dynamics", "batch_throughput", "work_precision", "startup", "long_chains")
+FOLDERS = (
+    "forward_dynamics", "batch_throughput", "work_precision", "startup", "long_chains", "flexible",
+)  # fmt: skip
 Row = tuple[str, str, float, float, bool]  # what, where, measured, target, smaller is better
 
 
@@ -112,6 +114,20 @@ def starts() -> list[Row]:
     run = module("startup")
     found = run.ratios(record("startup")["results"])
     return [(name, "7 pins", value, run.TARGETS[name], True) for name, value in found.items()]
+
+
+def flexible() -> list[Row]:
+    """Runs of flexible bodies against Exudyn's ANCF cable, both as accurate as asked."""
+    run = module("flexible")
+    found = record("flexible")
+    rows: list[Row] = []
+    for result in found["results"]:
+        value = run.ratio(result)
+        if value is not None:
+            rows.append(
+                ("flexible / Exudyn ANCF", result["scene"], value, found["asked_ratio"], True)
+            )
+    return rows
 
 
 def table(rows: list[Row]) -> str:
@@ -203,7 +219,7 @@ def main() -> None:
     if options.run:
         for folder in FOLDERS:
             subprocess.run([sys.executable, str(HERE / folder / "run.py")], check=True)
-    rows = forward() + batches() + precision() + starts()
+    rows = forward() + batches() + precision() + starts() + flexible()
     text = table(rows)
     at = record("forward_dynamics")["machine"]
     load = statistics.median([record(folder)["machine"]["load"] for folder in FOLDERS])
