@@ -23,7 +23,6 @@ from mstmm.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .c_text import C_OPERATIONS, KernelText, comment, string
 
-
 #: Run-time sizes for which the compiler unrolls the loops of a kernel.
 _OWN_SIZES = (1, 2, 3, 4)
 
