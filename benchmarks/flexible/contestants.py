@@ -208,17 +208,20 @@ def chain(quick: bool) -> Tools:
 
 def _cables(reference: Array, settings: dict[str, Any], quick: bool) -> Any:
     # Full Newton takes a hundred times longer than one Jacobian a step here.
-    joints = ("constraint", "spring")
+    joints, tight, loose = ("constraint", "spring"), (1e-8, 1e-3), (1e-6, 1e-2)
+    one = ("once a step",)
     grid = [
         *itertools.product(
-            joints, (300, 600, 800, 1000, 1300), (0.4, 0.7), ("modified", "once a step")
+            joints, (300, 600, 800, 1000, 1300), (0.4, 0.7), ("modified", *one), (tight,)
         ),
-        *itertools.product(joints, (1100, 1200, 1600), (0.2, 0.3, 0.5), ("once a step",)),
+        *itertools.product(joints, (1100, 1200, 1600), (0.2, 0.3, 0.5), one, (tight,)),
+        *itertools.product(joints, (1200, 1300, 1600), (0.4, 0.5), one, (loose,)),
     ]
     made = {joint: exudyn_cable.Chain(COUNT, 1, joint) for joint in joints}
-    for joint, steps, radius, newton in grid[:: 7 if quick else 1]:
+    for joint, steps, radius, newton, tolerance in grid[:: 7 if quick else 1]:
         subject = made[joint]
         options = {**settings, "steps": steps, "radius": radius, "newton": newton}
+        options["tolerance"] = tolerance
 
         def watch(subject: Any = subject, options: Any = options) -> tuple[float, None, float]:
             spent = subject.solve(Strip.T_END, watched=True, **options)
@@ -228,6 +231,7 @@ def _cables(reference: Array, settings: dict[str, Any], quick: bool) -> Any:
             return float(subject.solve(Strip.T_END, **options))
 
         label = f"1 element, {joint}s, {steps} steps, rho {radius}, Newton {newton}"
+        label += "" if tolerance == tight else f" {tolerance[0]:.0e} {tolerance[1]:.0e}"
         yield label, Setting(watch, once)
 
 
