@@ -58,9 +58,10 @@ def read(scene: Scene) -> dict[str, float]:
 def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """The scene with other numbers, validated afresh.
 
-    A name without an index stands for all entries of a list of one, and for all bodies or hinges
-    of a chain's pattern: "rope.body.mass".  Raises SceneError for unknown
-    names and for values that the scene refuses.
+    A name without an index stands for all entries of a list of one or of equal numbers (both
+    bending stiffnesses of a beam that were given as one), and for all bodies or hinges of a chain's
+    pattern: "rope.body.mass".  Raises SceneError for unknown names and for values that the scene
+    refuses.
     """
     data = _data(scene)
     known: dict[str, float] | None = None
@@ -126,6 +127,9 @@ def _assign(target: Any, parts: list[str], value: float) -> bool:
                 return False
         elif index is not None:
             return False
+        if i == len(parts) - 1 and index is None and _equal_numbers(holder[place]):
+            holder[place] = [float(value)] * len(holder[place])
+            return True
         if i == len(parts) - 1:
             if isinstance(holder[place], (dict, list, int)):
                 return False
@@ -133,3 +137,8 @@ def _assign(target: Any, parts: list[str], value: float) -> bool:
             return True
         target = holder[place]
     return False
+
+
+def _equal_numbers(value: Any) -> bool:
+    """Whether a value is a list of several numbers, all alike and none of them zero."""
+    return isinstance(value, list) and len(set(map(str, value))) == 1 and bool(value[0])

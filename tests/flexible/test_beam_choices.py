@@ -9,6 +9,7 @@ import pytest
 import scipy.linalg
 from flexible.beam_scenes import FREE, HELD, PIN, body_of
 
+import mstmm
 from mstmm.runtime.flexible.bodies import modal_bodies
 from mstmm.scene import Scene
 
@@ -29,7 +30,7 @@ def carrying(hinge: str, mass: float = 1.0, at: str = "tip", **more: Any) -> dic
         ({"type": "pin", "drive": "sin(t)"}, {}, "tangent", "clamped-free"),
         ({"type": "pin", "law": {"inertia": 5.0}}, {}, "tangent", "clamped-free"),
         ({"type": "pin", "law": {"inertia": 1e-3}}, {}, "chord", "simply-supported"),
-        ({"type": "pin", "law": {"stiffness": 50.0}}, {}, "tangent", "clamped-free"),
+        ({"type": "pin", "law": {"stiffness": 50.0}}, {}, "chord", "simply-supported"),
         (PIN, {}, "chord", "simply-supported"),
         ({"type": "ball"}, {}, "chord", "simply-supported"),
         ({"type": "pin", "axis": [0, 1, 0]}, {}, "tangent", "clamped-free"),
@@ -53,6 +54,33 @@ def test_frame_and_basis_follow_the_hinges(
     body = body_of(hinge, more=more, ends={"mid": 0.5})
     assert body.frame == frame
     assert f" {basis} shapes" in body.notes[0]
+
+
+def test_a_sprung_pin_takes_a_frame_that_keeps_its_inertia() -> None:
+    """Two links, a motor at the shoulder, a spring at the elbow, a payload: a tangent frame at the
+    elbow would be left without inertia at 0.2 s."""
+    link = {"damping": 0.01}
+    pin = {"type": "pin", "axis": [0, 0, 1]}
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        beam=[
+            link | {"name": "upper", "length": 1.0, "mass_per_length": 1.5,
+                    "bending_stiffness": 150.0},
+            link | {"name": "fore", "length": 0.8, "mass_per_length": 0.8,
+                    "bending_stiffness": 40.0},
+        ],
+        body=[{"name": "payload", "mass": 0.5, "inertia": [5e-4, 5e-4, 5e-4]}],
+        hinge=[
+            pin | {"name": "shoulder", "inboard": "ground", "outboard": "upper",
+                   "law": {"effort": "20*sin(2*pi*t) + 15", "inertia": 0.05}},
+            pin | {"name": "elbow", "inboard": "upper.tip", "outboard": "fore",
+                   "law": {"stiffness": 30.0, "damping": 0.1}},
+            {"name": "grip", "type": "fixed", "inboard": "fore.tip", "outboard": "payload"},
+        ],
+    )  # fmt: skip
+    model = mstmm.compile(scene, engine="looped")
+    assert [body.frame for body in model.flexible.values()] == ["chord", "chord"]
+    assert model.simulate(0.5, rtol=1e-6, atol=1e-8).success
 
 
 def test_each_bending_plane_has_its_own_frame() -> None:

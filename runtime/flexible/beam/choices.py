@@ -1,7 +1,7 @@
 """What `"auto"` stands for: frame, basis, number of shapes and quadrature of a beam.
 
 Frame, per bending direction: tangent at the held section where the hinge holds the rotation (or
-drives it, or a heavy rotor or stiff spring does); chord where it leaves the rotation free, for a
+drives it, or a heavy rotor does); chord where it leaves the rotation free, a spring or not, for a
 frame tied to a pinned section is left with an inertia there that falls with the cube of the number
 of shapes; mean where nothing holds the beam at all.
 
@@ -82,7 +82,7 @@ def wants_quadrature(beam: Beam, held: Holding, chosen: tuple[Choice, ...]) -> b
         return beam.quadrature
     return beam.stiffening and any(
         c.direction in held.turns
-        and c.direction not in held.heavy_rotor | held.sprung
+        and c.direction not in held.heavy_rotor
         and c.frame == Frame("tangent", held.x)
         and c.count >= 2
         for c in chosen
@@ -117,8 +117,8 @@ def _frame(beam: Beam, data: BeamData, held: Holding, direction: str) -> tuple[F
         return Frame(natural, held.x if natural == "tangent" else 0.0), f"{beam.basis} shapes"
     if direction not in held.turns:
         return Frame("tangent", held.x), f"{held.said} holds the section"
-    if direction in held.heavy_rotor | held.sprung:
-        return Frame("tangent", held.x), f"spring or rotor of {held.said} holds the section"
+    if direction in held.heavy_rotor:
+        return Frame("tangent", held.x), f"the rotor of {held.said} holds the section"
     if held.moves:
         return Frame("mean"), f"{held.said} leaves the beam free"
     return Frame("chord"), f"{held.said} leaves the section free to turn"
@@ -151,7 +151,8 @@ def _basis(beam: Beam, data: BeamData, held: Holding, direction: str, frame: Fra
         at_ends = all(x in (0.0, data.length) for x in others)
         if not at_ends:
             return Basis(STATIC, base, others)
-        slopes = tuple(sorted({e.x for e in loaded if direction in e.moments}))
+        sprung = {held.x} if direction in held.sprung else set()
+        slopes = tuple(sorted({e.x for e in loaded if direction in e.moments} | sprung))
         return Basis(SIMPLY_SUPPORTED, base, slopes=slopes)
     if loaded and others:
         return Basis(STATIC, base, others)

@@ -44,7 +44,7 @@ class End:
 @dataclass(frozen=True)
 class Holding:
     """How a beam is held: at `x` by a hinge that leaves `turns` (directions) free and translations
-    if `moves`; `sprung` are the directions among them in which a spring or rotor resists."""
+    if `moves`; among them heavy rotors resist in some, springs or motors act in `sprung` ones."""
 
     name: str  #: end by which it is held
     x: float
@@ -114,7 +114,7 @@ def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
         free,
         hinge.type in ("free", "planar", "elastic"),
         heavy_rotor=free if rotors else frozenset(),
-        sprung=free if stiff else frozenset(),
+        sprung=free if stiff or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
         ends=ends,
         said=f"the {hinge.type} hinge",
     )

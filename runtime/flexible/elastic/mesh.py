@@ -113,7 +113,7 @@ def mesh_model(mesh: Any, material: Material, order: int, where: str) -> Elastic
             f"{where}: order: expected 2 on cells of degree 2, found 1; leave order out"
         )
     element = _element(skfem, mesh, order)
-    vector = skfem.Basis(mesh, skfem.ElementVector(element), intorder=2 * order)
+    vector = _basis(skfem, mesh, element, order, where)
     scalar = vector.with_element(element)
     _refuse_inverted(scalar, where)
     density = material.density
@@ -136,6 +136,18 @@ def _element(skfem: Any, mesh: Any, order: int) -> Any:
     if order == 1:
         return skfem.ElementHex1() if hexahedra else skfem.ElementTetP1()
     return skfem.ElementHex2() if hexahedra else skfem.ElementTetP2()
+
+
+def _basis(skfem: Any, mesh: Any, element: Any, order: int, where: str) -> Any:
+    try:
+        return skfem.Basis(mesh, skfem.ElementVector(element), intorder=2 * order)
+    except Exception as error:  # the library raises this very class for cells that are folded
+        if "Jacobian" not in str(error):
+            raise
+        raise SceneError(
+            f"{where}: expected cells that are not folded, found one whose map has no inverse "
+            f"({error}); check the order of the nodes in the cells of the mesh"
+        ) from None
 
 
 def _refuse_inverted(scalar: Any, where: str) -> None:

@@ -57,9 +57,12 @@ def plane(points: Array) -> tuple[Array, Array]:
     """Two unit vectors (3,) that span the plane in which points (..., 3) spread most.
 
     A coordinate plane where the points lie close to one, so that a planar scene is drawn as it was
-    written; else the principal plane.
+    written; else the principal plane.  Points that are not finite do not count.
     """
-    cloud = points.reshape(-1, 3) - points.reshape(-1, 3).mean(axis=0)
+    cloud = _finite(points.reshape(-1, 3))
+    if not len(cloud):
+        return np.eye(3)[0], np.eye(3)[1]
+    cloud = cloud - cloud.mean(axis=0)
     spread = np.sqrt(np.mean(cloud**2, axis=0))
     across = int(np.argmin(spread[::-1]))  # of equal ones the last: y up, z towards the reader
     across = 2 - across
@@ -86,9 +89,16 @@ def direction(v: Array) -> str:
     return "along (" + ", ".join(f"{c:.2f}" for c in v) + ")"
 
 
+def _finite(points: Array) -> Array:
+    """Those of the points (n, 3) that are numbers: samples may be beyond the model."""
+    return points[np.isfinite(points).all(axis=1)]
+
+
 def strip_height(strips: list[Strip]) -> float:
     """Height in inches of a panel of the usual width in which these shapes fill the axes."""
-    cloud = np.concatenate([s.deflected.reshape(-1, 3) for s in strips])
+    cloud = _finite(np.concatenate([s.deflected.reshape(-1, 3) for s in strips]))
+    if not len(cloud):
+        return _LOWEST + _LABELS
     first, second = (float(np.ptp(cloud @ axis)) for axis in plane(cloud))
     return float(np.clip(_WIDTH * second / max(first, 1e-300), _LOWEST, _HIGHEST)) + _LABELS
 
