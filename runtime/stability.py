@@ -130,30 +130,35 @@ def fastest(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex,
 
 def _differences(engine: Engine, t: float, y: Array, memory: Array, moves: Array) -> Array:
     """Central differences (n, k) of the right-hand side along the columns of `moves` (n, k)."""
-    states = np.concatenate([y + moves.T, y - moves.T])
-    q, u = (np.ascontiguousarray(x) for x in np.split(states, [engine.nq], axis=1))
-    rows = np.tile(memory, (len(states), 1))
-    rates = np.hstack(engine.accelerations(t, q, u, rows))
-    half = len(states) // 2
+    rates = _rates(engine, t, np.concatenate([y + moves.T, y - moves.T]), memory)
+    half = len(rates) // 2
     return np.asarray((rates[:half] - rates[half:]).T / 2)
+
+
+def _rates(engine: Engine, t: float, states: Array, memory: Array) -> Array:
+    """Right-hand sides (k, n) of states (k, n)."""
+    q, u = (np.ascontiguousarray(x) for x in np.split(states, [engine.nq], axis=1))
+    return np.hstack(engine.accelerations(t, q, u, np.tile(memory, (len(states), 1))))
 
 
 def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Array]:
     """The same for large states, from products of the Jacobian with vectors."""
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-    n = len(y)
+    n, rest = len(y), _rates(engine, t, y[None], memory)[0]
 
     def product(vector: Any) -> Array:
         size = float(np.linalg.norm(vector)) or 1.0
-        move = 1e-6 * np.sqrt(n) * np.asarray(vector, dtype=float).reshape(n, 1) / size
-        change = _differences(engine, t, y, memory, move)[:, 0]
+        move = 1e-6 * np.sqrt(n) * np.asarray(vector, dtype=float).reshape(1, n) / size
+        change = _rates(engine, t, y + move, memory)[0] - rest  # a hundredth is all that is asked
         return np.asarray(change * size / (1e-6 * np.sqrt(n)))
 
     operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(n)
     try:
-        values, vectors = eigs(operator, k=1, which="LM", tol=1e-2, maxiter=20, v0=start)
+        values, vectors = eigs(
+            operator, k=1, which="LM", tol=1e-2, maxiter=40, v0=start, ncv=min(n, 12)
+        )
     except ArpackNoConvergence as error:
         values, vectors = error.eigenvalues, error.eigenvectors
     if not len(values):
