@@ -84,7 +84,7 @@ def check_step(
     if not rate > 0.0 or not np.isfinite(rate):
         return None
     layout = engine.packed.layout
-    hinge = max(layout.hinges.values(), key=lambda s: float(shares[s.u_slice].sum()))
+    hinge = max(layout.owners, key=lambda s: float(shares[s.u_slice].sum()))
     return StepCheck(
         settings.step, rate, settings.step * rate,
         float(abs(tableau.amplification(settings.step * value))), hinge.name,

@@ -11,6 +11,8 @@ import typer
 from .options import Json, quoted
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from .stored import Entry
 
 
@@ -62,6 +64,13 @@ def _elements(kind: str, title: str) -> Section:
     return Section(title, (kind, "what it is", "parameters"), rows, [e.to_json() for e in entries])
 
 
+def _flexible() -> Section:
+    from mstmm.scene_beam import Beam
+    from mstmm.scene_elastic import Elastic
+
+    return _keys("flexible bodies", (("beam", Beam), ("elastic", Elastic)))
+
+
 def _laws() -> Section:
     from mstmm.scene_law import Friction, Law, Limits, SpringLaw
 
@@ -71,12 +80,18 @@ def _laws() -> Section:
         ("limits", Limits),
         ("law of a spring", SpringLaw),
     )
-    rows = []
-    for owner, model in owners:
-        for key, entry in model.model_json_schema()["properties"].items():
-            rows.append((owner, key, str(entry.get("description", "a table, see scenes"))))
+    return _keys("laws on coordinates", owners)
+
+
+def _keys(title: str, owners: Sequence[tuple[str, type[BaseModel]]]) -> Section:
+    """The keys of tables of a scene, and what each expects."""
+    rows = [
+        (owner, key, str(entry.get("description") or "a table, see scenes"))
+        for owner, model in owners
+        for key, entry in model.model_json_schema()["properties"].items()
+    ]
     data = [dict(zip(("table", "key", "expected"), row, strict=True)) for row in rows]
-    return Section("laws on coordinates", ("table", "key", "expected"), rows, data)
+    return Section(title, ("table", "key", "expected"), rows, data)
 
 
 def _matrices() -> Section:
@@ -157,6 +172,7 @@ def _joined(names: tuple[str, ...]) -> str:
 SECTIONS: dict[str, Callable[[], Section]] = {
     "hinges": _hinges,
     "bodies": lambda: _elements("body", "bodies"),
+    "flexible": _flexible,
     "forces": lambda: _elements("force", "force elements, in [[spring]]"),
     "laws": _laws,
     "matrices": _matrices,
@@ -181,7 +197,7 @@ def list_elements(
     ] = None,
     json: Json = False,
 ) -> None:
-    """List hinges, bodies, forces, laws, matrices, methods, and your own elements."""
+    """List hinges, bodies rigid and flexible, forces, laws, matrices, methods, your own elements."""
     from . import output
 
     sections = {part: SECTIONS[part]() for part in _chosen(parts or [])}
