@@ -44,8 +44,8 @@ def compile_scene(
         scene: validated scene (`load_scene`, or `Scene(...)`).
         engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
-            up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache is used, and a run
-            or batch long enough to repay the compiler has it built.
+            up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
+            is used, and a run or batch long enough to repay the compiler has it built.
         sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
             matrices, chains only, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the

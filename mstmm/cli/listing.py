@@ -197,7 +197,7 @@ def list_elements(
     ] = None,
     json: Json = False,
 ) -> None:
-    """List hinges, bodies rigid and flexible, forces, laws, matrices, methods, your own elements."""
+    """List hinges, bodies rigid and flexible, forces, laws, matrices, methods, own elements."""
     from . import output
 
     sections = {part: SECTIONS[part]() for part in _chosen(parts or [])}
