@@ -87,5 +87,6 @@ def test_events_on_modal_coordinates_and_on_ends() -> None:
 
 def test_an_entry_beyond_the_shapes_that_auto_chose_is_refused() -> None:
     data = bladed(modes="auto") | {"load": [{"on": "blade.tip", "force": ["blade.q[99]", 0, 0]}]}
-    with pytest.raises(SceneError, match=r"'blade\.q\[99\]': 'blade' has \d+ entries: [yz]1, [yz]2"):
+    beyond = r"'blade\.q\[99\]': 'blade' has \d+ entries: [yz]1, [yz]2"
+    with pytest.raises(SceneError, match=beyond):
         mstmm.compile(Scene(**data), engine="looped")
