@@ -65,6 +65,15 @@ int mstmm_section_motion(mstmm_state *state, int index)
     return 0;
 }
 
+/* Loads of prescribed modal accelerations (inverse dynamics). */
+static void prescribe(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const modal_arrays a = modal_of(state, body->modal);
+    mstmm_sweep_modal_prescribed(body->modal->n, a.s_rf, a.s_ff, state->udot + body->modal->u,
+                                 state->workspace + body->block + MSTMM_BLOCK_E, a.e_f);
+}
+
 int mstmm_modal_forward(mstmm_state *state, int index, real *qdot)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -79,16 +88,8 @@ int mstmm_modal_forward(mstmm_state *state, int index, real *qdot)
                                block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_S, a.s_rf, a.second,
                                a.s_ff, block + MSTMM_BLOCK_E, a.e_f);
     memcpy(qdot + modal->q, etad, (size_t)modal->n * sizeof(real));
-    if (state->imposed_all) mstmm_modal_prescribe(state, index);
+    if (state->imposed_all) prescribe(state, index);
     return 0;
-}
-
-void mstmm_modal_prescribe(mstmm_state *state, int index)
-{
-    const mstmm_body *body = &state->model->bodies[index];
-    const modal_arrays a = modal_of(state, body->modal);
-    mstmm_sweep_modal_prescribed(body->modal->n, a.s_rf, a.s_ff, state->udot + body->modal->u,
-                                 state->workspace + body->block + MSTMM_BLOCK_E, a.e_f);
 }
 
 int mstmm_modal_condense(mstmm_state *state, int index)
@@ -172,7 +173,7 @@ static void momentum_of(const mstmm_state *state, int index, const mstmm_moments
     const mstmm_modal *modal = body->modal;
     const modal_arrays a = modal_of(state, modal);
     const real *block = state->workspace + body->block;
-    /* The rows that the sweep left are not needed any more, or are put back by the caller. */
+    /* `based` and `second` are free here: before a sweep it writes them anew, behind it nobody reads. */
     mstmm_sweep_modal_momentum(modal->n, m->rigid, m->c, m->p, m->b, m->z[0], m->z[1], m->z[2],
                                m->z[3], m->z[4], m->z[5], m->y[0], m->y[1], m->y[2], m->g[0],
                                m->g[1], m->g[2], m->m, state->q + modal->q, state->u + modal->u,
@@ -191,6 +192,7 @@ void mstmm_modal_momentum(const mstmm_state *state, int index, real *inertia, re
 void mstmm_modal_drag(mstmm_state *state, mstmm_balance *balance)
 {
     const mstmm_model *model = state->model;
+    if (!model->n_flexible) return;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_modal *modal = model->bodies[i].modal;
         if (!modal || !modal->drag) continue;
@@ -207,6 +209,7 @@ void mstmm_modal_drag(mstmm_state *state, mstmm_balance *balance)
 void mstmm_modal_balance(const mstmm_state *state, mstmm_balance *balance)
 {
     const mstmm_model *model = state->model;
+    if (!model->n_flexible) return;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_modal *modal = model->bodies[i].modal;
         if (!modal) continue;

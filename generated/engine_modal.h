@@ -22,8 +22,7 @@ void mstmm_section_absorb(mstmm_state *state, int body);
 void mstmm_modal_recover(mstmm_state *state, int body, real *udot);
 /* The modes' part of the deviation of an end. */
 void mstmm_section_follow(mstmm_state *state, int body);
-/* Loads of prescribed modal accelerations and efforts on the modes (inverse dynamics). */
-void mstmm_modal_prescribe(mstmm_state *state, int body);
+/* Efforts that an end, and the body itself, ask of the modes (inverse dynamics). */
 void mstmm_section_effort(mstmm_state *state, int body);
 void mstmm_modal_effort(mstmm_state *state, int body, real *efforts);
 /* Drag, behind a pose pass. */

@@ -216,13 +216,13 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
 }
 
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
-                            const real *memory, real *y)
+                            real *memory, real *y)
 {
     const int m = run->model->n_memory;
     real *own = run->memory;
     int first = 0;
     for (int64_t k = 0; k < n; k++) {
-        run->memory = m ? (real *)memory + k * m : own; /* settling writes the turn it ends in */
+        run->memory = m ? memory + k * m : own; /* settling writes the turn it ends in */
         const int code = mstmm_scene_settle(run, t[k], y + k * width);
         if (code && !first) first = code;
     }

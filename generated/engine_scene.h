@@ -72,9 +72,9 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system);
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
 /* The same for n states in rows of `width` numbers, each with its own memory; the run's memory is
- * what it was.  Returns the code of the first that fails, the others are settled all the same. */
+ * what it was, the rows take the turns they end in.  Returns the code of the first that fails, the others are settled all the same. */
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
-                            const real *memory, real *y);
+                            real *memory, real *y);
 /* cdef end */
 
 #endif

@@ -148,6 +148,7 @@ typedef struct {
 
 typedef struct {
     int n_bodies, nq, nu, n_memory;
+    int n_flexible; /* bodies with modes */
     const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
     const mstmm_body *bodies;
     int n_runs;

@@ -164,6 +164,7 @@ class _Packing:
         packed.warnings += [w for body in packed.flexible.values() for w in body.warnings]
         self.kept.append(model)
         model.bodies, model.n_bodies = records.array, records.count
+        model.n_flexible = len(self.expanded.bodies)
         for k in range(3):
             model.gravity[k] = scene.gravity[k]
         self._drives(packed)

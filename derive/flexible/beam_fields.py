@@ -111,9 +111,9 @@ def second_order(slopes: Matrix) -> sp.Expr:
 
 def _mixed(function: object, part: int) -> sp.Expr:
     """d^2 function(eta_k shape_k + eta_l shape_l) / d eta_k d eta_l."""
-    k, l = sp.symbols("eta_k eta_l")  # noqa: E741
-    value = function(k * _entries(SHAPE_K[part]) + l * _entries(SHAPE_L[part]))  # type: ignore[operator]
-    return sp.expand(sp.diff(value, k, l))
+    eta_k, eta_l = sp.symbols("eta_k eta_l")
+    both = eta_k * _entries(SHAPE_K[part]) + eta_l * _entries(SHAPE_L[part])
+    return sp.expand(sp.diff(function(both), eta_k, eta_l))  # type: ignore[operator]
 
 
 def rigid() -> Derivation:

@@ -73,7 +73,8 @@ class _Expansion:
         self.used = {self._full(x) for x in self._references()}
 
     def run(self) -> Expanded:
-        hinges = [self._rewritten(hinge) for hinge in self.scene.hinge]
+        self.made.held = self._held()
+        hinges = list(self.scene.hinge)
         for name, body in self.made.bodies.items():
             hinges = self._flexible(name, body, hinges)
         inboard = [self._node(hinge.inboard) for hinge in hinges]
@@ -112,13 +113,10 @@ class _Expansion:
     def _node(self, reference: str) -> str:
         return self.made.nodes.get(self._full(reference), reference)
 
-    def _rewritten(self, hinge: Hinge) -> Hinge:
-        """A hinge that holds a flexible body names the end by which it does."""
-        full = self._full(hinge.outboard)
-        name, end = split(full)
-        if name in self.made.bodies:
-            self.made.held[name] = end
-        return hinge
+    def _held(self) -> dict[str, str]:
+        """End by which each flexible body is held."""
+        ends = (split(self._full(hinge.outboard)) for hinge in self.scene.hinge)
+        return {name: end for name, end in ends if name in self.made.bodies}
 
     def _load(self, load: Load) -> Load:
         """A distributed load acts on the node of its weighted mean section."""
