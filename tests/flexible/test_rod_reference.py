@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 import scipy.optimize
 from flexible.reference import kirchhoff
 from flexible.reference.closed_forms import SELF_WEIGHT_BUCKLING
 from flexible.reference.kirchhoff import Load, Rod, Vector, solve
+from flexible.reference.rod_energy import Ritz
 from numpy.polynomial import legendre
 from scipy.special import ellipeinc, ellipkinc
 
@@ -122,61 +121,15 @@ def test_work_and_reciprocity() -> None:
     assert compliance[:3, :3] @ np.array(AT_45) == pytest.approx(moved, abs=1e-6)
 
 
-def ritz(rod: Rod, force: Array, order: int) -> tuple[Array, Array]:
-    """Coefficients (order + 1, 3) of the rotation vector over s of least potential energy, and the
-    tip's place.
-
-    Nothing but the energy: complex steps give its gradient, and no equation of balance is used.
-    """
-    x, w = legendre.leggauss(order + 10)
-    s, w = rod.length * (x + 1) / 2, rod.length * w / 2
-    shapes = s[:, None] * legendre.legvander(x, order)
-    slopes = (
-        legendre.legvander(x, order)
-        + s[:, None]
-        * (2 / rod.length)
-        * np.array([legendre.legval(x, legendre.legder(row)) for row in np.eye(order + 1)]).T
-    )
-    stiffness = 1 / rod.compliance
-
-    def tip(a: Array) -> Any:
-        v = shapes @ a.reshape(order + 1, 3)
-        square = (v * v).sum(1)
-        f, g = _sinc(square)
-        e = np.array([1.0, 0.0, 0.0])
-        t = e + f[:, None] * np.cross(v, e) + g[:, None] * np.cross(v, np.cross(v, e))
-        return w @ t
-
-    def potential(a: Array) -> Any:
-        v, dv = (b @ a.reshape(order + 1, 3) for b in (shapes, slopes))
-        square = (v * v).sum(1)
-        f, g = _sinc(square)
-        h = (1 - f) / square
-        twice = np.cross(v, np.cross(v, dv))
-        own = dv - g[:, None] * np.cross(v, dv) + h[:, None] * twice
-        return 0.5 * w @ (own * own @ stiffness) - force @ tip(a)
-
-    def gradient(a: Array) -> Array:
-        steps = a + 1e-30j * np.eye(len(a))
-        return np.array([potential(row).imag for row in steps]) / 1e-30
-
-    start = np.full(3 * (order + 1), 1e-3)
-    found = scipy.optimize.root(gradient, start, tol=1e-13).x
-    return found.reshape(-1, 3), tip(found)
-
-
-def _sinc(square: Array) -> tuple[Array, Array]:
-    angle = np.sqrt(square)
-    return np.sin(angle) / angle, (1 - np.cos(angle)) / square
-
-
 @pytest.mark.parametrize("force", (0.25, 1.5))
 def test_load_at_45_degrees_by_energy(force: float) -> None:
     """Twist couples the planes: against a potential energy that shares no formula with the rod."""
-    a, tip = ritz(FLAT, force * np.array(AT_45), 9)
+    whole, energy = force * np.array(AT_45), Ritz(1 / FLAT.compliance, 1.0, 9)
+    a = energy.equilibrium(whole, np.full(energy.size, 1e-3))
     state = solve(FLAT, Load(AT_45) * force)
-    assert state.end[:3] == pytest.approx(tip, abs=1e-9)
-    assert state.rotation == pytest.approx(a.sum(0), abs=1e-8)
+    assert state.end[:3] == pytest.approx(energy.tip(a), abs=1e-9)
+    assert state.rotation == pytest.approx(energy.rotation(a), abs=1e-8)
+    assert state.energy - whole @ state.end[:3] == pytest.approx(energy.potential(a, whole))
     uncoupled = [solve(FLAT, Load(v)).tip for v in ((0, force / 2**0.5, 0), (0, 0, force / 2**0.5))]
     assert state.tip[1] > 1.01 * uncoupled[0][1]
 

@@ -7,7 +7,7 @@ and m the force and moment that the outer part puts on the inner one, all in axe
     C = R diag(1/GJ, 1/EI_y, 1/EI_z) R^T,
 
 and an infinitesimal motion about it (d theta the rotation, harmonic in time with the square w2
-of its frequency; rod's mass per length mu, J = R diag(j, 0, 0) R^T) obeys
+of its frequency; rod's mass per length mu, J = R diag(j, i_y, i_z) R^T) obeys
 
     dr' = dth x t,   dth' = C (dm - dth x m),
     dn' = -w2 mu dr,  dm' = -(dth x t) x n - t x dn - w2 J dth.
@@ -45,14 +45,15 @@ EYE = np.eye(3)
 
 @dataclass(frozen=True)
 class Rod:
-    """`bending` EI_y (deflection along z) and EI_z (along y), N m^2; `torsion` GJ, N m^2; mass,
-    kg/m, and polar inertia, kg m, per length."""
+    """`bending` EI_y (deflection along z) and EI_z (along y), N m^2; `torsion` GJ, N m^2; per
+    length: mass, kg/m, polar and `rotary` inertia (about y and z), kg m."""
 
     bending: tuple[float, float]
     torsion: float
     length: float = 1.0
     mass: float = 1.0
     polar: float = 0.0
+    rotary: tuple[float, float] = (0.0, 0.0)
 
     @property
     def compliance(self) -> Array:
@@ -191,7 +192,7 @@ def cross(v: Array) -> Array:
 def _slope(rod: Rod, load: Load, square: float) -> Callable[[float, Array], Array]:
     """Derivative along the axis of the state and of the columns of motions that follow it."""
     section, spread = rod.compliance, np.array(load.per_length)
-    carried, turning = square * rod.mass, square * rod.polar
+    carried, inertia = square * rod.mass, square * np.array([rod.polar, *rod.rotary])
 
     def slope(_: float, y: Array) -> Array:
         R, n, m = y[A_].reshape(3, 3), y[N_], y[M_]
@@ -208,7 +209,7 @@ def _slope(rod: Rod, load: Load, square: float) -> Callable[[float, Array], Arra
         rates = out[STATE:].reshape(12, -1)
         rates[0:3], rates[6:9] = -tx @ turned, -carried * dr
         rates[3:6] = C @ (dm + cross(m) @ turned)
-        rates[9:12] = -(cross(n) @ tx + turning * np.outer(t, t)) @ turned - tx @ dn
+        rates[9:12] = -(cross(n) @ tx + (R * inertia) @ R.T) @ turned - tx @ dn
         return out
 
     return slope
