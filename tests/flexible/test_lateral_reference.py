@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from flexible.reference import lateral
 from flexible.reference.kirchhoff import Load, Rod, lateral_bifurcation, rectangle, solve
-from flexible.reference.lateral import Beam, critical, end_force, end_moment, prandtl, squares
+from flexible.reference.lateral import (
+    Beam,
+    critical,
+    end_force,
+    end_moment,
+    flutter,
+    lowest_rate,
+    prandtl,
+    squares,
+)
 from flexible.reference.rod_energy import Ritz
 from scipy.spatial.transform import Rotation
 
@@ -27,6 +36,7 @@ def test_buckling_loads_of_the_books(beam: Beam) -> None:
     for kind, turns in (("forces along y", 1), ("forces along x", 1), ("semi-tangential", 2)):
         found = critical(beam, end_moment(kind)) * L / scale
         assert found == pytest.approx(turns * np.pi / 2, rel=1e-12)
+    assert {critical(beam, end_moment(kind)) for kind in ("dead", "follower")} == {np.inf}
 
 
 def test_frequencies_without_load() -> None:
@@ -41,12 +51,26 @@ def test_frequencies_without_load() -> None:
 def test_lateral_frequency_by_the_rod(part: float) -> None:
     """A rod that hardly bends in its stiff plane; past the buckling load a growth rate."""
     beam, load = Beam(rotary=0.02), part * prandtl()
-    square = squares(beam, end_force(1.0), load)[0]
-    rate = np.sign(square) * abs(square) ** 0.5
+    rate = lowest_rate(beam, end_force(1.0), load)
     rod = Rod((1.0, 1e9), 1.0, polar=0.01, rotary=(0.02, 0.0))
     found = solve(rod, DOWN * load).frequencies(rate - 0.1, rate, 0.2, lateral=True)
     assert found == pytest.approx([rate], rel=1e-7)
     assert (rate < 0) == (part > 1)
+
+
+@pytest.mark.parametrize("kind", ("dead", "follower"))
+def test_moments_without_potential(kind: str) -> None:
+    """They raise the first frequency, both by as much, until it meets the next one and is gone."""
+    limit = flutter(Beam(), end_moment(kind), 3.0, 5.0)
+    for load, number in ((1.5, 2), (0.995 * limit, 2), (1.005 * limit, 0)):
+        rod = Rod((1.0, 1e9), 1.0, polar=0.01)
+        state = solve(rod, Load(moment=(0.0, 0.0, load), follower=kind == "follower"))
+        found = state.frequencies(3.5, 16.0, 0.5, lateral=True)
+        assert len(found) == number
+        if number:
+            expected = squares(Beam(), end_moment(kind), load)[:2].real ** 0.5
+            assert found == pytest.approx(expected, rel=1e-6)
+            assert found[0] > 3.516
 
 
 @pytest.mark.parametrize("height", (-0.1, 0.0, 0.1))

@@ -50,8 +50,8 @@ class Beam:
 
 @dataclass(frozen=True)
 class Bent:
-    """`moment` M(x), N m, per unit of load; `tip` (2, 2) further terms of 2 V, symmetric, in
-    (w', psi) at x = L."""
+    """`moment` M(x), N m, per unit of load; `tip` (2, 2) further stiffness for (w', psi) at x = L,
+    symmetric where the load has a potential."""
 
     moment: Callable[[Array], Array]
     tip: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
@@ -67,19 +67,23 @@ def spread_force(length: float) -> Bent:
     return Bent(lambda x: -((length - x) ** 2) / 2)
 
 
-#: Term in 2 w' psi at the tip, per unit of moment: the couple's own work to second order, less that
-#: of dead forces along y.
-COUPLES = {"forces along y": 0.0, "semi-tangential": -0.5, "forces along x": -1.0}
+#: The further moment against w' by psi, and against psi by w', per unit of moment about z: what
+#: each does when the tip turns, less what dead forces along y do.
+MOMENTS = {
+    "forces along y": (0.0, 0.0),
+    "forces along x": (-1.0, -1.0),
+    "semi-tangential": (-0.5, -0.5),
+    "dead": (0.0, -1.0),
+    "follower": (-1.0, 0.0),
+}
 
 
 def end_moment(kind: str) -> Bent:
-    """A couple about z at the tip, made of dead forces along y on rigid arms along x, of dead
-    forces along x on arms along y, or half of each.
-
-    A moment of fixed direction, or one that follows the section, has no potential; the clamped
-    beam bends sideways in no equilibrium under either.
-    """
-    return Bent(np.ones_like, ((0.0, COUPLES[kind]), (COUPLES[kind], 0.0)))
+    """A moment about z at the tip: a couple of dead forces along y on rigid arms along x, of dead
+    forces along x on arms along y, half of each, a moment of fixed direction, or one that turns
+    with the section.  The last two have no potential."""
+    slope, twist = MOMENTS[kind]
+    return Bent(np.ones_like, ((0.0, slope), (twist, 0.0)))
 
 
 def matrices(beam: Beam, bent: Bent, order: int = 16) -> tuple[Array, Array, Array]:
@@ -111,22 +115,41 @@ def matrices(beam: Beam, bent: Bent, order: int = 16) -> tuple[Array, Array, Arr
     return stiffness, change, mass
 
 
-def squares(beam: Beam, bent: Bent, load: float, count: int = 4) -> Array:
-    """Lowest squares of the lateral natural frequencies, rad^2/s^2, under `load`."""
+def squares(beam: Beam, bent: Bent, load: float, count: int = 4) -> npt.NDArray[np.complex128]:
+    """Lowest squares (by modulus of what is shifted) of the lateral natural frequencies, rad^2/s^2,
+    under `load`; negative: growth, a pair of complex ones: flutter."""
     stiffness, change, mass = matrices(beam, bent)
     loaded, shift = stiffness + load * change, 0.0
-    while np.linalg.eigvalsh(loaded + shift * mass)[0] <= 0:
+    while np.linalg.eigvalsh(loaded + loaded.T + 2 * shift * mass)[0] <= 0:
         shift = max(2 * shift, beam.bending / (beam.mass * beam.length**4))
     # The largest reciprocals, so that the stiff shapes leave no rounding on the lowest.
-    reciprocal = scipy.linalg.eigh(mass, loaded + shift * mass, eigvals_only=True)
-    return np.asarray(1 / reciprocal[::-1][:count] - shift, float)
+    reciprocal = np.linalg.eigvals(np.linalg.solve(loaded + shift * mass, mass)).astype(complex)
+    return np.sort_complex(1 / reciprocal[np.argsort(-np.abs(reciprocal))[:count]] - shift)
+
+
+def lowest_rate(beam: Beam, bent: Bent, load: float) -> float:
+    """First frequency, rad/s, of a load with a potential; a rate of growth, 1/s, as negative."""
+    square = squares(beam, bent, load)[0]
+    assert abs(square.imag) < 1e-9 * abs(square), square
+    return float(np.sign(square.real) * abs(square.real) ** 0.5)
 
 
 def critical(beam: Beam, bent: Bent) -> float:
-    """Smallest positive load at which the beam stands still in a lateral shape."""
+    """Smallest positive load at which the beam stands still in a lateral shape; inf for none."""
     stiffness, change, _ = matrices(beam, bent)
-    reciprocal = scipy.linalg.eigh(-change, stiffness, eigvals_only=True)
-    return float(1 / reciprocal.max())
+    reciprocal = np.linalg.eigvals(np.linalg.solve(stiffness, -change))
+    real = reciprocal.real[np.abs(reciprocal.imag) < 1e-9]
+    return float(1 / real.max()) if real.max(initial=0.0) > 1e-6 else float(np.inf)
+
+
+def flutter(beam: Beam, bent: Bent, low: float, high: float) -> float:
+    """Load between `low` and `high` from which a pair of frequencies is complex."""
+    while high - low > 1e-10 * high:
+        middle = (low + high) / 2
+        found = squares(beam, bent, middle)
+        steady = np.abs(found.imag).max() < 1e-6 * np.abs(found).max()
+        low, high = (middle, high) if steady else (low, middle)
+    return high
 
 
 def prandtl() -> float:
