@@ -77,6 +77,15 @@ def test_small_deflections_superpose() -> None:
     assert state.rotation == pytest.approx(turned, rel=1e-4)
 
 
+def test_twist_of_second_order() -> None:
+    """GJ psi' = int (1/EI_z - 1/EI_y) M_y M_z ds from x to the tip: the work of the moments."""
+    rod, y, z = Rod((1.0, 16.0), 1.3, 2.0), 3e-3, 2e-3
+    state = solve(rod, Load((0.0, y, z)))
+    expected = -y * z * 2.0**4 * (1 - 1 / 16) / (12 * 1.3)
+    assert state.twist == pytest.approx(expected, rel=1e-4)
+    assert state.rotation[0] == pytest.approx(expected, rel=1e-4)
+
+
 def test_first_integrals_and_balance() -> None:
     """Along a uniform rod without load per length m.u/2 + n.t, m.n and m + r x n are constant."""
     state = solve(FLAT, Load((0.3, 1.5, 2.0), (0.4, -0.2, 0.3)))
