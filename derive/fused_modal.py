@@ -63,7 +63,7 @@ class ModalPass:
             None if idle else lambda c, code: f.fail_unless(c, SECTION, index, code),
             "inward" if section.inward else "outward", modal.n,
             R_end=f.entries(section.end),
-            **{name: found[name] for name in ("x", "Psi", "xd", "Psid", "xdd")},
+            **{name: found[name] for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")},
         )  # fmt: skip
         self.subspaces[index] = self._run("subspace", modal.n, H6=motion["H6"], Phi=found["Phi"])[
             "H"

@@ -18,7 +18,7 @@ from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
 from .elements.body_rigid import RigidBody
 from .factored import eliminate_factored, recover_factored
-from .flexible import beam_fields, modal, modal_sweep, section
+from .flexible import beam_fields, beam_second_order, modal, modal_sweep, section
 from .hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from .lower import lower
 from .registry import Element, builtin_elements, kind_of
@@ -179,7 +179,8 @@ def modal_kernels() -> tuple[Kernel, ...]:
 
 def beam_kernels() -> tuple[Kernel, ...]:
     """Beams: integrands per length, integrated along the beam when a scene is packed."""
-    return tuple(Kernel(name, make()) for name, make in beam_fields.KERNELS.items())
+    derivations = beam_fields.KERNELS | beam_second_order.KERNELS
+    return tuple(Kernel(name, make()) for name, make in derivations.items())
 
 
 def classical_kernel(name: str) -> Kernel:

@@ -505,10 +505,16 @@ int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inerti
     const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
     const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
     real *restrict K);
-int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
-    real *restrict g);
 int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
     real *restrict phi, real *restrict theta);
+int mstmm_sweep_beam_turning(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict kappa_k, const real *restrict kappa_l, real *restrict dh);
+int mstmm_sweep_beam_drawing(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict stretch_k, const real *restrict stretch_l, const real *restrict h,
+    real *restrict dg);
+int mstmm_sweep_beam_second_moments(const real *restrict x, const real *restrict inertia,
+    const real *restrict turn_k, const real *restrict turn_l, const real *restrict g,
+    const real *restrict h_turn, real *restrict G, real *restrict X);
 
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
@@ -817,17 +823,18 @@ int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *r
     const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d);
 int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
     const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd);
+    real *restrict Psid, real *restrict xdd, real *restrict Psidd);
 int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c);
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c);
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H);
 int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,

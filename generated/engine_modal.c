@@ -13,11 +13,11 @@ typedef struct {
 
 /* Arrays of a section in the workspace. */
 typedef struct {
-    real *jacobian, *subspace, *push, *h6, *place, *turn, *rate, *turn_rate, *bias;
+    real *jacobian, *subspace, *push, *h6, *place, *turn, *rate, *turn_rate, *bias, *turn_bias;
 } section_arrays;
 
 int64_t mstmm_modal_numbers(int n) { return (int64_t)32 * n + (int64_t)2 * n * n + n + n; }
-int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 36 + 15; }
+int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 36 + 18; }
 
 static modal_arrays modal_of(const mstmm_state *state, const mstmm_modal *modal)
 {
@@ -37,7 +37,8 @@ static section_arrays section_of(const mstmm_state *state, const mstmm_section *
     real *at = state->workspace + section->place, *fixed = at + 18 * n;
     return (section_arrays){.jacobian = at, .subspace = at + 6 * n, .push = at + 12 * n,
                             .h6 = fixed, .place = fixed + 36, .turn = fixed + 39,
-                            .rate = fixed + 42, .turn_rate = fixed + 45, .bias = fixed + 48};
+                            .rate = fixed + 42, .turn_rate = fixed + 45, .bias = fixed + 48,
+                            .turn_bias = fixed + 51};
 }
 
 int mstmm_section_motion(mstmm_state *state, int index)
@@ -48,13 +49,14 @@ int mstmm_section_motion(mstmm_state *state, int index)
     const section_arrays a = section_of(state, section);
     real *block = state->workspace + body->block, *bias = block + MSTMM_BLOCK_HINGE_C;
     mstmm_sweep_modal_section(modal->n, section->point, section->phi, section->theta,
-                              section->shortening[0], section->shortening[1],
-                              section->shortening[2], state->q + modal->q, state->u + modal->u,
-                              a.jacobian, a.place, a.turn, a.rate, a.turn_rate, a.bias);
+                              section->drawn[0], section->drawn[1], section->drawn[2],
+                              section->turned[0], section->turned[1], section->turned[2],
+                              state->q + modal->q, state->u + modal->u, a.jacobian, a.place, a.turn,
+                              a.rate, a.turn_rate, a.bias, a.turn_bias);
     int code = (section->inward ? mstmm_sweep_modal_inward : mstmm_sweep_modal_outward)(
-        section->end, a.place, a.turn, a.rate, a.turn_rate, a.bias, block + MSTMM_BLOCK_HINGE_R,
-        block + MSTMM_BLOCK_HINGE_D, a.h6, block + MSTMM_BLOCK_HINGE_V,
-        block + MSTMM_BLOCK_HINGE_W, bias);
+        section->end, a.place, a.turn, a.rate, a.turn_rate, a.bias, a.turn_bias,
+        block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_D, a.h6,
+        block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_W, bias);
     if (code) return mstmm_fail(state, MSTMM_FAILED_SECTION, index, code);
     mstmm_sweep_modal_subspace(modal->n, a.h6, a.jacobian, a.subspace);
     if (state->imposed_all) {

@@ -58,7 +58,7 @@ typedef struct {
 typedef struct {
     const mstmm_modal *modal;
     int inward; /* 1: from the section that is held to the floating frame; 0: outward, to an end */
-    const real *point, *phi, *theta, *shortening[3], *end;
+    const real *point, *phi, *theta, *drawn[3], *turned[3], *end; /* g and h of second order */
     int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
 } mstmm_section;
 

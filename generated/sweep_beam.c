@@ -15,10 +15,16 @@ int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inerti
     const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
     const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
     real *restrict K);
-int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
-    real *restrict g);
 int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
     real *restrict phi, real *restrict theta);
+int mstmm_sweep_beam_turning(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict kappa_k, const real *restrict kappa_l, real *restrict dh);
+int mstmm_sweep_beam_drawing(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict stretch_k, const real *restrict stretch_l, const real *restrict h,
+    real *restrict dg);
+int mstmm_sweep_beam_second_moments(const real *restrict x, const real *restrict inertia,
+    const real *restrict turn_k, const real *restrict turn_l, const real *restrict g,
+    const real *restrict h_turn, real *restrict G, real *restrict X);
 
 /* integrands per length of the rigid beam's mass, first and second moments
  * source: Shabana, Dynamics of Multibody Systems, ch. 5
@@ -193,37 +199,6 @@ static const mstmm_port mstmm_sweep_beam_moments_outputs[] = {
     {"K", 1, "", 0, 0},
 };
 
-/* rate of shortening by two shapes
- * source: Shabana, Dynamics of Multibody Systems, ch. 5
- * in  slope_k[2] v', w'
- * in  slope_l[2] v', w'
- * out g[1] -u2', second derivative by eta_k, eta_l
- */
-int mstmm_sweep_beam_shortening(const real *restrict slope_k, const real *restrict slope_l,
-    real *restrict g)
-{
-    const real t0 = slope_k[0] * slope_l[0];
-    const real t1 = slope_k[1] * slope_l[1];
-    const real t2 = t0 + t1;
-    g[0] = t2;
-    return 0;
-}
-
-static int mstmm_sweep_beam_shortening_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_beam_shortening(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_beam_shortening_inputs[] = {
-    {"slope_k", 2, "", 0, 0},
-    {"slope_l", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_beam_shortening_outputs[] = {
-    {"g", 1, "", 0, 0},
-};
-
 /* displacement and rotation vector of a section by one shape
  * source: Shabana, Dynamics of Multibody Systems, ch. 5
  * in  values[4] s, v, w, psi
@@ -260,6 +235,215 @@ static const mstmm_port mstmm_sweep_beam_section_outputs[] = {
     {"theta", 3, "", 0, 0},
 };
 
+/* rate along the beam of the rotation of second order by two shapes
+ * source: Kirchhoff's rod: Love, A Treatise on the Mathematical Theory of Elasticity, ch. 18
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (second-order displacements)
+ * in  theta_k[3] rotation vector psi, -w', v' of the section, shape k
+ * in  theta_l[3] rotation vector psi, -w', v' of the section, shape l
+ * in  kappa_k[3] twist and curvature psi', -w'', v'', shape k
+ * in  kappa_l[3] twist and curvature psi', -w'', v'', shape l
+ * out dh[3] dh / dx
+ */
+int mstmm_sweep_beam_turning(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict kappa_k, const real *restrict kappa_l, real *restrict dh)
+{
+    const real t0 = theta_k[2] * kappa_l[1];
+    const real t1 = theta_l[2] * kappa_k[1];
+    const real t2 = theta_l[1] * kappa_k[2];
+    const real t3 = t1 - t2;
+    const real t4 = t0 + t3;
+    const real t5 = theta_k[1] * kappa_l[2];
+    const real t6 = t4 - t5;
+    const real t7 = 0.5 * t6;
+    dh[0] = t7;
+    const real t8 = theta_k[0] * kappa_l[2];
+    const real t9 = theta_l[0] * kappa_k[2];
+    const real t10 = theta_l[2] * kappa_k[0];
+    const real t11 = t9 - t10;
+    const real t12 = theta_k[2] * kappa_l[0];
+    const real t13 = t11 - t12;
+    const real t14 = t8 + t13;
+    const real t15 = 0.5 * t14;
+    dh[1] = t15;
+    const real t16 = theta_k[1] * kappa_l[0];
+    const real t17 = theta_l[1] * kappa_k[0];
+    const real t18 = theta_l[0] * kappa_k[1];
+    const real t19 = t17 - t18;
+    const real t20 = t16 + t19;
+    const real t21 = theta_k[0] * kappa_l[1];
+    const real t22 = t20 - t21;
+    const real t23 = 0.5 * t22;
+    dh[2] = t23;
+    return 0;
+}
+
+static int mstmm_sweep_beam_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_beam_turning(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_beam_turning_inputs[] = {
+    {"theta_k", 3, "", 0, 0},
+    {"theta_l", 3, "", 0, 0},
+    {"kappa_k", 3, "", 0, 0},
+    {"kappa_l", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_beam_turning_outputs[] = {
+    {"dh", 3, "", 0, 0},
+};
+
+/* rate along the beam of the displacement of second order by two shapes
+ * source: Kirchhoff's rod: Love, A Treatise on the Mathematical Theory of Elasticity, ch. 18
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (second-order displacements)
+ * in  theta_k[3] rotation vector psi, -w', v' of the section, shape k
+ * in  theta_l[3] rotation vector psi, -w', v' of the section, shape l
+ * in  stretch_k[1] axial strain s', shape k
+ * in  stretch_l[1] axial strain s', shape l
+ * in  h[3] rotation of second order, -d^2 Psi2 / d eta_k d eta_l
+ * out dg[3] dg / dx
+ */
+int mstmm_sweep_beam_drawing(const real *restrict theta_k, const real *restrict theta_l,
+    const real *restrict stretch_k, const real *restrict stretch_l, const real *restrict h,
+    real *restrict dg)
+{
+    const real t0 = theta_k[1] * theta_l[1];
+    const real t1 = theta_k[2] * theta_l[2];
+    const real t2 = t0 + t1;
+    dg[0] = t2;
+    const real t3 = theta_k[1] * theta_l[0];
+    const real t4 = 0.5 * t3;
+    const real t5 = theta_k[0] * theta_l[1];
+    const real t6 = t5 * 0.5;
+    const real t7 = theta_l[2] * stretch_k[0];
+    const real t8 = theta_k[2] * stretch_l[0];
+    const real t9 = t7 + t8;
+    const real t10 = t6 + t9;
+    const real t11 = t4 + t10;
+    const real t12 = h[2] - t11;
+    dg[1] = t12;
+    const real t13 = theta_l[1] * stretch_k[0];
+    const real t14 = theta_k[1] * stretch_l[0];
+    const real t15 = t13 + t14;
+    const real t16 = theta_k[0] * theta_l[2];
+    const real t17 = 0.5 * t16;
+    const real t18 = t15 - t17;
+    const real t19 = theta_k[2] * theta_l[0];
+    const real t20 = 0.5 * t19;
+    const real t21 = t18 - t20;
+    const real t22 = t21 - h[1];
+    dg[2] = t22;
+    return 0;
+}
+
+static int mstmm_sweep_beam_drawing_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_beam_drawing(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_beam_drawing_inputs[] = {
+    {"theta_k", 3, "", 0, 0},
+    {"theta_l", 3, "", 0, 0},
+    {"stretch_k", 1, "", 0, 0},
+    {"stretch_l", 1, "", 0, 0},
+    {"h", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_beam_drawing_outputs[] = {
+    {"dg", 3, "", 0, 0},
+};
+
+/* integrands per length of the moments of the displacement of second order
+ * source: Kirchhoff's rod: Love, A Treatise on the Mathematical Theory of Elasticity, ch. 18
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (second-order displacements)
+ * in  x[1] (m) place along the beam
+ * in  inertia[3] mass per length (kg/m), int rho y^2 dA, int rho z^2 dA (kg m)
+ * in  turn_k[3] rotation of the section that carries inertia, shape k
+ * in  turn_l[3] rotation of the section that carries inertia, shape l
+ * in  g[3] displacement of second order, -d^2 u2 / d eta_k d eta_l
+ * in  h_turn[3] that part of h which carries inertia
+ * out G[3] int rho g dA
+ * out X[3][3] int rho r0 g^T dA
+ */
+int mstmm_sweep_beam_second_moments(const real *restrict x, const real *restrict inertia,
+    const real *restrict turn_k, const real *restrict turn_l, const real *restrict g,
+    const real *restrict h_turn, real *restrict G, real *restrict X)
+{
+    const real t0 = inertia[0] * g[0];
+    G[0] = t0;
+    const real t1 = inertia[0] * g[1];
+    G[1] = t1;
+    const real t2 = inertia[0] * g[2];
+    G[2] = t2;
+    const real t3 = x[0] * t0;
+    X[0] = t3;
+    const real t4 = x[0] * t1;
+    X[1] = t4;
+    const real t5 = x[0] * t2;
+    X[2] = t5;
+    const real t6 = turn_k[0] * turn_l[1];
+    const real t7 = t6 * 0.5;
+    const real t8 = turn_k[1] * turn_l[0];
+    const real t9 = 0.5 * t8;
+    const real t10 = t7 + t9;
+    const real t11 = h_turn[2] + t10;
+    const real t12 = inertia[1] * t11;
+    const real t13 = -t12;
+    X[3] = t13;
+    const real t14 = turn_k[0] * turn_l[0];
+    const real t15 = turn_k[2] * turn_l[2];
+    const real t16 = t14 + t15;
+    const real t17 = inertia[1] * t16;
+    X[4] = t17;
+    const real t18 = turn_k[1] * turn_l[2];
+    const real t19 = 0.5 * t18;
+    const real t20 = turn_k[2] * turn_l[1];
+    const real t21 = 0.5 * t20;
+    const real t22 = t19 + t21;
+    const real t23 = h_turn[0] - t22;
+    const real t24 = inertia[1] * t23;
+    X[5] = t24;
+    const real t25 = turn_k[0] * turn_l[2];
+    const real t26 = 0.5 * t25;
+    const real t27 = turn_k[2] * turn_l[0];
+    const real t28 = 0.5 * t27;
+    const real t29 = t26 + t28;
+    const real t30 = h_turn[1] - t29;
+    const real t31 = inertia[2] * t30;
+    X[6] = t31;
+    const real t32 = h_turn[0] + t22;
+    const real t33 = inertia[2] * t32;
+    const real t34 = -t33;
+    X[7] = t34;
+    const real t35 = turn_k[1] * turn_l[1];
+    const real t36 = t14 + t35;
+    const real t37 = inertia[2] * t36;
+    X[8] = t37;
+    return 0;
+}
+
+static int mstmm_sweep_beam_second_moments_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_beam_second_moments(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_beam_second_moments_inputs[] = {
+    {"x", 1, "m", 0, 0},
+    {"inertia", 3, "", 0, 0},
+    {"turn_k", 3, "", 0, 0},
+    {"turn_l", 3, "", 0, 0},
+    {"g", 3, "", 0, 0},
+    {"h_turn", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_beam_second_moments_outputs[] = {
+    {"G", 3, "", 0, 0},
+    {"X", 9, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_beam_kernels[] = {
     {
         .name = "rigid",
@@ -286,18 +470,6 @@ static const mstmm_kernel mstmm_sweep_beam_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "shortening",
-        .function = (void (*)(void))mstmm_sweep_beam_shortening,
-        .call = mstmm_sweep_beam_shortening_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_beam_shortening_inputs,
-        .outputs = mstmm_sweep_beam_shortening_outputs,
-        .ir_hash = "fd0a9c10149d6e2e32926045e71efd163e33387925f4b55541358aa1890f9e58",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
         .name = "section",
         .function = (void (*)(void))mstmm_sweep_beam_section,
         .call = mstmm_sweep_beam_section_call,
@@ -309,13 +481,49 @@ static const mstmm_kernel mstmm_sweep_beam_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "turning",
+        .function = (void (*)(void))mstmm_sweep_beam_turning,
+        .call = mstmm_sweep_beam_turning_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_beam_turning_inputs,
+        .outputs = mstmm_sweep_beam_turning_outputs,
+        .ir_hash = "1701d51db2b03b67308d3dbbaa201b78f29c8976311a33cabcee24cb808397fc",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "drawing",
+        .function = (void (*)(void))mstmm_sweep_beam_drawing,
+        .call = mstmm_sweep_beam_drawing_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_beam_drawing_inputs,
+        .outputs = mstmm_sweep_beam_drawing_outputs,
+        .ir_hash = "cf800affaf54b9e1fafa2e6ae1db22c733899390283a16419393467575e91663",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "second_moments",
+        .function = (void (*)(void))mstmm_sweep_beam_second_moments,
+        .call = mstmm_sweep_beam_second_moments_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_beam_second_moments_inputs,
+        .outputs = mstmm_sweep_beam_second_moments_outputs,
+        .ir_hash = "6817c38e0da124bcefe28ced3d72128565e4fe9a3b1c68539dabce747ab43ff5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_beam = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "beam",
-    .hash = "e40a03e78875ed5c9e731060bd687f6458cf98be364fb0701dde87ef0bdc10a5",
+    .hash = "7edea1b21dc182657d0082a84b454345d8c50c2f89273f6448ed38e949ef72e6",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -325,6 +533,6 @@ const mstmm_element mstmm_sweep_beam = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 6,
     .kernels = mstmm_sweep_beam_kernels,
 };

@@ -30,17 +30,18 @@ int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *r
     const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d);
 int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
     const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd);
+    real *restrict Psid, real *restrict xdd, real *restrict Psidd);
 int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c);
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c);
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H);
 int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
@@ -1416,6 +1417,9 @@ static const mstmm_port mstmm_sweep_modal_strain_energy_outputs[] = {
  * in  g_x[n][n] displacement of second order along x: -1/2 eta^T g eta
  * in  g_y[n][n] displacement of second order along y: -1/2 eta^T g eta
  * in  g_z[n][n] displacement of second order along z: -1/2 eta^T g eta
+ * in  h_x[n][n] rotation vector of second order about x: -1/2 eta^T h eta
+ * in  h_y[n][n] rotation vector of second order about y: -1/2 eta^T h eta
+ * in  h_z[n][n] rotation vector of second order about z: -1/2 eta^T h eta
  * in  eta[n] modal coordinates
  * in  etad[n] modal speeds
  * out Phi[6][n] rates of point and rotation vector per modal speed
@@ -1424,13 +1428,15 @@ static const mstmm_port mstmm_sweep_modal_strain_energy_outputs[] = {
  * out xd[3] (m/s) rate of x
  * out Psid[3] (rad/s) rate of Psi
  * out xdd[3] (m/s2) second rate of x at etadd = 0
+ * out Psidd[3] (rad/s2) second rate of Psi at etadd = 0
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_section_sized(int n, const real *restrict r, const real *restrict phi,
     const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd)
+    real *restrict Psid, real *restrict xdd, real *restrict Psidd)
 {
     for (int k = 0; k < n; ++k) {
         real t1 = 0;
@@ -1460,170 +1466,249 @@ int mstmm_sweep_modal_section_sized(int n, const real *restrict r, const real *r
         Phi[2 * n + k] = t8;
     }
     for (int k = 0; k < n; ++k) {
-        Phi[3 * n + k] = theta[k];
+        real t10 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t9 = eta[l] * h_x[n * l + k];
+            t10 += t9;
+        }
+        const real t11 = theta[k] - t10;
+        Phi[3 * n + k] = t11;
     }
     for (int k = 0; k < n; ++k) {
-        Phi[4 * n + k] = theta[n + k];
+        real t13 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t12 = eta[l] * h_y[n * l + k];
+            t13 += t12;
+        }
+        const real t14 = theta[n + k] - t13;
+        Phi[4 * n + k] = t14;
     }
     for (int k = 0; k < n; ++k) {
-        Phi[5 * n + k] = theta[2 * n + k];
+        real t16 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t15 = eta[l] * h_z[n * l + k];
+            t16 += t15;
+        }
+        const real t17 = theta[2 * n + k] - t16;
+        Phi[5 * n + k] = t17;
     }
-    real t10 = 0;
+    real t19 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t9 = Phi[k] * eta[k];
-        t10 += t9;
+        const real t18 = Phi[k] * eta[k];
+        t19 += t18;
     }
-    const real t11 = 0.5 * t10;
-    real t13 = 0;
+    const real t20 = 0.5 * t19;
+    real t22 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t12 = phi[k] * eta[k];
-        t13 += t12;
+        const real t21 = phi[k] * eta[k];
+        t22 += t21;
     }
-    const real t14 = 0.5 * t13;
-    const real t15 = t11 + t14;
-    const real t16 = r[0] + t15;
-    x[0] = t16;
-    real t18 = 0;
+    const real t23 = 0.5 * t22;
+    const real t24 = t20 + t23;
+    const real t25 = r[0] + t24;
+    x[0] = t25;
+    real t27 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t17 = eta[k] * Phi[n + k];
-        t18 += t17;
+        const real t26 = eta[k] * Phi[n + k];
+        t27 += t26;
     }
-    const real t19 = 0.5 * t18;
-    real t21 = 0;
+    const real t28 = 0.5 * t27;
+    real t30 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t20 = phi[n + k] * eta[k];
-        t21 += t20;
+        const real t29 = phi[n + k] * eta[k];
+        t30 += t29;
     }
-    const real t22 = 0.5 * t21;
-    const real t23 = t19 + t22;
-    const real t24 = r[1] + t23;
-    x[1] = t24;
-    real t26 = 0;
+    const real t31 = 0.5 * t30;
+    const real t32 = t28 + t31;
+    const real t33 = r[1] + t32;
+    x[1] = t33;
+    real t35 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t25 = eta[k] * Phi[2 * n + k];
-        t26 += t25;
+        const real t34 = eta[k] * Phi[2 * n + k];
+        t35 += t34;
     }
-    const real t27 = 0.5 * t26;
-    real t29 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t28 = phi[2 * n + k] * eta[k];
-        t29 += t28;
-    }
-    const real t30 = 0.5 * t29;
-    const real t31 = t27 + t30;
-    const real t32 = r[2] + t31;
-    x[2] = t32;
-    real t34 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t33 = theta[k] * eta[k];
-        t34 += t33;
-    }
-    Psi[0] = t34;
-    real t36 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t35 = theta[n + k] * eta[k];
-        t36 += t35;
-    }
-    Psi[1] = t36;
+    const real t36 = 0.5 * t35;
     real t38 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t37 = theta[2 * n + k] * eta[k];
+        const real t37 = phi[2 * n + k] * eta[k];
         t38 += t37;
     }
-    Psi[2] = t38;
-    real t40 = 0;
+    const real t39 = 0.5 * t38;
+    const real t40 = t36 + t39;
+    const real t41 = r[2] + t40;
+    x[2] = t41;
+    real t43 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t39 = Phi[k] * etad[k];
-        t40 += t39;
+        const real t42 = eta[k] * Phi[3 * n + k];
+        t43 += t42;
     }
-    xd[0] = t40;
-    real t42 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t41 = Phi[n + k] * etad[k];
-        t42 += t41;
-    }
-    xd[1] = t42;
-    real t44 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t43 = Phi[2 * n + k] * etad[k];
-        t44 += t43;
-    }
-    xd[2] = t44;
+    const real t44 = 0.5 * t43;
     real t46 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t45 = theta[k] * etad[k];
+        const real t45 = theta[k] * eta[k];
         t46 += t45;
     }
-    Psid[0] = t46;
-    real t48 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t47 = theta[n + k] * etad[k];
-        t48 += t47;
-    }
-    Psid[1] = t48;
+    const real t47 = 0.5 * t46;
+    const real t48 = t44 + t47;
+    Psi[0] = t48;
     real t50 = 0;
     for (int k = 0; k < n; ++k) {
-        const real t49 = theta[2 * n + k] * etad[k];
+        const real t49 = eta[k] * Phi[4 * n + k];
         t50 += t49;
     }
-    Psid[2] = t50;
-    real t54 = 0;
+    const real t51 = 0.5 * t50;
+    real t53 = 0;
     for (int k = 0; k < n; ++k) {
-        real t52 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t51 = g_x[n * k + l] * etad[l];
-            t52 += t51;
-        }
-        const real t53 = etad[k] * t52;
-        t54 += t53;
+        const real t52 = theta[n + k] * eta[k];
+        t53 += t52;
     }
-    const real t55 = -t54;
-    xdd[0] = t55;
-    real t59 = 0;
+    const real t54 = 0.5 * t53;
+    const real t55 = t51 + t54;
+    Psi[1] = t55;
+    real t57 = 0;
     for (int k = 0; k < n; ++k) {
-        real t57 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t56 = etad[l] * g_y[n * k + l];
-            t57 += t56;
-        }
-        const real t58 = etad[k] * t57;
-        t59 += t58;
+        const real t56 = eta[k] * Phi[5 * n + k];
+        t57 += t56;
     }
-    const real t60 = -t59;
-    xdd[1] = t60;
+    const real t58 = 0.5 * t57;
+    real t60 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t59 = theta[2 * n + k] * eta[k];
+        t60 += t59;
+    }
+    const real t61 = 0.5 * t60;
+    const real t62 = t58 + t61;
+    Psi[2] = t62;
     real t64 = 0;
     for (int k = 0; k < n; ++k) {
-        real t62 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t61 = etad[l] * g_z[n * k + l];
-            t62 += t61;
-        }
-        const real t63 = etad[k] * t62;
+        const real t63 = Phi[k] * etad[k];
         t64 += t63;
     }
-    const real t65 = -t64;
-    xdd[2] = t65;
+    xd[0] = t64;
+    real t66 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t65 = Phi[n + k] * etad[k];
+        t66 += t65;
+    }
+    xd[1] = t66;
+    real t68 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t67 = Phi[2 * n + k] * etad[k];
+        t68 += t67;
+    }
+    xd[2] = t68;
+    real t70 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t69 = Phi[3 * n + k] * etad[k];
+        t70 += t69;
+    }
+    Psid[0] = t70;
+    real t72 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t71 = Phi[4 * n + k] * etad[k];
+        t72 += t71;
+    }
+    Psid[1] = t72;
+    real t74 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t73 = Phi[5 * n + k] * etad[k];
+        t74 += t73;
+    }
+    Psid[2] = t74;
+    real t78 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t76 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t75 = g_x[n * k + l] * etad[l];
+            t76 += t75;
+        }
+        const real t77 = etad[k] * t76;
+        t78 += t77;
+    }
+    const real t79 = -t78;
+    xdd[0] = t79;
+    real t83 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t81 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t80 = etad[l] * g_y[n * k + l];
+            t81 += t80;
+        }
+        const real t82 = etad[k] * t81;
+        t83 += t82;
+    }
+    const real t84 = -t83;
+    xdd[1] = t84;
+    real t88 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t86 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t85 = etad[l] * g_z[n * k + l];
+            t86 += t85;
+        }
+        const real t87 = etad[k] * t86;
+        t88 += t87;
+    }
+    const real t89 = -t88;
+    xdd[2] = t89;
+    real t93 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t91 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t90 = etad[l] * h_x[n * k + l];
+            t91 += t90;
+        }
+        const real t92 = etad[k] * t91;
+        t93 += t92;
+    }
+    const real t94 = -t93;
+    Psidd[0] = t94;
+    real t98 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t96 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t95 = etad[l] * h_y[n * k + l];
+            t96 += t95;
+        }
+        const real t97 = etad[k] * t96;
+        t98 += t97;
+    }
+    const real t99 = -t98;
+    Psidd[1] = t99;
+    real t103 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t101 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t100 = etad[l] * h_z[n * k + l];
+            t101 += t100;
+        }
+        const real t102 = etad[k] * t101;
+        t103 += t102;
+    }
+    const real t104 = -t103;
+    Psidd[2] = t104;
     return 0;
 }
 
 int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
     const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd)
+    real *restrict Psid, real *restrict xdd, real *restrict Psidd)
 {
     switch (n) { /* loops over a number that is known are unrolled */
-    case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
-    case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
-    case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
-    case 4: return mstmm_sweep_modal_section_sized(4, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
-    default: return mstmm_sweep_modal_section_sized(n, r, phi, theta, g_x, g_y, g_z, eta, etad, Phi, x, Psi, xd, Psid, xdd);
+    case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+    case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+    case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+    case 4: return mstmm_sweep_modal_section_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+    default: return mstmm_sweep_modal_section_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
     }
 }
 
 static int mstmm_sweep_modal_section_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_section(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_section(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
 }
 
 static const mstmm_port mstmm_sweep_modal_section_inputs[] = {
@@ -1633,6 +1718,9 @@ static const mstmm_port mstmm_sweep_modal_section_inputs[] = {
     {"g_x", 1, "", 0, 2},
     {"g_y", 1, "", 0, 2},
     {"g_z", 1, "", 0, 2},
+    {"h_x", 1, "", 0, 2},
+    {"h_y", 1, "", 0, 2},
+    {"h_z", 1, "", 0, 2},
     {"eta", 1, "", 0, 1},
     {"etad", 1, "", 0, 1},
 };
@@ -1644,6 +1732,7 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
     {"xd", 3, "m/s", 0, 0},
     {"Psid", 3, "rad/s", 0, 0},
     {"xdd", 3, "m/s2", 0, 0},
+    {"Psidd", 3, "rad/s2", 0, 0},
 };
 
 /* end of a flexible body against its floating frame
@@ -1656,6 +1745,7 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
  * in  xd[3] (m/s) rate of x
  * in  Psid[3] (rad/s) rate of Psi
  * in  xdd[3] (m/s2) second rate of x at etadd = 0
+ * in  Psidd[3] (rad/s2) second rate of Psi at etadd = 0
  * out R[3][3] rotation, outboard axes to inboard axes
  * out d[3] (m) outboard point from the inboard one, inboard axes
  * out H6[6][6] subspace by [xd; Psid], rows v then w, outboard axes
@@ -1665,8 +1755,8 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
  */
 int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c)
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
 {
     const real t0 = Psi[2] * Psi[2];
     const real t1 = Psi[0] * Psi[0];
@@ -1968,117 +2058,135 @@ int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x
     const real t240 = xdd[2] * t113;
     const real t241 = t239 + t240;
     c[2] = t241;
-    const real t242 = Psi[2] * Psid[2];
-    const real t243 = Psi[0] * Psid[0];
-    const real t244 = Psi[1] * Psid[1];
-    const real t245 = t243 + t244;
-    const real t246 = t242 + t245;
-    const real t247 = 2.0 * t246;
-    const real t248 = t4 * 3.868170170630684e-22;
-    const real t249 = (-1.7615646957052136e-19) + t248;
-    const real t250 = t4 * t249;
-    const real t251 = 6.576508197299464e-17 + t250;
-    const real t252 = t4 * t251;
-    const real t253 = (-((real)1 / (real)50812489728000)) + t252;
-    const real t254 = t4 * t253;
-    const real t255 = ((real)1 / (real)217945728000) + t254;
-    const real t256 = t4 * t255;
-    const real t257 = (-((real)1 / (real)1245404160)) + t256;
-    const real t258 = t4 * t257;
-    const real t259 = ((real)1 / (real)9979200) + t258;
-    const real t260 = t4 * t259;
-    const real t261 = (-((real)1 / (real)120960)) + t260;
-    const real t262 = t4 * t261;
-    const real t263 = ((real)1 / (real)2520) + t262;
-    const real t264 = t4 * t263;
-    const real t265 = (-((real)1 / (real)120)) + t264;
-    const real t266 = t247 * t265;
-    const real t267 = Psi[0] * Psid[1];
-    const real t268 = Psi[1] * Psid[0];
-    const real t269 = t267 - t268;
-    const real t270 = Psi[1] * t269;
-    const real t271 = Psi[2] * Psid[0];
-    const real t272 = Psi[0] * Psid[2];
-    const real t273 = t271 - t272;
-    const real t274 = Psi[2] * t273;
-    const real t275 = t270 - t274;
-    const real t276 = t266 * t275;
-    const real t277 = Psid[1] * t269;
-    const real t278 = Psid[2] * t273;
-    const real t279 = t277 - t278;
-    const real t280 = t133 * t279;
-    const real t281 = t276 + t280;
-    const real t282 = t4 * 8.896791392450573e-21;
-    const real t283 = (-3.6992858609809485e-18) + t282;
-    const real t284 = t4 * t283;
-    const real t285 = ((real)1 / (real)800296713216000) + t284;
-    const real t286 = t4 * t285;
-    const real t287 = (-((real)1 / (real)2988969984000)) + t286;
+    const real t242 = Psidd[2] * t158;
+    const real t243 = Psidd[1] * t147;
+    const real t244 = Psidd[0] * t135;
+    const real t245 = Psi[2] * Psid[2];
+    const real t246 = Psi[0] * Psid[0];
+    const real t247 = Psi[1] * Psid[1];
+    const real t248 = t246 + t247;
+    const real t249 = t245 + t248;
+    const real t250 = 2.0 * t249;
+    const real t251 = t4 * 3.868170170630684e-22;
+    const real t252 = (-1.7615646957052136e-19) + t251;
+    const real t253 = t4 * t252;
+    const real t254 = 6.576508197299464e-17 + t253;
+    const real t255 = t4 * t254;
+    const real t256 = (-((real)1 / (real)50812489728000)) + t255;
+    const real t257 = t4 * t256;
+    const real t258 = ((real)1 / (real)217945728000) + t257;
+    const real t259 = t4 * t258;
+    const real t260 = (-((real)1 / (real)1245404160)) + t259;
+    const real t261 = t4 * t260;
+    const real t262 = ((real)1 / (real)9979200) + t261;
+    const real t263 = t4 * t262;
+    const real t264 = (-((real)1 / (real)120960)) + t263;
+    const real t265 = t4 * t264;
+    const real t266 = ((real)1 / (real)2520) + t265;
+    const real t267 = t4 * t266;
+    const real t268 = (-((real)1 / (real)120)) + t267;
+    const real t269 = t250 * t268;
+    const real t270 = Psi[0] * Psid[1];
+    const real t271 = Psi[1] * Psid[0];
+    const real t272 = t270 - t271;
+    const real t273 = Psi[1] * t272;
+    const real t274 = Psi[2] * Psid[0];
+    const real t275 = Psi[0] * Psid[2];
+    const real t276 = t274 - t275;
+    const real t277 = Psi[2] * t276;
+    const real t278 = t273 - t277;
+    const real t279 = t269 * t278;
+    const real t280 = Psid[1] * t272;
+    const real t281 = Psid[2] * t276;
+    const real t282 = t280 - t281;
+    const real t283 = t133 * t282;
+    const real t284 = t279 + t283;
+    const real t285 = t244 + t284;
+    const real t286 = t4 * 8.896791392450573e-21;
+    const real t287 = (-3.6992858609809485e-18) + t286;
     const real t288 = t4 * t287;
-    const real t289 = ((real)1 / (real)14529715200) + t288;
+    const real t289 = ((real)1 / (real)800296713216000) + t288;
     const real t290 = t4 * t289;
-    const real t291 = (-((real)1 / (real)95800320)) + t290;
+    const real t291 = (-((real)1 / (real)2988969984000)) + t290;
     const real t292 = t4 * t291;
-    const real t293 = ((real)1 / (real)907200) + t292;
+    const real t293 = ((real)1 / (real)14529715200) + t292;
     const real t294 = t4 * t293;
-    const real t295 = (-((real)1 / (real)13440)) + t294;
+    const real t295 = (-((real)1 / (real)95800320)) + t294;
     const real t296 = t4 * t295;
-    const real t297 = ((real)1 / (real)360) + t296;
+    const real t297 = ((real)1 / (real)907200) + t296;
     const real t298 = t4 * t297;
-    const real t299 = (-((real)1 / (real)24)) + t298;
-    const real t300 = t299 * t247;
-    const real t301 = Psi[1] * Psid[2];
-    const real t302 = Psi[2] * Psid[1];
-    const real t303 = t301 - t302;
-    const real t304 = t300 * t303;
-    const real t305 = t281 - t304;
-    const real t306 = R_end[0] * t305;
-    const real t307 = Psi[2] * t303;
-    const real t308 = Psi[0] * t269;
-    const real t309 = t307 - t308;
-    const real t310 = t266 * t309;
-    const real t311 = Psid[2] * t303;
-    const real t312 = Psid[0] * t269;
-    const real t313 = t311 - t312;
-    const real t314 = t133 * t313;
-    const real t315 = t310 + t314;
-    const real t316 = t300 * t273;
-    const real t317 = t315 - t316;
-    const real t318 = R_end[3] * t317;
-    const real t319 = t306 + t318;
-    const real t320 = Psi[0] * t273;
-    const real t321 = Psi[1] * t303;
+    const real t299 = (-((real)1 / (real)13440)) + t298;
+    const real t300 = t4 * t299;
+    const real t301 = ((real)1 / (real)360) + t300;
+    const real t302 = t4 * t301;
+    const real t303 = (-((real)1 / (real)24)) + t302;
+    const real t304 = t303 * t250;
+    const real t305 = Psi[1] * Psid[2];
+    const real t306 = Psi[2] * Psid[1];
+    const real t307 = t305 - t306;
+    const real t308 = t304 * t307;
+    const real t309 = t285 - t308;
+    const real t310 = t243 + t309;
+    const real t311 = t242 + t310;
+    const real t312 = R_end[0] * t311;
+    const real t313 = Psidd[0] * t139;
+    const real t314 = Psidd[2] * t160;
+    const real t315 = Psidd[1] * t150;
+    const real t316 = Psi[2] * t307;
+    const real t317 = Psi[0] * t272;
+    const real t318 = t316 - t317;
+    const real t319 = t269 * t318;
+    const real t320 = Psid[2] * t307;
+    const real t321 = Psid[0] * t272;
     const real t322 = t320 - t321;
-    const real t323 = t266 * t322;
-    const real t324 = Psid[0] * t273;
-    const real t325 = Psid[1] * t303;
-    const real t326 = t324 - t325;
-    const real t327 = t133 * t326;
-    const real t328 = t323 + t327;
-    const real t329 = t300 * t269;
-    const real t330 = t328 - t329;
-    const real t331 = R_end[6] * t330;
-    const real t332 = t319 + t331;
-    c[3] = t332;
-    const real t333 = R_end[1] * t305;
-    const real t334 = R_end[4] * t317;
-    const real t335 = t333 + t334;
-    const real t336 = R_end[7] * t330;
-    const real t337 = t335 + t336;
-    c[4] = t337;
-    const real t338 = R_end[2] * t305;
-    const real t339 = R_end[5] * t317;
-    const real t340 = t338 + t339;
-    const real t341 = R_end[8] * t330;
-    const real t342 = t340 + t341;
-    c[5] = t342;
+    const real t323 = t133 * t322;
+    const real t324 = t319 + t323;
+    const real t325 = t315 + t324;
+    const real t326 = t304 * t276;
+    const real t327 = t325 - t326;
+    const real t328 = t314 + t327;
+    const real t329 = t313 + t328;
+    const real t330 = R_end[3] * t329;
+    const real t331 = t312 + t330;
+    const real t332 = Psidd[0] * t144;
+    const real t333 = Psidd[1] * t155;
+    const real t334 = Psidd[2] * t164;
+    const real t335 = Psi[0] * t276;
+    const real t336 = Psi[1] * t307;
+    const real t337 = t335 - t336;
+    const real t338 = t269 * t337;
+    const real t339 = Psid[0] * t276;
+    const real t340 = Psid[1] * t307;
+    const real t341 = t339 - t340;
+    const real t342 = t133 * t341;
+    const real t343 = t338 + t342;
+    const real t344 = t334 + t343;
+    const real t345 = t304 * t272;
+    const real t346 = t344 - t345;
+    const real t347 = t333 + t346;
+    const real t348 = t332 + t347;
+    const real t349 = R_end[6] * t348;
+    const real t350 = t331 + t349;
+    c[3] = t350;
+    const real t351 = R_end[1] * t311;
+    const real t352 = R_end[4] * t329;
+    const real t353 = t351 + t352;
+    const real t354 = R_end[7] * t348;
+    const real t355 = t353 + t354;
+    c[4] = t355;
+    const real t356 = R_end[2] * t311;
+    const real t357 = R_end[5] * t329;
+    const real t358 = t356 + t357;
+    const real t359 = R_end[8] * t348;
+    const real t360 = t358 + t359;
+    c[5] = t360;
     return 0;
 }
 
 static int mstmm_sweep_modal_outward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_outward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_outward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
 static const mstmm_port mstmm_sweep_modal_outward_inputs[] = {
@@ -2088,6 +2196,7 @@ static const mstmm_port mstmm_sweep_modal_outward_inputs[] = {
     {"xd", 3, "m/s", 0, 0},
     {"Psid", 3, "rad/s", 0, 0},
     {"xdd", 3, "m/s2", 0, 0},
+    {"Psidd", 3, "rad/s2", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_modal_outward_outputs[] = {
@@ -2113,6 +2222,7 @@ static const mstmm_guard mstmm_sweep_modal_outward_guards[] = {
  * in  xd[3] (m/s) rate of x
  * in  Psid[3] (rad/s) rate of Psi
  * in  xdd[3] (m/s2) second rate of x at etadd = 0
+ * in  Psidd[3] (rad/s2) second rate of Psi at etadd = 0
  * out R[3][3] rotation, outboard axes to inboard axes
  * out d[3] (m) outboard point from the inboard one, inboard axes
  * out H6[6][6] subspace by [xd; Psid], rows v then w, outboard axes
@@ -2122,8 +2232,8 @@ static const mstmm_guard mstmm_sweep_modal_outward_guards[] = {
  */
 int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, real *restrict R, real *restrict d, real *restrict H6,
-    real *restrict v, real *restrict w, real *restrict c)
+    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
+    real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
 {
     const real t0 = Psi[2] * Psi[2];
     const real t1 = Psi[0] * Psi[0];
@@ -2419,162 +2529,180 @@ int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     const real t237 = t235 + t236;
     const real t238 = t234 - t237;
     w[2] = t238;
-    const real t239 = t4 * 8.896791392450573e-21;
-    const real t240 = (-3.6992858609809485e-18) + t239;
-    const real t241 = t4 * t240;
-    const real t242 = ((real)1 / (real)800296713216000) + t241;
+    const real t239 = Psidd[0] * t154;
+    const real t240 = Psidd[2] * t169;
+    const real t241 = t4 * 8.896791392450573e-21;
+    const real t242 = (-3.6992858609809485e-18) + t241;
     const real t243 = t4 * t242;
-    const real t244 = (-((real)1 / (real)2988969984000)) + t243;
+    const real t244 = ((real)1 / (real)800296713216000) + t243;
     const real t245 = t4 * t244;
-    const real t246 = ((real)1 / (real)14529715200) + t245;
+    const real t246 = (-((real)1 / (real)2988969984000)) + t245;
     const real t247 = t4 * t246;
-    const real t248 = (-((real)1 / (real)95800320)) + t247;
+    const real t248 = ((real)1 / (real)14529715200) + t247;
     const real t249 = t4 * t248;
-    const real t250 = ((real)1 / (real)907200) + t249;
+    const real t250 = (-((real)1 / (real)95800320)) + t249;
     const real t251 = t4 * t250;
-    const real t252 = (-((real)1 / (real)13440)) + t251;
+    const real t252 = ((real)1 / (real)907200) + t251;
     const real t253 = t4 * t252;
-    const real t254 = ((real)1 / (real)360) + t253;
+    const real t254 = (-((real)1 / (real)13440)) + t253;
     const real t255 = t4 * t254;
-    const real t256 = (-((real)1 / (real)24)) + t255;
-    const real t257 = Psi[2] * Psid[2];
-    const real t258 = Psi[0] * Psid[0];
-    const real t259 = Psi[1] * Psid[1];
-    const real t260 = t258 + t259;
-    const real t261 = t257 + t260;
-    const real t262 = 2.0 * t261;
-    const real t263 = t256 * t262;
-    const real t264 = Psi[2] * Psid[0];
-    const real t265 = Psi[0] * Psid[2];
-    const real t266 = t264 - t265;
-    const real t267 = t263 * t266;
-    const real t268 = t4 * 3.868170170630684e-22;
-    const real t269 = (-1.7615646957052136e-19) + t268;
-    const real t270 = t4 * t269;
-    const real t271 = 6.576508197299464e-17 + t270;
-    const real t272 = t4 * t271;
-    const real t273 = (-((real)1 / (real)50812489728000)) + t272;
-    const real t274 = t4 * t273;
-    const real t275 = ((real)1 / (real)217945728000) + t274;
-    const real t276 = t4 * t275;
-    const real t277 = (-((real)1 / (real)1245404160)) + t276;
-    const real t278 = t4 * t277;
-    const real t279 = ((real)1 / (real)9979200) + t278;
-    const real t280 = t4 * t279;
-    const real t281 = (-((real)1 / (real)120960)) + t280;
-    const real t282 = t4 * t281;
-    const real t283 = ((real)1 / (real)2520) + t282;
-    const real t284 = t4 * t283;
-    const real t285 = (-((real)1 / (real)120)) + t284;
-    const real t286 = t262 * t285;
-    const real t287 = Psi[1] * Psid[2];
-    const real t288 = Psi[2] * Psid[1];
-    const real t289 = t287 - t288;
-    const real t290 = Psi[2] * t289;
-    const real t291 = Psi[0] * Psid[1];
-    const real t292 = Psi[1] * Psid[0];
-    const real t293 = t291 - t292;
-    const real t294 = Psi[0] * t293;
-    const real t295 = t290 - t294;
-    const real t296 = t286 * t295;
-    const real t297 = Psid[2] * t289;
-    const real t298 = Psid[0] * t293;
-    const real t299 = t297 - t298;
-    const real t300 = t152 * t299;
-    const real t301 = t296 + t300;
-    const real t302 = t267 + t301;
-    const real t303 = x[2] * t302;
-    const real t304 = t232 - t231;
-    const real t305 = xd[2] * t304;
-    const real t306 = 2.0 * t305;
-    const real t307 = t237 - t234;
-    const real t308 = x[0] * t307;
-    const real t309 = t227 - t226;
-    const real t310 = x[2] * t309;
-    const real t311 = t308 - t310;
-    const real t312 = t307 * t311;
-    const real t313 = x[1] * t309;
-    const real t314 = x[0] * t304;
-    const real t315 = t313 - t314;
-    const real t316 = t304 * t315;
-    const real t317 = t312 - t316;
-    const real t318 = t306 + t317;
-    const real t319 = xd[1] * t307;
-    const real t320 = 2.0 * t319;
-    const real t321 = t318 - t320;
-    const real t322 = t303 + t321;
-    const real t323 = t263 * t293;
-    const real t324 = Psi[0] * t266;
-    const real t325 = Psi[1] * t289;
-    const real t326 = t324 - t325;
-    const real t327 = t286 * t326;
-    const real t328 = Psid[0] * t266;
-    const real t329 = Psid[1] * t289;
-    const real t330 = t328 - t329;
-    const real t331 = t152 * t330;
-    const real t332 = t327 + t331;
-    const real t333 = t323 + t332;
-    const real t334 = x[1] * t333;
-    const real t335 = t322 - t334;
-    const real t336 = t335 - xdd[0];
-    c[0] = t336;
-    const real t337 = x[0] * t333;
-    const real t338 = xd[0] * t307;
-    const real t339 = 2.0 * t338;
-    const real t340 = t309 * t315;
-    const real t341 = x[2] * t304;
-    const real t342 = x[1] * t307;
-    const real t343 = t341 - t342;
-    const real t344 = t307 * t343;
-    const real t345 = t340 - t344;
-    const real t346 = xd[2] * t309;
-    const real t347 = 2.0 * t346;
-    const real t348 = t345 - t347;
-    const real t349 = t339 + t348;
-    const real t350 = t263 * t289;
-    const real t351 = Psi[1] * t293;
-    const real t352 = Psi[2] * t266;
-    const real t353 = t351 - t352;
-    const real t354 = t286 * t353;
-    const real t355 = Psid[1] * t293;
-    const real t356 = Psid[2] * t266;
-    const real t357 = t355 - t356;
-    const real t358 = t152 * t357;
-    const real t359 = t354 + t358;
-    const real t360 = t350 + t359;
-    const real t361 = x[2] * t360;
-    const real t362 = t349 - t361;
-    const real t363 = t337 + t362;
-    const real t364 = t363 - xdd[1];
-    c[1] = t364;
-    const real t365 = x[1] * t360;
-    const real t366 = xd[1] * t309;
-    const real t367 = 2.0 * t366;
-    const real t368 = t304 * t343;
-    const real t369 = t309 * t311;
-    const real t370 = t368 - t369;
-    const real t371 = t367 + t370;
-    const real t372 = xd[0] * t304;
-    const real t373 = 2.0 * t372;
-    const real t374 = t371 - t373;
+    const real t256 = ((real)1 / (real)360) + t255;
+    const real t257 = t4 * t256;
+    const real t258 = (-((real)1 / (real)24)) + t257;
+    const real t259 = Psi[2] * Psid[2];
+    const real t260 = Psi[0] * Psid[0];
+    const real t261 = Psi[1] * Psid[1];
+    const real t262 = t260 + t261;
+    const real t263 = t259 + t262;
+    const real t264 = 2.0 * t263;
+    const real t265 = t258 * t264;
+    const real t266 = Psi[2] * Psid[0];
+    const real t267 = Psi[0] * Psid[2];
+    const real t268 = t266 - t267;
+    const real t269 = t265 * t268;
+    const real t270 = Psidd[1] * t162;
+    const real t271 = t4 * 3.868170170630684e-22;
+    const real t272 = (-1.7615646957052136e-19) + t271;
+    const real t273 = t4 * t272;
+    const real t274 = 6.576508197299464e-17 + t273;
+    const real t275 = t4 * t274;
+    const real t276 = (-((real)1 / (real)50812489728000)) + t275;
+    const real t277 = t4 * t276;
+    const real t278 = ((real)1 / (real)217945728000) + t277;
+    const real t279 = t4 * t278;
+    const real t280 = (-((real)1 / (real)1245404160)) + t279;
+    const real t281 = t4 * t280;
+    const real t282 = ((real)1 / (real)9979200) + t281;
+    const real t283 = t4 * t282;
+    const real t284 = (-((real)1 / (real)120960)) + t283;
+    const real t285 = t4 * t284;
+    const real t286 = ((real)1 / (real)2520) + t285;
+    const real t287 = t4 * t286;
+    const real t288 = (-((real)1 / (real)120)) + t287;
+    const real t289 = t264 * t288;
+    const real t290 = Psi[1] * Psid[2];
+    const real t291 = Psi[2] * Psid[1];
+    const real t292 = t290 - t291;
+    const real t293 = Psi[2] * t292;
+    const real t294 = Psi[0] * Psid[1];
+    const real t295 = Psi[1] * Psid[0];
+    const real t296 = t294 - t295;
+    const real t297 = Psi[0] * t296;
+    const real t298 = t293 - t297;
+    const real t299 = t289 * t298;
+    const real t300 = Psid[2] * t292;
+    const real t301 = Psid[0] * t296;
+    const real t302 = t300 - t301;
+    const real t303 = t152 * t302;
+    const real t304 = t299 + t303;
+    const real t305 = t270 + t304;
+    const real t306 = t269 + t305;
+    const real t307 = t240 + t306;
+    const real t308 = t239 + t307;
+    const real t309 = x[2] * t308;
+    const real t310 = t232 - t231;
+    const real t311 = xd[2] * t310;
+    const real t312 = 2.0 * t311;
+    const real t313 = t237 - t234;
+    const real t314 = x[0] * t313;
+    const real t315 = t227 - t226;
+    const real t316 = x[2] * t315;
+    const real t317 = t314 - t316;
+    const real t318 = t313 * t317;
+    const real t319 = x[1] * t315;
+    const real t320 = x[0] * t310;
+    const real t321 = t319 - t320;
+    const real t322 = t310 * t321;
+    const real t323 = t318 - t322;
+    const real t324 = t312 + t323;
+    const real t325 = xd[1] * t313;
+    const real t326 = 2.0 * t325;
+    const real t327 = t324 - t326;
+    const real t328 = t309 + t327;
+    const real t329 = Psidd[0] * t158;
+    const real t330 = Psidd[1] * t166;
+    const real t331 = t265 * t296;
+    const real t332 = Psidd[2] * t172;
+    const real t333 = Psi[0] * t268;
+    const real t334 = Psi[1] * t292;
+    const real t335 = t333 - t334;
+    const real t336 = t289 * t335;
+    const real t337 = Psid[0] * t268;
+    const real t338 = Psid[1] * t292;
+    const real t339 = t337 - t338;
+    const real t340 = t152 * t339;
+    const real t341 = t336 + t340;
+    const real t342 = t332 + t341;
+    const real t343 = t331 + t342;
+    const real t344 = t330 + t343;
+    const real t345 = t329 + t344;
+    const real t346 = x[1] * t345;
+    const real t347 = t328 - t346;
+    const real t348 = t347 - xdd[0];
+    c[0] = t348;
+    const real t349 = x[0] * t345;
+    const real t350 = xd[0] * t313;
+    const real t351 = 2.0 * t350;
+    const real t352 = t315 * t321;
+    const real t353 = x[2] * t310;
+    const real t354 = x[1] * t313;
+    const real t355 = t353 - t354;
+    const real t356 = t313 * t355;
+    const real t357 = t352 - t356;
+    const real t358 = xd[2] * t315;
+    const real t359 = 2.0 * t358;
+    const real t360 = t357 - t359;
+    const real t361 = t351 + t360;
+    const real t362 = Psidd[2] * t185;
+    const real t363 = Psidd[1] * t181;
+    const real t364 = t265 * t292;
+    const real t365 = Psidd[0] * t177;
+    const real t366 = Psi[1] * t296;
+    const real t367 = Psi[2] * t268;
+    const real t368 = t366 - t367;
+    const real t369 = t289 * t368;
+    const real t370 = Psid[1] * t296;
+    const real t371 = Psid[2] * t268;
+    const real t372 = t370 - t371;
+    const real t373 = t152 * t372;
+    const real t374 = t369 + t373;
     const real t375 = t365 + t374;
-    const real t376 = x[0] * t302;
-    const real t377 = t375 - t376;
-    const real t378 = t377 - xdd[2];
-    c[2] = t378;
-    const real t379 = -t360;
-    c[3] = t379;
-    const real t380 = -t302;
-    c[4] = t380;
-    const real t381 = -t333;
-    c[5] = t381;
+    const real t376 = t364 + t375;
+    const real t377 = t363 + t376;
+    const real t378 = t362 + t377;
+    const real t379 = x[2] * t378;
+    const real t380 = t361 - t379;
+    const real t381 = t349 + t380;
+    const real t382 = t381 - xdd[1];
+    c[1] = t382;
+    const real t383 = x[1] * t378;
+    const real t384 = xd[1] * t315;
+    const real t385 = 2.0 * t384;
+    const real t386 = t310 * t355;
+    const real t387 = t315 * t317;
+    const real t388 = t386 - t387;
+    const real t389 = t385 + t388;
+    const real t390 = xd[0] * t310;
+    const real t391 = 2.0 * t390;
+    const real t392 = t389 - t391;
+    const real t393 = t383 + t392;
+    const real t394 = x[0] * t308;
+    const real t395 = t393 - t394;
+    const real t396 = t395 - xdd[2];
+    c[2] = t396;
+    const real t397 = -t378;
+    c[3] = t397;
+    const real t398 = -t308;
+    c[4] = t398;
+    const real t399 = -t345;
+    c[5] = t399;
     return 0;
 }
 
 static int mstmm_sweep_modal_inward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_inward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_inward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
 static const mstmm_port mstmm_sweep_modal_inward_inputs[] = {
@@ -2584,6 +2712,7 @@ static const mstmm_port mstmm_sweep_modal_inward_inputs[] = {
     {"xd", 3, "m/s", 0, 0},
     {"Psid", 3, "rad/s", 0, 0},
     {"xdd", 3, "m/s2", 0, 0},
+    {"Psidd", 3, "rad/s2", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_modal_inward_outputs[] = {
@@ -3852,11 +3981,11 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .name = "section",
         .function = (void (*)(void))mstmm_sweep_modal_section,
         .call = mstmm_sweep_modal_section_call,
-        .n_inputs = 8,
-        .n_outputs = 6,
+        .n_inputs = 11,
+        .n_outputs = 7,
         .inputs = mstmm_sweep_modal_section_inputs,
         .outputs = mstmm_sweep_modal_section_outputs,
-        .ir_hash = "c4b8b42dfe31ebd060f0823208db3d557c6afacba727d3e3da1f05f14e5827b1",
+        .ir_hash = "fd5280df307416a890e6d4f93cf72ef1516c5022c5c62021aa8c9a2002c7130a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -3864,11 +3993,11 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .name = "outward",
         .function = (void (*)(void))mstmm_sweep_modal_outward,
         .call = mstmm_sweep_modal_outward_call,
-        .n_inputs = 6,
+        .n_inputs = 7,
         .n_outputs = 6,
         .inputs = mstmm_sweep_modal_outward_inputs,
         .outputs = mstmm_sweep_modal_outward_outputs,
-        .ir_hash = "f5de6e7938d1df8b8caa4d6811d1b671226d258c892d30ed52eb024a11adeb71",
+        .ir_hash = "bb4649c2a9babf4134ae2a7b52dda38f42e5a94ae1f744cbd262b7fe2d630100",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_outward_guards,
     },
@@ -3876,11 +4005,11 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .name = "inward",
         .function = (void (*)(void))mstmm_sweep_modal_inward,
         .call = mstmm_sweep_modal_inward_call,
-        .n_inputs = 6,
+        .n_inputs = 7,
         .n_outputs = 6,
         .inputs = mstmm_sweep_modal_inward_inputs,
         .outputs = mstmm_sweep_modal_inward_outputs,
-        .ir_hash = "bd676b284e13bd4e3d197d2315d2cd77a3b34b54f47afc06fd004d2121b2cb14",
+        .ir_hash = "88995b978bf08c26f6dc578a10da008207378917654868de0db0fad8bf90cdbe",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_inward_guards,
     },
@@ -3998,7 +4127,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "f8a752afc04f781f68273c326a40068c89399ce362fc6a47f4072e424e020ff8",
+    .hash = "af96c67e0cd30804959c667359aad973c0064305ac243e684f958da5ae9586a5",
     .nq = 0,
     .nu = 0,
     .np = 0,

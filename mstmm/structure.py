@@ -54,7 +54,7 @@ class SectionStructure:
     """A section of the flexible body with floating frame `frame`, which a connection passes:
     outward from the frame to an end, or inward from the end that is held.
 
-    `numbers` are the inputs r, phi, theta, g_x, g_y, g_z of the kernel "section", by name.
+    `numbers` are the inputs r, phi, theta, g_x .. g_z, h_x .. h_z of the kernel "section", by name.
     """
 
     frame: int

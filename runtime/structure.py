@@ -217,7 +217,8 @@ def _section(reader: _Reader, body: Any) -> SectionStructure | None:
     frame = next(i for i in range(model.n_bodies) if model.bodies[i].modal == record.modal)
     arrays = [
         ("r", record.point, 3), ("phi", record.phi, 3 * n), ("theta", record.theta, 3 * n),
-        *((f"g_{a}", record.shortening[k], n * n) for k, a in enumerate("xyz")),
+        *((f"g_{a}", record.drawn[k], n * n) for k, a in enumerate("xyz")),
+        *((f"h_{a}", record.turned[k], n * n) for k, a in enumerate("xyz")),
     ]  # fmt: skip
     return SectionStructure(
         frame, bool(record.inward),

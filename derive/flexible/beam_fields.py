@@ -7,8 +7,7 @@ A point of the section at x that lies at (y, z) in it moves by
 s, v, w displacements of the axis, psi twist.  The section's rotation enters the inertia as `turn`:
 theta itself where rotary inertia is kept; its twist, and what the section turns with the floating
 frame, where it is left out.  Strain is that of the axis, s' - y v'' - z w'', and the rate of twist
-psi'.  Bending does not stretch the axis, so that it draws each section towards the root by the
-second-order displacement u2 with u2' = -(v'^2 + w'^2)/2.
+psi'.  What bending and twist displace and turn to second order is in `beam_second_order`.
 
 The field is linear in the modal coordinates, so that every integral of the mass matrix is
 bilinear in two shapes k and l (Shabana, Dynamics of Multibody Systems, ch. 5).  The integrals over
@@ -41,7 +40,6 @@ def _shape(k: str) -> tuple[Quantity, ...]:
     return (
         Quantity(vector(f"axis_{k}", 3), "", f"displacement s, v, w of the axis by shape {k}"),
         Quantity(vector(f"turn_{k}", 3), "", "rotation of the section that carries inertia"),
-        Quantity(vector(f"slope_{k}", 2), "", "v', w'"),
         Quantity(vector(f"strain_{k}", 4), "", "s', psi', w'', v''"),
     )
 
@@ -49,12 +47,8 @@ def _shape(k: str) -> tuple[Quantity, ...]:
 SHAPE_K, SHAPE_L = _shape("k"), _shape("l")
 
 
-def _linear(shape: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
-    """What enters mass and stiffness: all but the slopes."""
-    return (shape[0], shape[1], shape[3])
-
-
-def _entries(quantity: Quantity) -> Matrix:
+def entries(quantity: Quantity) -> Matrix:
+    """The entries of a column, one symbol each."""
     return Matrix([quantity.symbol[i, 0] for i in range(quantity.rows)])
 
 
@@ -64,13 +58,13 @@ def _over_section(entry: sp.Expr, weights: Mapping[tuple[int, int], sp.Expr]) ->
     return sp.Add(*(c * weights.get(powers, sp.Integer(0)) for powers, c in terms))
 
 
-def _mass(matrix: Matrix) -> Matrix:
+def over_mass(matrix: Matrix) -> Matrix:
     """int rho matrix dA: principal axes through the mass centre, so that odd moments vanish."""
-    m, yy, zz = _entries(INERTIA)
+    m, yy, zz = entries(INERTIA)
     return matrix.applyfunc(lambda e: _over_section(e, {(0, 0): m, (2, 0): yy, (0, 2): zz}))
 
 
-def _point() -> Matrix:
+def point() -> Matrix:
     """The undeformed place r0 of a point, from the root."""
     return Matrix([X.symbol[0, 0], _Y, _Z])
 
@@ -81,7 +75,7 @@ def displacement(axis: Matrix, turn: Matrix) -> Matrix:
 
 
 def _field(shape: tuple[Quantity, ...]) -> Matrix:
-    return displacement(_entries(shape[0]), _entries(shape[1]))
+    return displacement(entries(shape[0]), entries(shape[1]))
 
 
 def _strain_of_axis() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
@@ -96,29 +90,22 @@ def strain_energy(strains: Matrix) -> sp.Expr:
     axial, derivatives = _strain_of_axis()
     stretch, twist, curved_z, curved_y = strains
     axial = axial.subs(dict(zip(derivatives, (stretch, curved_z, curved_y), strict=True)))
-    ea, git, eiy, eiz = _entries(STIFFNESS)
+    ea, git, eiy, eiz = entries(STIFFNESS)
     # E y^2 over the section is EI about z.
     normal = _over_section(sp.expand(axial**2), {(0, 0): ea, (2, 0): eiz, (0, 2): eiy})
     return (normal + git * twist**2) / 2
 
 
-def second_order(slopes: Matrix) -> sp.Expr:
-    """u2' of an axis that keeps its length: u2' + (v'^2 + w'^2)/2 = 0 (Green's axial strain)."""
-    rate = sp.Symbol("u2_x")
-    green = rate + (slopes[0] ** 2 + slopes[1] ** 2) / 2
-    return sp.solve(green, rate)[0]
-
-
-def _mixed(function: object, part: int) -> sp.Expr:
-    """d^2 function(eta_k shape_k + eta_l shape_l) / d eta_k d eta_l."""
+def _stiffness() -> sp.Expr:
+    """Strain energy of eta_k shape_k + eta_l shape_l, its second derivative by eta_k, eta_l."""
     eta_k, eta_l = sp.symbols("eta_k eta_l")
-    both = eta_k * _entries(SHAPE_K[part]) + eta_l * _entries(SHAPE_L[part])
-    return sp.expand(sp.diff(function(both), eta_k, eta_l))  # type: ignore[operator]
+    both = eta_k * entries(SHAPE_K[2]) + eta_l * entries(SHAPE_L[2])
+    return sp.expand(sp.diff(strain_energy(both), eta_k, eta_l))
 
 
 def rigid() -> Derivation:
     """Integrands of the mass, of int r0 and of int r0 r0^T."""
-    r = _point()
+    r = point()
     mass, first = sp.MatrixSymbol("mass", 1, 1), vector("first", 3)
     second = sp.MatrixSymbol("second", 3, 3)
     return Derivation(
@@ -131,9 +118,9 @@ def rigid() -> Derivation:
             Quantity(second, "kg m", "int rho r0 r0^T dA", symmetric=True),
         ),
         (
-            Equation("mass", mass, _mass(Matrix([[1]]))),
-            Equation("first moment", first, _mass(r)),
-            Equation("second moment", second, _mass(Matrix(r * r.T)), symmetric=True),
+            Equation("mass", mass, over_mass(Matrix([[1]]))),
+            Equation("first moment", first, over_mass(r)),
+            Equation("second moment", second, over_mass(Matrix(r * r.T)), symmetric=True),
         ),
         sources=SOURCES,
         notes=("principal axes of the section through its mass centre",),
@@ -142,14 +129,14 @@ def rigid() -> Derivation:
 
 def moments() -> Derivation:
     """Integrands of C, E, F and of the stiffness, for shapes k and l."""
-    r, uk, ul = _point(), _field(SHAPE_K), _field(SHAPE_L)
+    r, uk, ul = point(), _field(SHAPE_K), _field(SHAPE_L)
     c = vector("C", 3)
     e, f = sp.MatrixSymbol("E", 3, 3), sp.MatrixSymbol("F", 3, 3)
     stiffness = sp.MatrixSymbol("K", 1, 1)
     return Derivation(
         "beam",
         "integrands per length of the moments of two shapes",
-        (X, INERTIA, STIFFNESS, *_linear(SHAPE_K), *_linear(SHAPE_L)),
+        (X, INERTIA, STIFFNESS, *SHAPE_K, *SHAPE_L),
         (
             Quantity(c, "", "int rho u_k dA"),
             Quantity(e, "", "int rho r0 u_k^T dA"),
@@ -157,10 +144,10 @@ def moments() -> Derivation:
             Quantity(stiffness, "", "strain energy's second derivative by eta_k, eta_l"),
         ),
         (
-            Equation("C", c, _mass(uk)),
-            Equation("E", e, _mass(Matrix(r * uk.T))),
-            Equation("F", f, _mass(Matrix(uk * ul.T))),
-            Equation("K", stiffness, Matrix([[_mixed(strain_energy, 3)]])),
+            Equation("C", c, over_mass(uk)),
+            Equation("E", e, over_mass(Matrix(r * uk.T))),
+            Equation("F", f, over_mass(Matrix(uk * ul.T))),
+            Equation("K", stiffness, Matrix([[_stiffness()]])),
         ),
         sources=SOURCES,
         notes=(
@@ -170,26 +157,12 @@ def moments() -> Derivation:
     )
 
 
-def shortening() -> Derivation:
-    """Rate along the beam of the second-order displacement towards the root, for shapes k and l."""
-    rate = sp.MatrixSymbol("g", 1, 1)
-    return Derivation(
-        "beam",
-        "rate of shortening by two shapes",
-        (SHAPE_K[2], SHAPE_L[2]),
-        (Quantity(rate, "", "-u2', second derivative by eta_k, eta_l"),),
-        (Equation("g", rate, Matrix([[_mixed(lambda a: -second_order(a), 2)]])),),
-        sources=SOURCES,
-        notes=("u2' = -(v'^2 + w'^2)/2: the axis keeps its length",),
-    )
-
-
 def section_rotation() -> Derivation:
     """Displacement and rotation of a section from the values of the shapes at it."""
     values = Quantity(vector("values", 4), "", "s, v, w, psi")
     slopes = Quantity(vector("slopes", 2), "", "v', w'")
     phi, theta = vector("phi", 3), vector("theta", 3)
-    s, v, w, psi = _entries(values)
+    s, v, w, psi = entries(values)
     return Derivation(
         "beam",
         "displacement and rotation vector of a section by one shape",
@@ -203,7 +176,5 @@ def section_rotation() -> Derivation:
     )
 
 
-#: Name -> derivation of every kernel of the beam.
-KERNELS = {
-    "rigid": rigid, "moments": moments, "shortening": shortening, "section": section_rotation,
-}  # fmt: skip
+#: Name -> derivation of the kernels of the linear fields.
+KERNELS = {"rigid": rigid, "moments": moments, "section": section_rotation}

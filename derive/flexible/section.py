@@ -1,8 +1,8 @@
 """Sections of a flexible body as ports: pose, subspace and bias against the floating frame.
 
-The rotation of a section is exp(Psi~) with Psi = theta eta, a rotation vector, in pose, rates and
-virtual power alike.  Its angular velocity is T(Psi) Psid in the section's axes, T(-Psi) Psid in the
-frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functions
+The rotation of a section is exp(Psi~) with Psi = theta eta - 1/2 eta^T h eta, a rotation vector, in
+pose, rates and virtual power alike.  Its angular velocity is T(Psi) Psid in the section's axes,
+T(-Psi) Psid in the frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functions
 
     a = sin t / t,   b = (1 - cos t) / t^2,   c = (t - sin t) / t^3,    t^2 = s = Psi . Psi
 
@@ -27,8 +27,11 @@ TERMS = 11
 POINT = Quantity(vector("r", 3), "m", "section point at rest from o, frame axes")
 PHI = modal("phi", 3, "displacement of the point per mode")
 THETA = modal("theta", 3, "rotation vector of the section per mode")
-SHORTENING = tuple(
+DRAWN = tuple(
     pair(f"g_{a}", f"displacement of second order along {a}: -1/2 eta^T g eta") for a in "xyz"
+)
+TURNED = tuple(
+    pair(f"h_{a}", f"rotation vector of second order about {a}: -1/2 eta^T h eta") for a in "xyz"
 )
 JACOBIAN = modal("Phi", 6, "rates of point and rotation vector per modal speed")
 
@@ -38,30 +41,42 @@ TURN = Quantity(vector("Psi", 3), "rad", "rotation vector of the section, frame 
 RATE = Quantity(vector("xd", 3), "m/s", "rate of x")
 TURN_RATE = Quantity(vector("Psid", 3), "rad/s", "rate of Psi")
 BIAS = Quantity(vector("xdd", 3), "m/s2", "second rate of x at etadd = 0")
+TURN_BIAS = Quantity(vector("Psidd", 3), "rad/s2", "second rate of Psi at etadd = 0")
 
 
 def section() -> Derivation:
     """Place and rotation vector of a section, their rates, and how they follow the modes."""
-    rows = [PHI.symbol[a, :] - eta.T * g.symbol for a, g in enumerate(SHORTENING)]
-    half = sp.Rational(1, 2)
-    linear = JACOBIAN.symbol[:3, :]
-    moved = half * (PHI.symbol * eta) + half * (linear * eta)
-    bent = stack(*(-(etad.T * g.symbol) * etad for g in SHORTENING))
+    at_rest = [field.symbol[a, :] for field in (PHI, THETA) for a in range(3)]
+    second = [g.symbol for g in (*DRAWN, *TURNED)]
+    rows = [row - eta.T * g for row, g in zip(at_rest, second, strict=True)]
+    bent = [-(etad.T * g) * etad for g in second]
+    along, about = JACOBIAN.symbol[:3, :], JACOBIAN.symbol[3:, :]
     return Derivation(
         "modal",
         "section of a flexible body",
-        (POINT, PHI, THETA, *SHORTENING, ETA, ETAD),
-        (JACOBIAN, PLACE, TURN, RATE, TURN_RATE, BIAS),
+        (POINT, PHI, THETA, *DRAWN, *TURNED, ETA, ETAD),
+        (JACOBIAN, PLACE, TURN, RATE, TURN_RATE, BIAS, TURN_BIAS),
         (
-            Equation("rates per mode", JACOBIAN.symbol, stack(*rows, THETA.symbol)),
-            Equation("x = r + phi eta - eta^T g eta / 2", PLACE.symbol, POINT.symbol + moved),
-            Equation("Psi", TURN.symbol, THETA.symbol * eta),
-            Equation("xd", RATE.symbol, linear * etad),
-            Equation("Psid", TURN_RATE.symbol, THETA.symbol * etad),
-            Equation("xdd", BIAS.symbol, bent),
+            Equation("rates per mode", JACOBIAN.symbol, stack(*rows)),
+            Equation(
+                "x = r + phi eta - eta^T g eta / 2",
+                PLACE.symbol,
+                POINT.symbol + _integrated(PHI.symbol, along),
+            ),
+            Equation("Psi", TURN.symbol, _integrated(THETA.symbol, about)),
+            Equation("xd", RATE.symbol, along * etad),
+            Equation("Psid", TURN_RATE.symbol, about * etad),
+            Equation("xdd", BIAS.symbol, stack(*bent[:3])),
+            Equation("Psidd", TURN_BIAS.symbol, stack(*bent[3:])),
         ),
         sources=SOURCES,
     )
+
+
+def _integrated(at_rest: sp.Basic, now: sp.Basic) -> sp.Basic:
+    """phi eta - 1/2 eta^T g eta from the rates phi at rest and phi - eta^T g now."""
+    half = sp.Rational(1, 2)
+    return half * (at_rest * eta) + half * (now * eta)
 
 
 def series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
@@ -102,13 +117,14 @@ def _tangent(sign: int) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix(sp.eye(3) - sign * b * turn + c * (turn * turn))
 
 
-def _tangent_rate(sign: int) -> sp.ImmutableDenseMatrix:
-    """(d/dt T(sign Psi)) Psid."""
+def _spin_rate(sign: int) -> sp.ImmutableDenseMatrix:
+    """d/dt (T(sign Psi) Psid) at etadd = 0."""
     c, bd, cd = (COEFFICIENTS[k, 0] for k in (2, 3, 4))
     turn, rate = tilde(part(TURN.symbol, 0)), tilde(part(TURN_RATE.symbol, 0))
     crossed = turn * part(TURN_RATE.symbol, 0)
+    followed = _tangent(sign) * part(TURN_BIAS.symbol, 0)
     return sp.ImmutableDenseMatrix(
-        -sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed)
+        followed - sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed)
     )
 
 
@@ -128,7 +144,7 @@ def _motion(title: str, definitions: tuple[Equation, ...]) -> Derivation:
     return Derivation(
         "modal",
         title,
-        (END, PLACE, TURN, RATE, TURN_RATE, BIAS),
+        (END, PLACE, TURN, RATE, TURN_RATE, BIAS, TURN_BIAS),
         _OUTPUTS,
         (*_coefficients(), *definitions),
         sources=SOURCES,
@@ -161,7 +177,7 @@ def outward() -> Derivation:
             Equation(
                 "bias",
                 _OUTPUTS[5].symbol,
-                stack(rotation.T * BIAS.symbol, end.T * _tangent_rate(1)),
+                stack(rotation.T * BIAS.symbol, end.T * _spin_rate(1)),
             ),
         ),
     )
@@ -194,7 +210,7 @@ def inward() -> Derivation:
             Equation("place", _OUTPUTS[1].symbol, -rotation * PLACE.symbol),
             *_rates(subspace),
             Equation("spin of the section", spin, -part(_OUTPUTS[4].symbol, 0)),
-            Equation("its rate", rate, _tangent_rate(-1)),
+            Equation("its rate", rate, _spin_rate(-1)),
             Equation("bias", _OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
         ),
     )

@@ -1,8 +1,8 @@
 """Arrays of a flexible body that its kernels share; n is the number of modes, known at run time.
 
 The displacement of a material point r0 is u = phi eta - 1/2 eta^T g eta (g: second order, such as
-the shortening of a bent axis).  All inertia integrals are moments of the fields [1, r0, phi, g]
-under the mass density rho:
+the shortening of a bent axis, or what twist makes of its deflection).  All inertia integrals are
+moments of the fields [1, r0, phi, g] under the mass density rho:
 
     m, c0 = int r0, R2_ab = int r0_a r0_b            C_a = int phi_a,     E_ab = int r0_a phi_b
     F_ab = int phi_a phi_b^T,  M = sum_a F_aa        G_a = int g_a,       X_ab = int r0_a g_b

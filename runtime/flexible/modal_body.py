@@ -5,7 +5,7 @@ A point that lies at r0 in the undeformed body is displaced by
     u = phi(r0) eta - 1/2 eta^T g(r0) eta
 
 in the axes of the floating frame F, where phi holds one vector field per mode and g is the
-displacement of second order that bending brings with it (the axis keeps its length).  All
+displacement of second order that bending and twist bring with them.  All
 integrals are over the mass of the undeformed body.  SI units; eta of bending and axial shapes in
 metres, of twist shapes in radians.
 """
@@ -29,20 +29,20 @@ Array: TypeAlias = NDArray[np.float64]
 class ModalPort:
     """One end of a flexible body, or any other section of it, seen from the floating frame.
 
-    The section's pose is R = exp(tilde(theta eta)) rotation, d = position + phi eta
-    - 1/2 eta^T shortening eta.
+    The section's pose is R = exp(Psi~) rotation with Psi = theta eta - 1/2 eta^T h eta and
+    d = position + phi eta - 1/2 eta^T g eta, where `second_order` holds g and then h.
     """
 
     position: Array  #: (3,) the point at rest, frame axes, m
     rotation: Array  #: (3, 3) axes of the end at rest -> frame axes
     phi: Array  #: (3, n) displacement of the point per mode
     theta: Array  #: (3, n) rotation vector of the section per mode
-    shortening: Array  #: (3, n, n) symmetric in the last two; zeros where linear
+    second_order: Array  #: (6, n, n) symmetric in the last two; zeros where linear
 
     @property
     def moves(self) -> bool:
         """False where the section never leaves its pose in the floating frame."""
-        return bool(np.any(self.phi) or np.any(self.theta) or np.any(self.shortening))
+        return bool(np.any(self.phi) or np.any(self.theta) or np.any(self.second_order))
 
 
 @dataclass(frozen=True)

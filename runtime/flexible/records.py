@@ -71,7 +71,7 @@ def _moved(body: M, r: Array, o: Array) -> M:
         C=r.T @ body.C,
         E=np.einsum("ia,jb,ijk->abk", r, r, e),
         F=np.einsum("ia,jb,ijkl->abkl", r, r, body.F),
-        G=np.einsum("ia,ikl->akl", r, body.G),
+        G=_turned(r, body.G),
         X=np.einsum("ia,jb,ijkl->abkl", r, r, x),
     )
 
@@ -81,8 +81,13 @@ def section_in(port: ModalPort, rotation: Array, origin: Array) -> ModalPort:
     r = rotation
     return ModalPort(
         r.T @ (port.position - origin), r.T @ port.rotation, r.T @ port.phi, r.T @ port.theta,
-        np.einsum("ia,ikl->akl", r, port.shortening),
+        np.concatenate([_turned(r, port.second_order[:3]), _turned(r, port.second_order[3:])]),
     )  # fmt: skip
+
+
+def _turned(rotation: Array, vectors: Array) -> Array:
+    """Components (3, n, n) in other axes."""
+    return np.asarray(np.einsum("ia,ikl->akl", rotation, vectors))
 
 
 def massless(body: ModalBody) -> ModalBody:
@@ -122,7 +127,8 @@ class ModalRecords:
         record.point, record.phi = self._reals(port.position), self._reals(port.phi)
         record.theta, record.end = self._reals(port.theta), self._reals(port.rotation)
         for a in range(3):
-            record.shortening[a] = self._reals(port.shortening[a])
+            record.drawn[a] = self._reals(port.second_order[a])
+            record.turned[a] = self._reals(port.second_order[3 + a])
         record.place = self._room(self.lib.mstmm_section_numbers(modal.n))
         return record
 

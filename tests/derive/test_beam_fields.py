@@ -1,5 +1,4 @@
-"""The beam's integrands against integrals over a real section, and its second-order displacement
-against the length of the bent axis."""
+"""The beam's integrands against integrals over a real section."""
 
 from __future__ import annotations
 
@@ -85,28 +84,6 @@ def test_rigid_integrands_are_those_of_a_rectangular_section() -> None:
     upper = [over_rectangle(r0 * r0.T, DENSITY)[i, j] for i in range(3) for j in range(i, 3)]
     assert [float(v) for v in found["second"]] == pytest.approx([float(e) for e in upper])
     assert float(found["mass"][0]) == pytest.approx(float(DENSITY * WIDTH * HEIGHT))
-
-
-def test_the_bent_axis_keeps_its_length_to_second_order() -> None:
-    """|d(x + u)/dx| of the displaced axis, expanded by its size."""
-    size, kv, kw, lv, lw = sp.symbols("size kv kw lv lw", real=True)
-    slopes = {"slope_k": [kv, kw], "slope_l": [lv, lw]}
-    numbers = random.Random(3)
-    values = {s: sp.Rational(numbers.randint(-99, 99), 64) for s in (kv, kw, lv, lw)}
-    given = {name: [values[s] for s in row] for name, row in slopes.items()}
-    pairs = (("k", "k"), ("k", "l"), ("l", "k"), ("l", "l"))
-    g = {
-        pair: outputs("shortening", {"slope_k": given[f"slope_{pair[0]}"],
-                                     "slope_l": given[f"slope_{pair[1]}"]})["g"][0]
-        for pair in pairs
-    }  # fmt: skip
-    eta = {"k": sp.Rational(2, 3), "l": -sp.Rational(5, 4)}
-    second = -sum(sp.Float(str(g[p]), 50) * eta[p[0]] * eta[p[1]] for p in pairs) / 2
-    v = sum(values[s] * eta[k] for s, k in ((kv, "k"), (lv, "l")))
-    w = sum(values[s] * eta[k] for s, k in ((kw, "k"), (lw, "l")))
-    length = sp.sqrt((1 + size**2 * second) ** 2 + size**2 * (v**2 + w**2))
-    grown = sp.series(length, size, 0, 3).removeO().coeff(size, 2)
-    assert abs(float(grown)) < 1e-14
 
 
 def test_a_section_turns_with_the_slopes_of_the_axis() -> None:

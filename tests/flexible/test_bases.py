@@ -134,7 +134,7 @@ def test_a_beam_held_inside_has_shapes_on_either_side() -> None:
     expected = np.array([1.8751041, 4.6940911]) ** 4
     assert np.diag(body.K) == pytest.approx([*expected / 0.4**3, *expected / 0.6**3], rel=1e-6)
     # Bending draws both ends towards the clamp.
-    assert root.shortening[0, 0, 0] < 0 < tip.shortening[0, 2, 2]
+    assert root.second_order[0, 0, 0] < 0 < tip.second_order[0, 2, 2]
 
 
 def test_many_shapes_stay_orthonormal_and_stiff() -> None:
@@ -180,7 +180,7 @@ def test_given_shapes_may_be_in_pieces(text: str) -> None:
     body = body_of(HELD, modes="auto", shapes={"y": [text]}, length=1.5)
     assert body.K[0, 0] == pytest.approx(4.0, rel=1e-9)  # v'' = 2 on one metre
     assert body.Mff[0, 0] == pytest.approx(1 / 5, rel=1e-9)
-    assert body.ports["tip"].shortening[0, 0, 0] == pytest.approx(4 / 3, rel=1e-9)
+    assert body.ports["tip"].second_order[0, 0, 0] == pytest.approx(4 / 3, rel=1e-9)
 
 
 def test_a_shape_that_is_a_sum_of_others_is_left_out() -> None:
@@ -247,7 +247,7 @@ def test_a_load_per_length_acts_on_the_mean_section() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(30)
     values = shapes.at(0.55 + 0.35 * nodes)
     for found, exact in (
-        (port.phi, values.phi), (port.theta, values.theta), (port.shortening[0], values.shortening)
+        (port.phi, values.phi), (port.theta, values.theta), (port.second_order, values.second_order)
     ):  # fmt: skip
         assert found == pytest.approx(np.einsum("m,m...->...", weights / 2, exact), abs=1e-12)
     assert port.position == pytest.approx([0.55, 0, 0])

@@ -30,8 +30,8 @@ def test_unit_loads_of_the_clamped_bar() -> None:
     line = bar.MASS / bar.LENGTH
     assert found.G[0, 0, 0] / line == pytest.approx(1.5709, rel=1e-4)
     assert found.X[0, 0, 0, 0] / line == pytest.approx(1.1933, rel=1e-4)
-    assert found.ports["tip"].shortening[0, 0, 0] == pytest.approx(4.6478, rel=1e-4)
-    assert not found.ports["root"].shortening.any()
+    assert found.ports["tip"].second_order[0, 0, 0] == pytest.approx(4.6478, rel=1e-4)
+    assert not found.ports["root"].second_order.any()
 
 
 def test_shortening_follows_from_the_slope() -> None:
@@ -43,7 +43,7 @@ def test_shortening_follows_from_the_slope() -> None:
     deflection = found.sections.model.components(found.shapes)[2, axis, 0]
     slope = np.gradient(deflection, nodes[axis, 0], edge_order=2)
     shorter = np.trapezoid(slope**2, nodes[axis, 0])
-    assert straight(modes=4).ports["tip"].shortening[0, 0, 0] == pytest.approx(shorter, rel=3e-3)
+    assert straight(modes=4).ports["tip"].second_order[0, 0, 0] == pytest.approx(shorter, rel=3e-3)
 
 
 @pytest.mark.parametrize(("direction", "stiffness"), [(2, bar.EI_Z), (1, bar.EI_Y)])
@@ -51,7 +51,7 @@ def test_column_buckles_at_eulers_load(direction: int, stiffness: float) -> None
     """Clamped-free, dead tip load: pi^2 / 4 EI / L^2, in either plane."""
     found = straight()
     plane = bending(found, direction)
-    shortening = found.ports["tip"].shortening[0][np.ix_(plane, plane)]
+    shortening = found.ports["tip"].second_order[0][np.ix_(plane, plane)]
     loads = linalg.eigvalsh(found.K[np.ix_(plane, plane)], shortening)
     assert loads[0] == pytest.approx(np.pi**2 / 4 * stiffness, rel=2e-3)
 
@@ -88,7 +88,7 @@ def test_free_bar_under_end_thrust() -> None:
     turned = np.cross(tip.theta.T, [1.0, 0, 0]).T
     follower = (tip.phi.T @ turned)[np.ix_(plane, plane)]
     K, M = found.K[np.ix_(plane, plane)], found.Mff[np.ix_(plane, plane)]
-    shortening = tip.shortening[0][np.ix_(plane, plane)]
+    shortening = tip.second_order[0][np.ix_(plane, plane)]
 
     def flutters(thrust: float) -> float:
         load = thrust * bar.EI_Z / bar.LENGTH**2
@@ -103,4 +103,4 @@ def test_off() -> None:
     found = bar.body(bar.table(stiffening=False))
     assert not found.G.any()
     assert not found.X.any()
-    assert not found.ports["tip"].shortening.any()
+    assert not found.ports["tip"].second_order.any()

@@ -52,7 +52,7 @@ def draw(form: lagrange.FreeBeam, rng: np.random.Generator) -> tuple[Array, Arra
     """q, u of the scene at a random state, and udot by Lagrange's equations."""
     k = 3 if form.planar else 6
     q, qd = rng.uniform(-1, 1, k + form.n), rng.uniform(-1, 1, k + form.n)
-    q[k:] *= 0.02  # beyond, a mass matrix cut after the second order need not be definite
+    q[k:] *= 0.004  # beyond, a mass matrix cut after the second order need not be definite
     qdd = form.accelerations(q, qd)
     A, w, alpha = form.angular(q, qd, qdd)
     place, velocity, acceleration = (np.zeros(3) for _ in range(3))

@@ -92,20 +92,19 @@ def test_shortening_is_the_arc_length_of_the_bent_axis() -> None:
     slope = np.gradient(phi[:, 1:], x, axis=0, edge_order=2)
     arc = np.concatenate([[0.0], np.cumsum((slope[1:] ** 2 + slope[:-1] ** 2).sum(1) / 2)])
     arc *= x[1] - x[0]
-    tip = body.ports["tip"].shortening[0]
+    tip = body.ports["tip"].second_order[0]
     assert eta @ tip @ eta == pytest.approx(arc[-1], rel=1e-4)
     mass = shapes.sections(x).mass_per_length
     mass[600] = 1.35  # half a step on either side of the change of section
     assert eta @ body.G[0] @ eta == pytest.approx(np.trapezoid(mass * arc, x), rel=1e-4)
     lever = np.trapezoid(mass * x * arc, x)
     assert eta @ body.X[0, 0] @ eta == pytest.approx(lever, rel=1e-4)
-    assert not body.G[1:].any() and not body.X[1:].any() and not body.X[0, 1:].any()
 
 
 def test_published_integrals_of_the_clamped_beam() -> None:
     body = body_of(HELD)
     assert body.G[0, 0, 0] == pytest.approx(1.5709, abs=5e-5)
-    assert body.ports["tip"].shortening[0, 0, 0] == pytest.approx(4.6478, abs=5e-5)
+    assert body.ports["tip"].second_order[0, 0, 0] == pytest.approx(4.6478, abs=5e-5)
     rows = np.array([[1.1933, -0.6859, -0.7924], [-0.6859, 6.4782, 0.1694],
                      [-0.7924, 0.1694, 17.8595]])  # fmt: skip
     assert body.X[0, 0] == pytest.approx(rows, abs=6e-5)
@@ -116,7 +115,7 @@ def test_what_vanishes_by_symmetry_is_exactly_zero() -> None:
     assert not body.C[2, :4].any() and not body.C[1, 4:].any() and not body.C[0].any()
     assert np.array_equal(body.K, np.diag(np.diag(body.K)))
     assert np.count_nonzero(body.F) == 7 + 6  # y and z shapes of equal form
-    assert not body.G.any() and not body.X.any() and not body.ports["tip"].shortening.any()
+    assert not body.G.any() and not body.X.any() and not body.ports["tip"].second_order.any()
     assert not body.ports["root"].moves
     assert body.ports["tip"].moves
     mean = body_of(FREE, modes={"y": 4})
@@ -158,7 +157,7 @@ def test_a_column_buckles_under_its_own_weight(n: int, load: float) -> None:
 def test_becks_column_flutters(n: int, load: float) -> None:
     body = body_of(HELD, modes={"y": n})
     tip = body.ports["tip"]
-    follower = np.outer(tip.phi[1], tip.theta[2]) - tip.shortening[0]
+    follower = np.outer(tip.phi[1], tip.theta[2]) - tip.second_order[0]
     found = lowest_load(lambda p: (body.K + p * follower, body.Mff), 10.0, 30.0)
     assert found == pytest.approx(load, abs=6e-5)
 
@@ -173,7 +172,7 @@ def test_a_free_beam_under_thrust_flutters_alike_in_every_frame(frame: str) -> N
     def matrices(thrust: float) -> tuple[Array, Array]:
         k = np.zeros_like(mass)
         along = thrust / body.mass
-        k[2:, 2:] = body.K - along * body.G[0] + thrust * port.shortening[0]
+        k[2:, 2:] = body.K - along * body.G[0] + thrust * port.second_order[0]
         k[1, 2:] = -along * body.C[1] + thrust * port.phi[1]
         k[:, 2:] -= thrust * np.outer(ends, port.theta[2])
         carry = mass[2:, :2] @ np.linalg.inv(mass[:2, :2])

@@ -48,7 +48,7 @@ def test_gamma_of_spin_acceleration_and_end_load(stiffening: bool) -> None:
     pushed = gamma(moving(body, acceleration=[5.0, 0.0, 0.0]))
     assert pushed == pytest.approx((-5.0 * G0 / LENGTH / square, 0.0), rel=1e-4)
     assert gamma(moving(body), gravity=np.array([-5.0, 0.0, 0.0])) == pytest.approx(pushed)
-    pulled = gamma(moving(body), {"tip": np.array([[6.0, 0.0, 0.0]])})
+    pulled = gamma(moving(body), {"tip": (np.array([[6.0, 0.0, 0.0]]), np.zeros((1, 3)))})
     assert pulled == pytest.approx((0.0, 6.0 * GL / LENGTH**2 / (MASS * square)), rel=1e-4)
 
 

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from mstmm.runtime.flexible.beam.beam_shapes import gauss_between
+from mstmm.runtime.flexible.beam.gauss import gauss_between
 from mstmm.runtime.flexible.beam.shapes import Eigenfunction, Piecewise, Shape, Sine, root
 
 BENDING = ("clamped-free", "free-free", "clamped-clamped")

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..modal_body import Array, ModalPort
 from . import kernels as beam_kernels
 from .data import BeamData, BeamSections
+from .gauss import gauss_between
+from .second_order import SecondOrder
 from .shapes import Shape
+
+if TYPE_CHECKING:
+    from .frames import Frame
 
 #: Directions in the order of the modal coordinates.
 DIRECTIONS = ("y", "z", "twist", "axial")
@@ -41,37 +45,14 @@ class ShapeValues:
     theta: Array  #: (m, 3, n) rotation vector of the section
     curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -w'', v''
     stretch: Array  #: (m, n) s'
-    shortening: Array  #: (m, n, n) along x: u = phi eta - 1/2 eta^T shortening eta
-
-
-@lru_cache(maxsize=64)
-def gauss(points: int) -> tuple[Array, Array]:
-    """Nodes and weights of the Gauss rule on 0 to 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return (nodes + 1.0) / 2.0, weights / 2.0
-
-
-def gauss_between(places: Iterable[float], density: float) -> tuple[Array, Array]:
-    """Gauss points and weights (m) between neighbouring places, for products of two shapes with
-    `density` half-waves per metre; long pieces are cut, for rules of high order lose digits."""
-    xs, ws = [], []
-    for a, b in pairwise(places):
-        cuts = max(1, int(np.ceil((b - a) * density / _WAVES)))
-        h = (b - a) / cuts
-        nodes, weights = gauss(8 + int(np.ceil(3.0 * h * density)))
-        xs.append((a + h * (np.arange(cuts)[:, None] + nodes)).ravel())
-        ws.append(np.tile(h * weights, cuts))
-    return np.concatenate(xs), np.concatenate(ws)
-
-
-#: Half-waves that one Gauss rule covers at most.
-_WAVES = 8.0
+    #: (m, 6, n, n) g of -1/2 eta^T g eta: displacement of the axis, rotation vector of the section
+    second_order: Array
 
 
 class BeamShapes:
     """All shapes of a beam in the floating frame.
 
-    `origin` is the section whose shortening is zero, None where the mean over the mass is.
+    `frames` says for each direction that has shapes where the floating frame is.
     """
 
     def __init__(
@@ -79,7 +60,7 @@ class BeamShapes:
         data: BeamData,
         modes: tuple[Mode, ...],
         stiffening: bool,
-        origin: float | None = 0.0,
+        frames: Mapping[str, Frame],
     ) -> None:
         self.data, self.modes, self.stiffening = data, modes, stiffening
         inner = {x for mode in modes for x in mode.shape.breaks if 0 < x < data.length}
@@ -90,13 +71,7 @@ class BeamShapes:
             b for a, b in zip((-1.0, *places), places, strict=False) if b - a > smallest
         )  #: every place between which all shapes and sections are smooth
         self.density = max((mode.shape.density for mode in modes), default=0.0)
-        self._offset = np.zeros((self.n, self.n))
-        if origin is None:
-            x, w = self.rule()
-            mass = w * data.sections(x).mass_per_length
-            self._offset = np.einsum("m,mkl->kl", mass, self._shortening(x)) / mass.sum()
-        elif origin != 0.0:
-            self._offset = self._shortening(np.array([origin]))[0]
+        self.second_order = SecondOrder(self, frames)
 
     @property
     def n(self) -> int:
@@ -158,36 +133,8 @@ class BeamShapes:
             np.moveaxis(here["theta"], 2, 0),
             np.moveaxis(change["theta"], 2, 0),
             slopes[0].T.copy(),
-            self._shortening(x) - self._offset,
+            self.second_order.at(x),
         )
-
-    def _shortening(self, x: Array) -> Array:
-        """int_0^x of the kernel's shortening rate, (m, n, n)."""
-        order = np.argsort(x, kind="stable")
-        ends = np.union1d(np.clip(x, 0.0, self.length), self.pieces)
-        total, table = np.zeros((self.n, self.n)), {float(ends[0]): np.zeros((self.n, self.n))}
-        slopes = self._slopes_between(ends)
-        for b, (places, weights) in zip(ends[1:], slopes, strict=True):
-            total = total + np.einsum("m,mkl->kl", weights, places)
-            table[float(b)] = total
-        result = np.zeros((len(x), self.n, self.n))
-        for i in order:
-            result[i] = table[float(np.clip(x[i], 0.0, self.length))]
-        return result
-
-    def _slopes_between(self, ends: Array) -> list[tuple[Array, Array]]:
-        """(rate (m, n, n), weights) of each interval between neighbouring ends."""
-        rules = [gauss_between(pair, self.density) for pair in pairwise(ends)]
-        rates = self.shortening_rate(np.concatenate([places for places, _ in rules]))
-        cuts = np.cumsum([len(places) for places, _ in rules])[:-1]
-        pieces = np.split(rates, cuts)
-        return [(rate, weights) for rate, (_, weights) in zip(pieces, rules, strict=True)]
-
-    def shortening_rate(self, x: Array) -> Array:
-        """d shortening / dx by the kernel, (m, n, n)."""
-        slopes = self.rows(x, 1)[1:3]
-        inputs = {"slope_k": slopes[:, :, None, :], "slope_l": slopes[:, None, :, :]}
-        return np.moveaxis(beam_kernels.evaluate("shortening", inputs)["g"][0], 2, 0)
 
     # --- ports -----------------------------------------------------------------------------------
 
@@ -195,7 +142,7 @@ class BeamShapes:
         """The section at x as a port; exact zeros where the frame's conditions hold it."""
         values = self.at(np.array([x]))
         turn = np.eye(3) if rotation is None else rotation
-        return self.port(x, turn, values.phi[0], values.theta[0], values.shortening[0])
+        return self.port(x, turn, values.phi[0], values.theta[0], values.second_order[0])
 
     def mean_section(self, start: float, end: float) -> ModalPort:
         """The mean of all sections between `start` and `end` (m): where a force that is the same
@@ -204,32 +151,39 @@ class BeamShapes:
         x, w = gauss_between((start, *inner, end), self.density)
         w = w / (end - start)
         values = self.at(x)
-        phi, theta, shortening = (
-            np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, values.shortening)
+        phi, theta, second = (
+            np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, values.second_order)
         )
-        return self.port((start + end) / 2, np.eye(3), phi, theta, shortening)
+        return self.port((start + end) / 2, np.eye(3), phi, theta, second)
 
-    def port(self, x: float, turn: Array, phi: Array, theta: Array, along: Array) -> ModalPort:
+    def port(self, x: float, turn: Array, phi: Array, theta: Array, second: Array) -> ModalPort:
         """A port from its values, rounding noise set to zero."""
-        size, slope, short = self._scales()
-        shortening = np.zeros((3, self.n, self.n))
-        if self.stiffening:
-            shortening[0] = without_noise((along + along.T) / 2, short)
+        size, slope, _ = self._scales()
         return ModalPort(
             np.array([x, 0.0, 0.0]), turn, without_noise(phi, size), without_noise(theta, slope),
-            shortening,
+            self._cleaned(second) if self.stiffening else np.zeros_like(second),
         )  # fmt: skip
 
+    def _cleaned(self, second: Array) -> Array:
+        largest = np.repeat([self.length, 1.0], 3)[:, None, None] * self.second_scale
+        return without_noise((second + np.swapaxes(second, 1, 2)) / 2, largest)
+
+    @property
+    def second_scale(self) -> Array:
+        """(n, n) size of the rotation of second order per pair of modes, by which rounding noise is
+        told."""
+        return self._scales()[2]
+
     def _scales(self) -> tuple[Array, Array, Array]:
-        """Largest displacement, rotation per mode and shortening per pair of modes."""
+        """Largest displacement and rotation per mode, and the latter's products."""
         if not hasattr(self, "_largest"):
             x = np.unique(np.concatenate([self.rule()[0], np.asarray(self.pieces)]))
             values, slopes = self.rows(x, 0), self.rows(x, 1)
             size = np.abs(values[:3]).max(axis=(0, 2), initial=0.0)
             slope = np.maximum(np.abs(slopes[1:3]).max(axis=(0, 2), initial=0.0),
                                np.abs(values[3]).max(axis=1, initial=0.0))  # fmt: skip
-            stretch = np.abs(slopes[1:3]).max(axis=(0, 2), initial=0.0)
-            self._largest = (size, slope, self.length * np.outer(stretch, stretch))
+            steep = np.maximum(slope, np.abs(slopes[0]).max(axis=1, initial=0.0))
+            self._largest = (size, slope, np.outer(steep, steep))
         return self._largest
 
 

@@ -81,7 +81,9 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
         modes += made
         notes += [_described(choice, len(made)), *said]
     frames = [c.frame for c in chosen]
-    shapes_all = BeamShapes(data, tuple(modes), beam.stiffening, frames[0].origin)
+    shapes_all = BeamShapes(
+        data, tuple(modes), beam.stiffening, {c.direction: c.frame for c in chosen}
+    )
     points: tuple[MassPoint, ...] = ()
     if wants_quadrature(beam, held, chosen):
         points = mass_points(shapes_all)

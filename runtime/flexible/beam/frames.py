@@ -5,9 +5,8 @@ axial displacement and no twist at the root; mean: int rho u = 0 and int rho r0 
 undeformed mass.  All three span the same motions together with the rigid ones, so that the choice
 changes neither linear results nor, but for terms beyond second order, any others.
 
-The second-order displacement along x is measured from the section of the tangent frame, from the
-root for the chord, from its mean over the mass for the mean frame: the conditions above, to second
-order.  A different origin is a motion of the frame along x that its own coordinates take up.
+The same conditions hold for what bending and twist displace and turn to second order
+(`second_order`).
 """
 
 from __future__ import annotations
@@ -19,8 +18,9 @@ import numpy as np
 from mstmm.errors import SceneError
 
 from ..modal_body import Array
-from .beam_shapes import Mode, gauss_between
+from .beam_shapes import Mode
 from .data import BeamData
+from .gauss import gauss_between
 from .shapes import Moved, Shape
 
 #: What is left of a shape without its rigid part, or without the shapes before it, as a share of
@@ -39,7 +39,7 @@ class Frame:
 
     @property
     def origin(self) -> float | None:
-        """Section whose shortening is zero, None for the mean."""
+        """Section that does not move along the beam or about it, None for the mean."""
         return {"tangent": self.x, "chord": 0.0, "mean": None}[self.kind]
 
 

@@ -8,6 +8,9 @@ from ..modal_body import Array, Moments
 from . import kernels as beam_kernels
 from .beam_shapes import BeamShapes, without_noise
 
+#: Numbers of one batch of pairs of shapes at points, about 8 MB an array.
+_BATCH = 2**20
+
 
 def mass_moments(shapes: BeamShapes) -> Moments:
     """Moments of the mass, with what bending and twist turn of the sections' inertia."""
@@ -64,7 +67,7 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     f = found["F"] @ w
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
-    g, moment = _second_order(shapes, rigid["mass"][0] * w, rigid["first"][0] * w, x)
+    g, moment = second_moments(shapes, density, x, w) if shapes.stiffening else _none(shapes.n)
     return Moments(
         mass=mass,
         first=first,
@@ -77,18 +80,46 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     )
 
 
-def _second_order(shapes: BeamShapes, mass: Array, first: Array, x: Array) -> tuple[Array, Array]:
-    """G and X: the shortening is along x, and so is the lever of every axis point."""
-    n = shapes.n
-    g, moment = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
-    if shapes.stiffening and n:
-        along = shapes.at(x).shortening
-        largest = np.abs(along).max(axis=0)
-        size = np.sqrt(np.outer(np.diag(largest), np.diag(largest)))
-        total, lever = np.einsum("m,mkl->kl", mass, along), np.einsum("m,mkl->kl", first, along)
-        g[0] = without_noise((total + total.T) / 2, mass.sum() * size)
-        moment[0, 0] = without_noise((lever + lever.T) / 2, np.abs(first).sum() * size)
-    return g, moment
+def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tuple[Array, Array]:
+    """G (3, n, n) and X (3, 3, n, n) of the second-order field under a density (3, m) at the points
+    and weights of a quadrature."""
+    g, lever = _none(shapes.n)
+    largest = max(1, _BATCH // max(1, 9 * shapes.n**2))
+    for first in range(0, len(x) if shapes.n else 0, largest):
+        some = slice(first, first + largest)
+        found = beam_kernels.evaluate(
+            "second_moments", _second_inputs(shapes, density[:, some], x[some])
+        )
+        g += found["G"] @ w[some]
+        lever += found["X"] @ w[some]
+    turned, length = shapes.second_scale, shapes.length
+    arms = np.array([density[0] @ w * length**2, density[1] @ w, density[2] @ w])
+    return (
+        without_noise(_halved(g), density[0] @ w * length * turned),
+        without_noise(_halved(lever), arms[:, None, None, None] * turned),
+    )
+
+
+def _second_inputs(shapes: BeamShapes, density: Array, x: Array) -> dict[str, Array]:
+    second = shapes.second_order.at(x)
+    turn = shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3])
+    return {
+        "x": x[None, None, None, :],
+        "inertia": density[:, None, None, :],
+        "turn_k": turn[:, :, None, :],
+        "turn_l": turn[:, None, :, :],
+        "g": np.moveaxis(second[:, :3], 0, 3),
+        "h_turn": np.moveaxis(shapes.second_order.carried(second), 0, 3),
+    }
+
+
+def _halved(pairs: Array) -> Array:
+    """Symmetric in the last two axes."""
+    return (pairs + np.swapaxes(pairs, -1, -2)) / 2
+
+
+def _none(n: int) -> tuple[Array, Array]:
+    return np.zeros((3, n, n)), np.zeros((3, 3, n, n))
 
 
 def _symmetric(upper: Array) -> Array:

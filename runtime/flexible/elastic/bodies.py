@@ -199,7 +199,7 @@ def elastic_body(
         C=_clean(found.C), E=_clean(found.E), F=_clean(found.F),
         G=_clean(stiff.G), X=_clean(stiff.X), K=K,
         D=_damping(name, model, damping, K, found.mass, reduction.frequencies),
-        ports={p.name: _port(reduction, p, stiff.shortening[p.name]) for p in ports},
+        ports={p.name: _port(reduction, p, stiff.ends[p.name]) for p in ports},
         eta=_start(model, start, "eta", len(K)), etad=_start(model, start, "etad", len(K)),
         frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), found.how),
         warnings=model.warnings,
@@ -210,7 +210,7 @@ def _stiffened(reduction: Reduction, ports: list[Port], stiffening: bool) -> Sec
     if stiffening:
         return second_order(reduction, ports)
     n = reduction.shapes.shape[1]
-    none = {port.name: np.zeros((3, n, n)) for port in ports}
+    none = {port.name: np.zeros((6, n, n)) for port in ports}
     return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)
 
 
@@ -228,13 +228,13 @@ def _notes(model: ElasticModel, reduction: Reduction, stiffening: bool) -> list[
     return notes
 
 
-def _port(reduction: Reduction, port_: Port, shortening: Array) -> ModalPort:
+def _port(reduction: Reduction, port_: Port, second: Array) -> ModalPort:
     motion = reduction.motion(port_)
     if reduction.frame == "tangent" and port_ is reduction.held:
         motion = np.zeros_like(motion)
     return ModalPort(
         position=port_.position, rotation=port_.rotation, phi=_clean(motion[:3]),
-        theta=_clean(motion[3:]), shortening=_clean(shortening),
+        theta=_clean(motion[3:]), second_order=_clean(second),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ load (tension stiffens), so that
 
     G_a     = int rho g_a       = the stiffness under the load rho e_a
     X_ab    = int rho r0_a g_b  = the stiffness under the load rho r0_a e_b
-    shortening_a of a port      = the stiffness under a unit force along a at the port
+    g_a at a port               = the stiffness under a unit force along a at the port
 
 and a unit acceleration of the frame along a, whose load is -rho e_a, adds -G_a.  In a tangent frame
 the held section carries the reaction.  In a mean frame every load is taken with the acceleration
@@ -31,18 +31,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """G (3, n, n) kg, X (3, 3, n, n) kg m, and the shortening (3, n, n) 1/m of every port."""
+    """G (3, n, n) kg, X (3, 3, n, n) kg m, and of every port (6, n, n) displacement of second order
+    in 1/m and rotation (zero: the stresses are those of unit forces)."""
 
     G: Array
     X: Array
-    shortening: Mapping[str, Array]
+    ends: Mapping[str, Array]
 
 
 def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
     """The second-order fields' moments; zeros where the model has no stresses."""
     model, n = reduction.sections.model, reduction.shapes.shape[1]
     if model.stress is None:
-        none = {port.name: np.zeros((3, n, n)) for port in ports}
+        none = {port.name: np.zeros((6, n, n)) for port in ports}
         return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)
     moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held]
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
@@ -53,11 +54,10 @@ def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
     families = (families + families.transpose(0, 2, 1)) / 2
     if reduction.frame == "mean":
         families[:3] = 0.0  # rounding: a free body under its own acceleration has no stress
-    ends = families[12:].reshape(-1, 3, n, n)
-    shortening = {port.name: ends[i] for i, port in enumerate(moving)}
-    if reduction.frame != "mean":
-        shortening[reduction.held.name] = np.zeros((3, n, n))
-    return SecondOrder(families[:3], families[3:12].reshape(3, 3, n, n), shortening)
+    ends = {port.name: np.zeros((6, n, n)) for port in ports}
+    for port, drawn in zip(moving, families[12:].reshape(-1, 3, n, n), strict=True):
+        ends[port.name][:3] = drawn
+    return SecondOrder(families[:3], families[3:12].reshape(3, 3, n, n), ends)
 
 
 def _body_loads(reduction: Reduction) -> Array:

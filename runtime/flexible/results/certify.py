@@ -127,8 +127,11 @@ def _gamma(
     second = e.second_order(motion.body)
     if second is None or not len(some):
         return None
-    forces = {port: load[some] for port, load in flexible.end_forces(name).items()}
-    from_loads = e.stiffness_from_loads(motion, flexible.gravity, forces, second)
+    loads = {
+        port: (force[some], moment[some])
+        for port, (force, moment) in flexible.end_loads(name).items()
+    }
+    from_loads = e.stiffness_from_loads(motion, flexible.gravity, loads, second)
     return e.load_ratios(motion.body.K, from_loads)
 
 
@@ -274,8 +277,8 @@ def _buckled(one: Flexibility) -> str:
     if one.gamma is None or one.gamma[0] >= BUCKLING:
         return ""
     return (
-        f'compression takes {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
-        "its buckling load"
+        f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
+        "its buckling load, by compression, or sideways by bending moments at work on its twist"
     )
 
 

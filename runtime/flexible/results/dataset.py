@@ -61,12 +61,12 @@ def variables(result: Result) -> dict[str, Variable]:
 
 
 def _shapes(name: str, body: ModalBody) -> dict[str, Variable]:
-    """deflection = phi eta - 1/2 (eta^T shortening eta) along x."""
+    """deflection = phi eta - 1/2 eta^T second_order eta."""
     shapes = body.shapes
     assert shapes is not None
     x = np.linspace(0.0, shapes.length, STATIONS)
     at, station, modes = shapes.at(x), f"{name}_x", f"{name}_mode"
-    short = at.shortening if shapes.stiffening else np.zeros_like(at.shortening)
+    drawn = at.second_order[:, :3] * float(shapes.stiffening)
     words = np.array(body.modes, dtype=object)
     return {
         station: ((station,), x, _about("m", f"place along {name}")),
@@ -79,9 +79,9 @@ def _shapes(name: str, body: ModalBody) -> dict[str, Variable]:
             (station, "axis", modes), at.theta,
             _about("1/m", f"rotation vector of the sections of {name} per mode, frame axes"),
         ),
-        f"{name}_shortening": (
-            (station, modes, f"{modes}_2"), short,
-            _about("1/m", f"displacement of second order of {name} along x: -1/2 eta^T g eta"),
+        f"{name}_second_order": (
+            (station, "axis", modes, f"{modes}_2"), drawn,
+            _about("1/m", f"displacement of second order of {name}, frame axes: -1/2 eta^T g eta"),
         ),
     }  # fmt: skip
 

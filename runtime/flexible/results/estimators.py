@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .observe import Motion, tilde, values_at
+from ..beam.moments import second_moments
+from .observe import Motion, tilde, turns, values_at
 from .observe_energy import modal_energy
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _all_turns(motion: Motion) -> list[Array]:
     body = motion.body
     if body.shapes is not None:
         places = np.linspace(0.0, body.shapes.length, SECTIONS)
-        return [np.einsum("mak,tk->tma", values_at(body.shapes, places).theta, motion.eta)]
+        return [turns(motion, places)]
     return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
 
 
@@ -58,7 +59,7 @@ def cross_spin(motion: Motion) -> float:
 @dataclass(frozen=True)
 class SecondOrder:
     """Moments of the second-order displacement: G (3, n, n) = int rho g_a, X (3, 3, n, n) =
-    int rho r0_a g_b, and its values (3, n, n) at the ends."""
+    int rho r0_a g_b; displacement and rotation of second order (6, n, n) at the ends."""
 
     G: Array
     X: Array
@@ -66,43 +67,41 @@ class SecondOrder:
 
 
 def second_order(body: ModalBody) -> SecondOrder | None:
-    """Of a beam the shortening of its bent axis, also where its kinematics leave it out; of another
+    """Of a beam what bending and twist bring, also where its kinematics leave it out; of another
     body what it has; None if it has nothing."""
-    if body.shapes is None:
-        ends = {name: port.shortening for name, port in body.ports.items()}
+    if body.shapes is None or body.shapes.stiffening:
+        ends = {name: port.second_order for name, port in body.ports.items()}
         known = np.any(body.G) or any(np.any(g) for g in ends.values())
-        return SecondOrder(body.G, body.X, ends) if known else None
-    n = len(body.modes)
-    G, X = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
+        return SecondOrder(body.G, body.X, ends) if known or body.shapes is not None else None
     x, weights = body.shapes.rule()
-    mass = weights * body.shapes.sections(x).mass_per_length
-    along = values_at(body.shapes, x).shortening
-    G[0] = np.einsum("m,mkl->kl", mass, along)
-    X[0, 0] = np.einsum("m,mkl->kl", mass * x, along)
-    ends = {}
-    for name, port in body.ports.items():
-        ends[name] = np.zeros((3, n, n))
-        ends[name][0] = values_at(body.shapes, port.position[:1]).shortening[0]
-    return SecondOrder(G, X, ends)
+    density = body.shapes.data.inertia[:, body.shapes.data.piece(x)]
+    places = np.array([port.position[0] for port in body.ports.values()])
+    at_ends = values_at(body.shapes, places).second_order
+    return SecondOrder(
+        *second_moments(body.shapes, density, x, weights),
+        dict(zip(body.ports, at_ends, strict=True)),
+    )
 
 
 def stiffness_from_loads(
-    motion: Motion, gravity: Array, ports: dict[str, Array], second: SecondOrder
+    motion: Motion, gravity: Array, ports: dict[str, tuple[Array, Array]], second: SecondOrder
 ) -> Array:
     """(n, modes, modes) K_g of the loads on the undeformed body.
 
-    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port), with the acceleration a = a_o + W r0 of
-    the rigid motion, W = wd~ + w~ w~, and g the second-order displacement: for a beam
-    (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L).  `ports` are forces (n, 3) in N on
-    the ends, inertial axes.
+    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port) + M_a h_a(port), with the acceleration
+    a = a_o + W r0 of the rigid motion, W = wd~ + w~ w~, and g, h the displacement and rotation of
+    second order: for a beam (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L), and the
+    work of loads across it on its twist.  `ports` are forces in N and moments in N*m (n, 3) on the
+    ends, inertial axes.
     """
     force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
     spin = tilde(motion.frame_spin)
     turning = tilde(motion.frame_spin_rate) + spin @ spin
     total = -np.einsum("ta,akl->tkl", force, second.G)
     total -= np.einsum("tab,bakl->tkl", turning, second.X)
-    for name, load in ports.items():
-        total += np.einsum("ta,akl->tkl", motion.inward(load), second.ends[name])
+    for name, loads in ports.items():
+        wrench = np.concatenate([motion.inward(load) for load in loads], axis=1)
+        total += np.einsum("ta,akl->tkl", wrench, second.ends[name])
     return total
 
 

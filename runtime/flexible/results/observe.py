@@ -1,8 +1,9 @@
 """What a flexible body did over a run: its floating frame, its modal coordinates, its sections.
 
 Arrays have the time first.  A section at x of a beam stands at r0 + phi eta - 1/2 eta^T g eta
-against the floating frame, turned by exp(Psi~), Psi = theta eta (the kernel `section`); s is the
-displacement along the beam, v and w across, Psi = (twist, -w', v').
+against the floating frame, turned by exp(Psi~), Psi = theta eta - 1/2 eta^T h eta (the kernel
+`section`); s is the displacement along the beam, v and w across, to first order
+Psi = (twist, -w', v').
 """
 
 from __future__ import annotations
@@ -139,22 +140,27 @@ def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
 
 
 def deflection(motion: Motion, places: Array) -> Array:
-    """(n, m, 3) elastic displacement in m of the axis at x, frame axes, shortening included."""
-    at = values_at(motion.shapes, places)
-    moved = np.einsum("mak,tk->tma", at.phi, motion.eta)
+    """(n, m, 3) elastic displacement in m of the axis at x, frame axes, second order included."""
+    return _to_second_order(motion, values_at(motion.shapes, places), "phi", slice(0, 3))
+
+
+def _to_second_order(motion: Motion, at: ShapeValues, field: str, rows: slice) -> Array:
+    """(n, m, 3) phi eta - 1/2 eta^T g eta; without g of a linear beam."""
+    found = np.einsum("mak,tk->tma", getattr(at, field), motion.eta)
     if motion.shapes.stiffening:
-        moved[:, :, 0] -= 0.5 * bilinear(at.shortening, motion.eta, motion.eta)
-    return moved
+        found -= 0.5 * bilinear(at.second_order[:, rows], motion.eta, motion.eta)
+    return found
 
 
 def bilinear(matrices: Array, a: Array, b: Array) -> Array:
-    """(n, m) numbers a^T G b of matrices (m, k, k) at a, b (n, k)."""
-    return np.einsum("tmk,tk->tm", np.einsum("mkl,tl->tmk", matrices, b), a)
+    """(n, m, 3) numbers a^T g b of matrices (m, 3, k, k) at a, b (n, k)."""
+    return np.einsum("tmik,tk->tmi", np.einsum("mikl,tl->tmik", matrices, b), a)
 
 
 def turns(motion: Motion, places: Array) -> Array:
-    """(n, m, 3) rotation vectors in rad of the sections against the frame: twist, -w', v'."""
-    return np.einsum("mak,tk->tma", values_at(motion.shapes, places).theta, motion.eta)
+    """(n, m, 3) rotation vectors in rad of the sections against the frame, second order included:
+    to first order twist, -w', v'."""
+    return _to_second_order(motion, values_at(motion.shapes, places), "theta", slice(3, 6))
 
 
 def slope(motion: Motion, places: Array) -> Array:

@@ -92,22 +92,22 @@ class FlexibleBodies:
         load = self.observed.columns("loads", (place,))
         return -load[:, :3], -load[:, 3:]
 
-    def end_forces(self, name: str) -> dict[str, Array]:
-        """Port -> force (n, 3) of the outside on it, inertial axes, of all but the held end."""
-        held, found = self.held_end(name), dict[str, Array]()
+    def end_loads(self, name: str) -> dict[str, tuple[Array, Array]]:
+        """Port -> force and moment (n, 3) of the outside on it, inertial axes, of all but the held
+        end."""
+        held, found = self.held_end(name), dict[str, tuple[Array, Array]]()
         for port in self.known[name].ports:
             load = None if port == held else self.at_end(name, port)
             if load is not None:
-                found[port] = load[0]
+                found[port] = load
         return found
 
     def point_loads(self, name: str) -> list[PointLoad]:
         """What acts at sections of a beam, but for the end that is held."""
         body, lines = self.known[name], {load.name for load in self._spread(name)}
         found = []
-        for port in self.end_forces(name):
-            load = None if port in lines else self.at_end(name, port)
-            if load is not None:
+        for port, load in self.end_loads(name).items():
+            if port not in lines:
                 found.append(PointLoad(float(body.ports[port].position[0]), *load))
         return found
 

@@ -164,9 +164,10 @@ def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, 
     moving = np.einsum("mak,tk->tma", at.phi, motion.etad)
     pushed = np.einsum("mak,tk->tma", at.phi, motion.etadd)
     if shapes.stiffening:
-        moving[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etad)
-        pushed[:, :, 0] -= bilinear(at.shortening, motion.eta, motion.etadd)
-        pushed[:, :, 0] -= bilinear(at.shortening, motion.etad, motion.etad)
+        drawn = at.second_order[:, :3]
+        moving -= bilinear(drawn, motion.eta, motion.etad)
+        pushed -= bilinear(drawn, motion.eta, motion.etadd)
+        pushed -= bilinear(drawn, motion.etad, motion.etad)
     w = motion.frame_spin[:, None]
     wd = motion.frame_spin_rate[:, None]
     turning = np.cross(w, place)
@@ -184,26 +185,41 @@ def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, 
 def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
 
-    A point s of a section lies at B s from the axis, B = 1 + theta~ with the part of Psi that turns
-    the sections' inertia (twist alone without rotary inertia), and is accelerated by Q s,
-    Q = (wd~ + w~ w~) B + 2 w~ thetad~ + thetadd~; so int rho (B s) x (Q s) is the axial vector of
+    A point s of a section lies at B s from the axis, B = exp(Psi~) to second order with the part of
+    Psi that turns the sections' inertia (twist alone without rotary inertia), and is accelerated by
+    Q s, Q = (wd~ + w~ w~) B + 2 w~ Bd + Bdd; so int rho (B s) x (Q s) is the axial vector of
     B (int rho s s^T) Q^T.  Slices that are rigid bodies of their own turn with all of Psi.
     """
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
-    shapes = motion.shapes
-    theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
-    if motion.body.points:
-        theta = values_at(shapes, x).theta
-    turned, rate, growth = (
-        tilde(np.einsum("mak,tk->tma", theta, modal))
-        for modal in (motion.eta, motion.etad, motion.etadd)
-    )
+    placed, rate, growth = _section_turn(motion, x)
     w = tilde(motion.frame_spin)[:, None]
-    placed = np.eye(3) + turned
     pushed = (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ placed + 2 * w @ rate + growth
     second = np.zeros((len(x), 3, 3))
     second[:, 1, 1], second[:, 2, 2] = per_length[:, 2], per_length[:, 1]
     product = placed @ second @ np.swapaxes(pushed, -1, -2)
     axial = [product[..., a, b] - product[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))]
     return np.stack(axial, axis=-1)
+
+
+def _section_turn(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
+    """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3)."""
+    shapes, at = motion.shapes, values_at(motion.shapes, x)
+    if motion.body.points:
+        theta, h = at.theta, at.second_order[:, 3:]
+    else:
+        theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
+        h = shapes.second_order.carried(at.second_order)
+    eta, etad, etadd = motion.eta, motion.etad, motion.etadd
+    turn, rate, growth = (np.einsum("mak,tk->tma", theta, modal) for modal in (eta, etad, etadd))
+    if not shapes.stiffening:
+        return np.eye(3) + tilde(turn), tilde(rate), tilde(growth)
+    now, moving, pushed = tilde(turn), tilde(rate), tilde(growth)
+    once = now @ moving
+    twice = now @ pushed + moving @ moving
+    return (
+        np.eye(3) + now + tilde(-0.5 * bilinear(h, eta, eta)) + now @ now / 2,
+        moving - tilde(bilinear(h, eta, etad)) + (once + np.swapaxes(once, -1, -2)) / 2,
+        pushed - tilde(bilinear(h, eta, etadd) + bilinear(h, etad, etad))
+        + (twice + np.swapaxes(twice, -1, -2)) / 2,
+    )  # fmt: skip

@@ -133,9 +133,16 @@ def _factorial(n: int) -> int:
 def section_jet(section: Section, eta: Jet) -> tuple[Jet, Jet]:
     """Place and attitude of a section in frame axes."""
     place = apply(section.phi, eta) + section.place
-    drawn = dot(eta, apply(section.shortening, eta)) * -0.5
-    place = place + drawn[..., None] * np.array([1.0, 0.0, 0.0])
-    return place, exponential(apply(section.theta, eta)) @ section.rotation
+    place = place + _grown(section.second[:3], eta)
+    turn = apply(section.theta, eta) + _grown(section.second[3:], eta)
+    return place, exponential(turn) @ section.rotation
+
+
+def _grown(second: Array, eta: Jet) -> Jet:
+    """1/2 eta^T second eta (..., 3)."""
+    x, y, z = ((dot(eta, apply(part, eta)) * 0.5)[..., None] for part in second)
+    axes = np.eye(3)
+    return x * axes[0] + y * axes[1] + z * axes[2]
 
 
 def frame_jet(state: State, a: Array, alpha: Array) -> tuple[Jet, Jet]:
@@ -227,14 +234,13 @@ def modes_of(p: Particles, eta: Array) -> tuple[Array, Array, Array]:
     """The same for any particles that move with the shapes."""
     count, n = len(p.mass), len(eta)
     first = p.phi @ eta
-    second = np.zeros((count, 3), dtype=np.result_type(eta, float))
-    second[:, 0] = -0.5 * np.einsum("mkl,k,l->m", p.shortening, eta, eta)
+    second = 0.5 * np.einsum("makl,k,l->ma", p.second, eta, eta)
     J = [np.zeros((count, 3, 6 + n), dtype=second.dtype) for _ in range(3)]
     J[0][:, :, :3] = np.eye(3)
     for order, arm in enumerate((p.place, first, second)):
         J[order][:, :, 3:6] = -_cross(arm)
     J[1][:, :, 6:] = p.phi
-    J[2][:, 0, 6:] = -p.shortening @ eta
+    J[2][:, :, 6:] = p.second @ eta
     return J[0], J[1], J[2]
 
 
@@ -272,10 +278,10 @@ def bias(body: Body, state: State, lagrangian: bool) -> Array:
         J0, J1, J2 = _modes(body, state.eta)
         J = J0 + J1 + J2
         place = p.place + p.phi @ state.eta
-        place[:, 0] -= 0.5 * np.einsum("mkl,k,l->m", p.shortening, state.eta, state.eta)
+        place += 0.5 * np.einsum("makl,k,l->ma", p.second, state.eta, state.eta)
         moving = J[:, :, 6:] @ state.etad
         acceleration = np.cross(w, np.cross(w, place)) + 2 * np.cross(w, moving)
-        acceleration[:, 0] -= np.einsum("mkl,k,l->m", p.shortening, state.etad, state.etad)
+        acceleration += np.einsum("makl,k,l->ma", p.second, state.etad, state.etad)
         return np.einsum("m,mai,ma->i", p.mass, J, acceleration)
     M = mass_matrix(body, state.eta, True)
     step: Any = 1e-30j * np.eye(n)
@@ -430,7 +436,7 @@ def energy(scene: Mapping[str, Any] | System, q: Array, u: Array, lagrangian: bo
         total += kinetic_energy(body, state, this.lagrangian)
         total += 0.5 * float(state.eta @ body.K @ state.eta)
         place = p.place + p.phi @ state.eta
-        place[:, 0] -= 0.5 * np.einsum("mkl,k,l->m", p.shortening, state.eta, state.eta)
+        place += 0.5 * np.einsum("makl,k,l->ma", p.second, state.eta, state.eta)
         total -= float(this.tree.gravity @ (p.mass @ (state.r + place @ state.A.T)))
     return float(total)
 

@@ -69,6 +69,22 @@ def _along(beam: Beam, entry: sp.Expr) -> sp.Expr:
     return sp.Add(*(c * beam.length ** (k + 1) / (k + 1) for (k,), c in polynomial.terms()))
 
 
+def _second_order(
+    s: sp.Expr, theta: sp.Matrix, carried: list[sp.Expr], offset: tuple[sp.Symbol, sp.Symbol]
+) -> sp.Matrix:
+    """Second-order displacement of the point (y, z): R = 1 + A1 + A2 with R' = R theta'~, the axis
+    by r' = (1 + s') R e_x, from a root section that does not move."""
+    first = theta.hat()
+    grown = (first * first.diff(_X)).applyfunc(lambda e: sp.integrate(sp.expand(e), (_X, 0, _X)))
+    along = grown[:, 0] + s.diff(_X) * first[:, 0]
+    axis = along.applyfunc(lambda e: sp.integrate(sp.expand(e), (_X, 0, _X)))
+    turn = (grown - first * first / 2).vee()
+    if carried[1] == 0 and carried[2] == 0:
+        turn[1] = turn[2] = 0
+    kept = sp.Matrix(carried).hat()
+    return axis + (turn.hat() + kept * kept / 2) * sp.Matrix([0, *offset])
+
+
 class FreeBeam:
     """Accelerations of a beam whose root section is the floating frame, on nothing."""
 
@@ -117,9 +133,9 @@ class FreeBeam:
         if beam.rotary:
             turned[1], turned[2] = -dw.diff(_X), dv.diff(_X)
         first = sp.Matrix([s, dv, dw]) + sp.Matrix(turned).cross(sp.Matrix([0, y, z]))
-        slope = sp.expand(dv.diff(_X) ** 2 + dw.diff(_X) ** 2)
-        drawn = -sp.integrate(slope, (_X, 0, _X)) / 2 if beam.stiffening else sp.Integer(0)
-        second = sp.Matrix([drawn, 0, 0])
+        second = sp.zeros(3, 1)
+        if beam.stiffening:
+            second = _second_order(s, sp.Matrix([psi, -dw.diff(_X), dv.diff(_X)]), turned, (y, z))
         rest = sp.Matrix([_X, y, z])
         rates = dict(zip(self.eta, self.etad, strict=True))
 
