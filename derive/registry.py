@@ -101,6 +101,7 @@ def load_file(path: str | Path) -> list[Element]:
     spec = importlib.util.spec_from_file_location(name, path)
     if path.suffix != ".py" or spec is None or spec.loader is None:
         raise ElementError(f"{path}: expected a Python file, ending in .py")
+    _refuse_null_bytes(path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
@@ -113,6 +114,18 @@ def load_file(path: str | Path) -> list[Element]:
         return _distinct(elements_in(module))
     except ElementError as error:
         raise ElementError(f"{path}: {error}") from error
+
+
+def _refuse_null_bytes(path: Path) -> None:
+    """Versions of Python differ in what they raise for them."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ElementError(f"{path}: cannot be read ({error.strerror})") from error
+    if b"\0" in content:
+        raise ElementError(
+            f"{path}: this is no Python text: it holds null bytes; save the file as UTF-8"
+        )
 
 
 def _distinct(found: list[Element]) -> list[Element]:

@@ -125,6 +125,30 @@ class Section(SectionTable):
     to: Annotated[float, rules.number("m", above=0)]
 
 
+def _as_ends(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise refuse(f"expected a table such as {{ mid = 5.0 }}, found {found(value)}")
+    for key in value:
+        if not isinstance(key, str) or not NAME.fullmatch(key):
+            raise refuse(f"expected the name of an end, found {found(key)}")
+    return {key: _as_end(one) for key, one in value.items()}
+
+
+def _as_end(value: Any) -> Any:
+    """A place along the beam, alone or in a table, as a point in beam axes."""
+    value = plain(value)
+    if isinstance(value, dict):
+        position = plain(value.get("position"))
+        if isinstance(position, (int, float)) and not isinstance(position, bool):
+            return {**value, "position": [position, 0.0, 0.0]}
+        return value
+    if isinstance(value, (list, tuple)):
+        return {"position": value}
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return {"position": [value, 0.0, 0.0]}
+    return value
+
+
 class Beam(FlexibleTable, SectionTable):
     """An Euler-Bernoulli beam.
 
@@ -144,7 +168,7 @@ class Beam(FlexibleTable, SectionTable):
         dict[str, End],
         Shorthand(
             "ends by name: x in m, or a table with position and orientation",
-            lambda value: _as_ends(value),
+            _as_ends,
             {"type": "object", "additionalProperties": {"type": ["number", "array", "object"]}},
         ),
     ] = Field(default_factory=dict)
@@ -213,27 +237,3 @@ class Beam(FlexibleTable, SectionTable):
 
 
 _DATA = tuple(SectionTable.model_fields)
-
-
-def _as_ends(value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise refuse(f"expected a table such as {{ mid = 5.0 }}, found {found(value)}")
-    for key in value:
-        if not isinstance(key, str) or not NAME.fullmatch(key):
-            raise refuse(f"expected the name of an end, found {found(key)}")
-    return {key: _as_end(one) for key, one in value.items()}
-
-
-def _as_end(value: Any) -> Any:
-    """A place along the beam, alone or in a table, as a point in beam axes."""
-    value = plain(value)
-    if isinstance(value, dict):
-        position = plain(value.get("position"))
-        if isinstance(position, (int, float)) and not isinstance(position, bool):
-            return {**value, "position": [position, 0.0, 0.0]}
-        return value
-    if isinstance(value, (list, tuple)):
-        return {"position": value}
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return {"position": [value, 0.0, 0.0]}
-    return value

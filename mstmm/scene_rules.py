@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
 from .rotations import norm, unit
@@ -63,10 +64,26 @@ def found(value: object, depth: int = 0) -> str:
     return type(value).__name__
 
 
+class _Published(GenerateJsonSchema):
+    """Writes the default of a field as its rule does: pydantic would dump it by its type."""
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
+        inner: dict[str, Any] = dict(schema["schema"])
+        dump = inner.get("serialization", {}).get("function")
+        if dump is not None and "default" in schema:
+            schema = {**schema, "default": dump(schema["default"])}
+        return super().default_schema(schema)
+
+
 class Table(BaseModel):
     """Base of all tables: frozen, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    @classmethod
+    def model_json_schema(cls, *args: Any, **options: Any) -> dict[str, Any]:
+        """The JSON Schema of the table's file format, defaults as a file writes them."""
+        return super().model_json_schema(*args, **{"schema_generator": _Published} | options)
 
 
 def split(reference: str) -> tuple[str, str]:

@@ -137,7 +137,8 @@ def test_forces_and_moments_move_every_body(run: Result, k: int) -> None:
 
 
 def test_energies_and_momentum_are_sums_over_the_bodies(run: Result) -> None:
-    kinetic, gravity, momentum, turning = 0.0, 0.0, np.zeros(3), np.zeros(3)
+    kinetic = gravity = np.zeros(len(run.t))
+    momentum, turning = np.zeros(3), np.zeros(3)
     for body in run.model.scene.body:
         arm = turned(run.orientation(body.name), np.array(body.center_of_mass))
         w = run.angular_velocity(body.name)

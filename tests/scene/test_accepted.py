@@ -16,6 +16,7 @@ from reference.random_scenes import random_scene
 from mstmm.hinge_types import HINGE_TYPES, effort_unit
 from mstmm.rotations import norm
 from mstmm.scene import Hinge, Scene, load_scene
+from mstmm.scene_law import SpringLaw
 from mstmm.stored import element_from_json
 from scene.scenes import arm, body, changed, hinge, one
 
@@ -307,6 +308,8 @@ def test_schema_is_published_with_units() -> None:
     assert "from" in schema["$defs"]["Spring"]["properties"]
     assert "a number in kg, 0 or more" in text and "three numbers in m/s^2" in text
     assert set(schema["$defs"]["Hinge"]["required"]) == {"name", "type", "inboard", "outboard"}
+    assert schema["$defs"]["Load"]["properties"]["force"]["default"] == [0.0, 0.0, 0.0]
+    assert SpringLaw.model_json_schema()["properties"]["effort"]["default"] == 0.0
 
 
 def test_reading_a_scene_loads_neither_numpy_nor_sympy() -> None:

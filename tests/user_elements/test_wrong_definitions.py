@@ -227,7 +227,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "no element": (HEAD + "x = 3", "defines no element; subclass"),
     "empty": ("", "defines no element; subclass"),
     "no Python": ("class Mine(", "running the file failed with SyntaxError"),
-    "null": ("\0\0", "running the file failed with SyntaxError"),
+    "null": ("\0\0", "this is no Python text: it holds null bytes; save the file as UTF-8"),
     "name": (HEAD + "class Mine(Hinge):\n    name = 3\n", "name: expected text"),
     "arguments": (
         HEAD + "class Mine(Hinge):\n    name = 'mine'\n    def __init__(self, a): ...\n",
@@ -287,6 +287,11 @@ def _binary(path: Path) -> Path:
     return path
 
 
+def _utf_16(path: Path) -> Path:
+    path.write_text(hinge(), encoding="utf-16")
+    return path
+
+
 def _toml(path: Path) -> Path:
     target = path.with_suffix(".toml")
     target.write_text("a = 1")
@@ -298,7 +303,8 @@ def _toml(path: Path) -> Path:
     [
         (lambda path: path, "no such file"),
         (_folder, "no such file"),
-        (_binary, "running the file failed with SyntaxError"),
+        (_binary, "this is no Python text: it holds null bytes"),
+        (_utf_16, "this is no Python text: it holds null bytes; save the file as UTF-8"),
         (_toml, "expected a Python file, ending in .py"),
     ],
 )

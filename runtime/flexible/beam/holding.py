@@ -131,9 +131,14 @@ def _directions(turn: Array, axes: tuple[Vector, ...]) -> frozenset[str]:
     )
 
 
+def _softest(data: BeamData) -> float:
+    """The least bending stiffness of the two planes, N m^2."""
+    return float(min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()))
+
+
 def _resisted(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
     """(springs, rotors) that matter beside the beam's own stiffness and inertia."""
-    bending = min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()) / data.length
+    bending = _softest(data) / data.length
     inertia = data.mass * data.length**2 / 3
     law = hinge.law
     rotary = slice(3, None) if hinge.type in ("free", "elastic") else slice(None)
@@ -166,7 +171,7 @@ def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
 
 def _is_stiff(spring: Spring, data: BeamData) -> bool:
     """Stiff beside the beam as a cantilever, or of a user's type."""
-    own = 3 * min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()) / data.length**3
+    own = 3 * _softest(data) / data.length**3
     return spring.type != "spring" or spring.law.stiffness > HEAVY * own
 
 
