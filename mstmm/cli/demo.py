@@ -65,7 +65,7 @@ def demo(json: Json = False) -> None:
         scene: "the scene" if kept is None else kept,
     } | ({} if picture is None else {picture: "a picture of it"})
     if json:
-        output.emit_json({**report.to_json(result, seconds), "files": [str(path) for path in made]})
+        output.emit_json({**report.to_json(result, seconds, result.certificate.verdict()), "files": [str(path) for path in made]})
         return
     output.say(text)
     output.say()
