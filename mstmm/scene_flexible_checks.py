@@ -142,7 +142,7 @@ def _within(direction: Vector, axes: list[Vector]) -> float:
 
 def warnings(scene: Scene) -> Iterator[str]:
     """What is accepted but worth knowing of flexible bodies."""
-    yield from _thick(scene)
+    yield from short_beams(scene)
     for body in (*scene.beam, *scene.elastic):
         if max(body.damping.ratio) >= 1:
             yield (
@@ -166,7 +166,7 @@ def _called(scene: Scene, name: str) -> str:
     return f'{word} "{name}"'
 
 
-def _thick(scene: Scene) -> Iterator[str]:
+def short_beams(scene: Scene) -> Iterator[str]:
     """Beams that are short for their height; those welded in line are one, and named once."""
     if not scene.beam:
         return
@@ -174,7 +174,7 @@ def _thick(scene: Scene) -> Iterator[str]:
     for beam in scene.beam:
         height, direction, source = max(_heights(beam), default=(0.0, "", ""))
         line = lines[beam.name]
-        if not 0 < line.length < SLENDER * height or line.first in said:
+        if not 0 < line.length < SLENDER * height or line.first in said or beam.model == "rigid":
             continue
         said.add(line.first)
         whole = "its length is" if line.length == beam.length else "the line it is welded into is"

@@ -46,6 +46,7 @@ class Certificate:
         flexible: how far the model of each flexible body was from the end of its range.
         give: of the stiffest spring, which the estimated error does not count; None without one.
         failures: why the run, or some of its samples, cannot be used at all.
+        models: where models of the scene are outside their range whatever the run.
     """
 
     energy: Drift
@@ -64,6 +65,7 @@ class Certificate:
     flexible: tuple[Flexibility, ...] = ()
     give: Give | None = None
     failures: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
 
     def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
@@ -142,6 +144,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
         flexible=certify.flexibilities(result._flexible),
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
+        models=result._outside(),
     )
 
 
@@ -173,7 +176,7 @@ def _doubts(c: Certificate) -> list[str]:
         )
     if c.step is not None and c.step.warning:
         found.append(c.step.warning)
-    return found + certify.warnings(c.flexible)
+    return [*found, *certify.warnings(c.flexible), *c.models]
 
 
 def _advice(c: Certificate) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene_flexible_checks import short_beams
 
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
@@ -122,7 +123,12 @@ class Result(FlexibleResults):
     def warnings(self) -> tuple[str, ...]:
         """What is worth knowing before the numbers are used, one sentence each."""
         scene, found = self.model.scene.warnings, self.certificate.warnings
-        return (*scene, *self.trajectory.notes, *found, *self._observed.failures)
+        notes, failures = self.trajectory.notes, self._observed.failures
+        return tuple(dict.fromkeys((*scene, *notes, *found, *failures)))
+
+    def _outside(self) -> tuple[str, ...]:
+        """Models of the scene that are outside their range whatever the run."""
+        return tuple(short_beams(self.model.scene))
 
     # --- bodies and ends ------------------------------------------------------------------------
 
