@@ -76,7 +76,7 @@ def attributes(result: Result) -> dict[str, Any]:
         "versions": json.dumps(versions()),
         "settings": json.dumps(settings),
         "status": "INTERRUPTED" if run.status is None else run.status.name,
-        "success": int(run.success),
+        "success": int(result.success),
         "message": run.message,
         "statistics": json.dumps(None if run.statistics is None else asdict(run.statistics)),
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
