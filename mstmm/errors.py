@@ -38,4 +38,11 @@ class NumericalFailure(MstmmError):
 
 
 class UndeterminedMotion(NumericalFailure):
-    """A hinge whose acceleration nothing determines: what it carries has no inertia there."""
+    """A hinge whose acceleration nothing determines: what it carries has no inertia there.
+
+    `place` is that of the hinge's body in the tree, -1 where it is not known.
+    """
+
+    def __init__(self, message: str = "", place: int = -1) -> None:
+        super().__init__(message)
+        self.place = place

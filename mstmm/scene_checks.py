@@ -12,7 +12,7 @@ from . import scene_flexible_checks, topology
 from .expression import Expression
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, flexible, problem_with
-from .scene_physics import triangle_excess
+from .scene_physics import negative_moment, triangle_excess
 from .scene_rules import GROUND, Location, split
 
 if TYPE_CHECKING:
@@ -147,23 +147,34 @@ def _inertias(scene: Scene) -> Iterator[Problem]:
     for place, _, body in _tables(scene):
         if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
             continue
+        negative = negative_moment(body.inertia_matrix)
         excess = triangle_excess(body.inertia_matrix)
-        if excess is not None:
+        if negative is not None:
+            yield (*place, "inertia"), f"{negative}, or accept it with {_ACCEPTED}"
+        elif excess is not None:
             yield (
                 (*place, "inertia"),
-                f"{excess}, so no body has this inertia; correct it, or accept it with "
-                "allow_unphysical_inertia = true",
+                f"{excess}, so no body has this inertia; correct it, or accept it with {_ACCEPTED}",
             )
+
+
+_ACCEPTED = "allow_unphysical_inertia = true"
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
     """What is accepted but worth knowing: inertias that no body can have, beams that are asked
     for what they cannot do well."""
-    found = []
+    found, dusty = [], []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
             found.append(f"{name}: inertia: {excess}; accepted as asked")
+        dusty += [(name, x) for k, x in enumerate(body.inertia[:3])
+                  if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
+    if dusty:
+        name, entry = dusty[0]
+        more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
+        found.append(f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}")
     return (*found, *scene_flexible_checks.warnings(scene))
 
 

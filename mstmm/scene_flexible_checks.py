@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
+from . import scene_lines
 from .rotations import Vector, apply, dot, norm, unit
 from .scene_rules import Location, split
 
@@ -141,8 +142,7 @@ def _within(direction: Vector, axes: list[Vector]) -> float:
 
 def warnings(scene: Scene) -> Iterator[str]:
     """What is accepted but worth knowing of flexible bodies."""
-    for beam in scene.beam:
-        yield from _thick(beam)
+    yield from short_beams(scene)
     for body in (*scene.beam, *scene.elastic):
         if max(body.damping.ratio) >= 1:
             yield (
@@ -166,23 +166,40 @@ def _called(scene: Scene, name: str) -> str:
     return f'{word} "{name}"'
 
 
-def _thick(beam: Beam) -> Iterator[str]:
-    """Heights of the section from its rotary inertia, as of a rectangle: h = sqrt(12 rho I / m)."""
-    heights = [
-        (sqrt(12 * rotary / piece.mass_per_length), direction)
-        for piece in beam.sections
-        if piece.rotary_inertia is not None and piece.mass_per_length
-        for direction, rotary in zip(("z", "y"), piece.rotary_inertia, strict=True)
-        if beam.modes is None or getattr(beam.modes, direction)
-    ]
-    height, direction = max(heights, default=(0.0, ""))
-    if height > 0 and beam.length < SLENDER * height:
+def short_beams(scene: Scene) -> Iterator[str]:
+    """Beams that are short for their height; those welded in line are one, and named once."""
+    if not scene.beam:
+        return
+    lines, said = scene_lines.lines(scene), set[str]()
+    for beam in scene.beam:
+        height, direction, source = max(_heights(beam), default=(0.0, "", ""))
+        line = lines[beam.name]
+        if not 0 < line.length < SLENDER * height or line.first in said or beam.model == "rigid":
+            continue
+        said.add(line.first)
+        whole = "its length is" if line.length == beam.length else "the line it is welded into is"
         yield (
-            f'beam "{beam.name}": its length is {beam.length / height:.2g} times the height of the '
-            f"section along {direction} ({height:.3g} m from rotary_inertia and mass_per_length), "
-            f"less than {SLENDER:g}: shear, which Euler-Bernoulli beams leave out, is not small; "
-            "use an elastic body from a mesh"
+            f'beam "{beam.name}": {whole} {line.length / height:.2g} times the height of the '
+            f"section along {direction} ({height:.3g} m from {source}), less than {SLENDER:g}: "
+            "shear, which Euler-Bernoulli beams leave out, is not small; use an elastic body from "
+            "a mesh"
         )
+
+
+def _heights(beam: Beam) -> Iterator[tuple[float, str, str]]:
+    """(height in m, direction, keys it comes from) of the sections, as of rectangles: sqrt(12)
+    times the radius of gyration, from rotary inertia or else from E I / E A."""
+    for piece in beam.sections:
+        rotary, bending = piece.rotary_inertia, piece.bending_stiffness
+        for k, direction in enumerate(("z", "y")):
+            if not _bends(beam, direction):
+                continue
+            if rotary is not None and piece.mass_per_length:
+                source = "rotary_inertia and mass_per_length"
+                yield sqrt(12 * rotary[k] / piece.mass_per_length), direction, source
+            elif rotary is None and bending is not None and piece.axial_stiffness:
+                source = "bending_stiffness and axial_stiffness"
+                yield sqrt(12 * bending[k] / piece.axial_stiffness), direction, source
 
 
 def _bends(beam: Beam, direction: str) -> bool:

@@ -80,9 +80,10 @@ class BodyTable(Table):
 
     @property
     def inertia_matrix(self) -> Matrix:
-        """The inertia tensor about the centre of mass, body axes, kg m^2."""
+        """The inertia tensor about the centre of mass, body axes, kg m^2, without moments that
+        are negative by rounding."""
         xx, yy, zz, xy, xz, yz = self.inertia
-        return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        return scene_physics.without_dust(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), self.mass)
 
     def end_position(self, at: str) -> Vector:
         """Position (m) of the end `at` in body axes; "" is the body's own origin."""
@@ -96,7 +97,7 @@ class BodyTable(Table):
     def _settle(self) -> Self:
         if len(self.inertia) == 3:
             object.__setattr__(self, "inertia", (*self.inertia, 0.0, 0.0, 0.0))
-        problems = scene_physics.inertia_problems(self.inertia_matrix)
+        problems: list[tuple[Location, str]] = []
         if self.type == "rigid" and "mass" not in self.model_fields_set:
             problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
         if self.type == "rigid" and self.parameters:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 from .rotations import Matrix, Vector
-from .scene_rules import Location
 
 #: Relative size of a violation that is put down to rounding.
 _ROUNDING = 1e-12
 _TRIANGLE_ROUNDING = 1e-6
+#: A radius of gyration (m) below this is rounding: no body of a scene is that small.
+_GYRATION = 1e-8
 
 
 def principal_moments(inertia: Matrix) -> Vector:
@@ -54,33 +55,50 @@ def _row(x: list[float]) -> Vector:
     return (x[0], x[1], x[2])
 
 
-def inertia_problems(inertia: Matrix) -> list[tuple[Location, str]]:
-    """What is wrong with a tensor that has a negative moment about some axis."""
+def is_dust(entry: float, others: float, mass: float) -> bool:
+    """True for a moment of inertia (kg m^2) that is rounding beside the largest entry of its tensor
+    or, with the mass (kg), a radius of gyration below any body's."""
+    return abs(entry) <= max(_ROUNDING * others, mass * _GYRATION**2)
+
+
+def without_dust(inertia: Matrix, mass: float) -> Matrix:
+    """The tensor with moments that are negative by rounding as zeros; itself where none is."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
+    if xx >= 0 and yy >= 0 and zz >= 0:
+        return inertia
+    largest = max(abs(x) for row in inertia for x in row)
+    xx, yy, zz = (0.0 if x < 0 and is_dust(x, largest, mass) else x for x in (xx, yy, zz))
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def negative_moment(inertia: Matrix) -> str | None:
+    """What is wrong with a tensor that has a negative moment about some axis; None for others."""
     for entry, label in zip((inertia[i][i] for i in range(3)), ("xx", "yy", "zz"), strict=True):
         if entry < 0:
-            return [(
-                ("inertia",),
+            return (
                 f"expected moments of inertia of 0 kg m^2 or more, found {label} = {entry:.6g}; "
-                "remove the sign",
-            )]  # fmt: skip
+                "remove the sign"
+            )
     moments, scale = _scaled(inertia)
     if moments[0] >= -_ROUNDING * moments[2]:
-        return []
-    return [(
-        ("inertia",),
+        return None
+    return (
         f"no body has this tensor: its principal moments are {shown(moments, scale)}, one "
-        "negative; check the products of inertia (tensor entries, Jxy = -int xy dm)",
-    )]  # fmt: skip
+        "negative; check the products of inertia (tensor entries, Jxy = -int xy dm)"
+    )
 
 
 def triangle_excess(inertia: Matrix) -> str | None:
-    """What breaks the triangle inequality of the principal moments, None where nothing does.
+    """What breaks the triangle inequality of the principal moments, None where nothing does; of
+    negative moments that they are negative.
 
     Every mass distribution has J1 + J2 >= J3.
     """
     moments, scale = _scaled(inertia)
     if moments[0] + moments[1] >= moments[2] * (1 - _TRIANGLE_ROUNDING):
         return None
+    if moments[0] < -_ROUNDING * abs(moments[2]):
+        return f"the principal moments {shown(moments, scale)} are not all positive"
     return (
         f"the principal moments {shown(moments, scale)} break the triangle inequality "
         "(each at most the sum of the other two)"

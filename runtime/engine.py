@@ -112,8 +112,10 @@ class Engine:
             self.pointer(qdot), self.pointer(udot), failure, at,
         )  # fmt: skip
         if code:
-            kind = UndeterminedMotion if code == UNDETERMINED else NumericalFailure
-            raise kind(self.failure_text(failure, float(times[at[0]])))
+            text = self.failure_text(failure, float(times[at[0]]))
+            if code == UNDETERMINED:
+                raise UndeterminedMotion(text, int(failure.element))
+            raise NumericalFailure(text)
         self._finite("acceleration", udot, times)
         return qdot, udot
 
@@ -199,7 +201,7 @@ class Engine:
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
-    def _is_flexible(self, position: int) -> bool:
+    def is_flexible(self, position: int) -> bool:
         """Whether the body at this place of the topology belongs to a flexible one."""
         expanded = self.packed.expanded
         return expanded is not None and expanded.is_node(self.body_name(position))
@@ -213,7 +215,7 @@ class Engine:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
         reason, element = int(failure.reason), int(failure.element)
-        if reason == UNDETERMINED and self._is_flexible(element):
+        if reason == UNDETERMINED and self.is_flexible(element):
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: what it moves has no positive inertia '
                 f'left: the shapes of the flexible body "{self.body_name(element).split("/")[0]}" '
@@ -223,8 +225,9 @@ class Engine:
         if reason == UNDETERMINED:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
-                "what it carries has no inertia in that direction (a thin rod on a ball, a point "
-                "mass, collinear axes); give the body inertia or fix that motion"
+                "what it carries has no positive inertia in that direction (a thin rod on a ball, "
+                "a point mass, collinear axes, a negative principal moment); give the body "
+                "inertia, give the hinge rotor inertia (law.inertia), or fix that motion"
             )
         if reason == _FORCE:
             name = self.packed.scene.spring[element].name

@@ -5,12 +5,16 @@ two is the error of the first up to the much smaller one of the second.  What is
 times the largest difference so far, so that a moment at which the two happen to cross does not pass
 for accuracy.  It holds until the two runs part for good: past that time (the predictability
 horizon) errors have no meaning, because neither run knows where the system is.
+
+The second run must differ in its steps, or it repeats the error of the first: where breaks and the
+end cut the steps of the first run, those of the second are shorter than the pieces; and a tolerance
+so loose that it bounds nothing is no measure of the second one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +44,18 @@ PART = 0.01
 #: No tolerance is tightened below this.
 _TIGHTEST = 1e-14
 
+#: The second run's tolerance is at most this, its absolute one this part of the motion's size.
+_LOOSEST = 1e-4
+
+#: Motions below this are rounding: no absolute tolerance follows them.
+_DUST = 1e-12
+
+#: Steps of the second run, at least, where the step is fixed.
+_FEWEST = 64
+
+#: Pieces between breaks that make up less than this part of the run are not halved.
+_MINOR = 0.01
+
 #: Growth of the error that counts as exponential, and as noise of rounding at its start.
 _GROWTH, _SMALLEST = 1e3, 1e-15
 
@@ -56,6 +72,7 @@ class ErrorEstimate:
         horizon: s; the runs part here, None if they do not.
         tenfold: s in which errors grow tenfold, None if they do not grow exponentially.
         reference: how the second run was made.
+        moved: unit -> how far coordinates of that unit went, against which errors are judged.
     """
 
     t: Array
@@ -64,6 +81,12 @@ class ErrorEstimate:
     horizon: float | None
     tenfold: float | None
     reference: str
+    moved: dict[str, float] = field(default_factory=dict)
+
+    def whole(self, kind: str = "q") -> dict[str, float]:
+        """Unit -> largest difference of the two runs, as an error, whatever the horizon."""
+        values: dict[str, Array] = getattr(self, kind)
+        return {unit: float(v.max(initial=0.0)) for unit, v in values.items()}
 
     def largest(self, kind: str = "q") -> dict[str, float]:
         """Unit -> largest error of q or u before the horizon (over the whole run without one)."""
@@ -72,31 +95,79 @@ class ErrorEstimate:
         return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
 
 
-def tighter(first: Trajectory) -> tuple[Settings, str]:
-    """Settings of the second run, sampled at the times of the first; and what to call it."""
+def tighter(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, str]:
+    """Settings of the second run, sampled at the times of the first; and what to call it.
+
+    `breaks` are the times (s) at which the scene ends every step.
+    """
     settings, times = first.settings, tuple(np.unique(first.t).tolist())
+    pieces = _pieces(settings, breaks)
     if settings.step is not None:
-        step = settings.step / 2
-        return replace(settings, step=step, output_times=times), f"half the step, {step:.6g} s"
+        half = settings.step / 2
+        cut = min(_typical(np.minimum(pieces, settings.step), pieces) / 2, pieces.sum() / _FEWEST)
+        step = min(half, cut) if cut > 0 else half
+        name = "half the step" if step == half else "a shorter step"
+        return replace(settings, step=step, output_times=times), f"{name}, {step:.6g} s"
     factor = max(TIGHTER, _TIGHTEST / settings.rtol)
     factor = factor if factor <= 0.1 else 10.0  # no room below: a looser run bounds the error too
+    rtol = min(settings.rtol * factor, _LOOSEST)
+    size = max(_size(first.q - first.q[:1]), _size(first.u))
+    atol = min(settings.atol * rtol / settings.rtol, max(_LOOSEST * size, _DUST))
+    longest = settings.max_step / 2
+    if first.statistics.steps <= 2 * len(pieces):  # breaks and the end, not errors, set the steps
+        longest = min(longest or np.inf, _typical(pieces, pieces) / 2)
     second = replace(
-        settings, rtol=settings.rtol * factor, atol=settings.atol * factor, output_times=times,
-        max_step=settings.max_step / 2, max_steps=3 * settings.max_steps,
+        settings, rtol=rtol, atol=atol, output_times=times, max_step=longest,
+        max_steps=3 * settings.max_steps,
         first_step=0.3 * (first.statistics.smallest_step or 0.0),  # else both begin alike
     )  # fmt: skip
     return second, f"rtol {second.rtol:.0e}"
 
 
-def compare(layout: Layout, first: Trajectory, second: Trajectory, reference: str) -> ErrorEstimate:
-    """Estimate from two runs; the second one sampled at the times of the first."""
+def _pieces(settings: Settings, breaks: Sequence[float]) -> Array:
+    """(m,) lengths in s of what breaks cut the run into, ascending."""
+    start, end = settings.t_start, settings.t_end
+    stops = [start, *(b for b in breaks if start < b < end), end]
+    return np.sort(np.diff(stops))
+
+
+def _typical(sizes: Array, pieces: Array) -> float:
+    """The entry of `sizes` (m,), ascending, below which hardly any of the run lies."""
+    covered = np.cumsum(pieces)
+    return float(sizes[np.searchsorted(covered, _MINOR * covered[-1])])
+
+
+def _size(values: Array) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def alike(first: Trajectory, second: Trajectory) -> bool:
+    """True if a second run made the very steps of the first one, so that it says nothing of it."""
+    a, b = first.statistics, second.statistics
+    counts = (a.steps, a.rejected, a.evaluations, a.smallest_step, a.largest_step)
+    return counts == (b.steps, b.rejected, b.evaluations, b.smallest_step, b.largest_step)
+
+
+def compare(
+    layout: Layout,
+    first: Trajectory,
+    second: Trajectory,
+    reference: str,
+    start: Array | None = None,
+) -> ErrorEstimate:
+    """Estimate from two runs; the second one sampled at the times of the first.
+
+    `start` (nq,) is q at the start, from which one sample alone is seen to have moved.
+    """
     t, ours, theirs = np.intersect1d(first.t, second.t, return_indices=True)
     q, u = (
         dict(_groups(layout, getattr(first, kind)[ours], getattr(second, kind)[theirs], kind))
         for kind in ("q", "u")
     )
-    excursions = dict(_excursions(layout, first.q))
-    return ErrorEstimate(t, q, u, _horizon(t, q, excursions), _tenfold(t, [*q.values()]), reference)
+    path = first.q if start is None or len(first.q) > 1 else np.vstack([start, first.q])
+    moved = _excursions(layout, path)
+    horizon = _horizon(t, q, moved, first.settings.t_start)
+    return ErrorEstimate(t, q, u, horizon, _tenfold(t, [*q.values()]), reference, moved)
 
 
 def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
@@ -137,24 +208,26 @@ def rotation_between(a: Array, b: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
 
 
-def _excursions(layout: Layout, q: Array) -> Iterator[tuple[str, float]]:
-    """(unit, largest excursion from the start) of the coordinates that are not angles."""
+def _excursions(layout: Layout, q: Array) -> dict[str, float]:
+    """Unit -> largest excursion from the first sample of any coordinate of that unit."""
     found: dict[str, float] = {}
     for unit, difference in _differences(layout, q, q[:1], "q"):
         if len(difference):
             found[unit] = max(found.get(unit, 0.0), float(difference.max()))
-    yield from found.items()
+    return found
 
 
-def _horizon(t: Array, q: dict[str, Array], excursions: dict[str, float]) -> float | None:
-    """The last sample before the runs differ by more than ANGLE or PART."""
-    limits = {unit: ANGLE if unit == "rad" else PART * excursions.get(unit, 0.0) for unit in q}
+def _horizon(t: Array, q: dict[str, Array], moved: dict[str, float], start: float) -> float | None:
+    """The last sample before the runs differ by more than ANGLE or PART; without one the start."""
+    limits = {unit: ANGLE if unit == "rad" else PART * moved.get(unit, 0.0) for unit in q}
     parted = [
         int(np.argmax(error > SAFETY * limits[unit]))
         for unit, error in q.items()
         if limits[unit] > 0 and (error > SAFETY * limits[unit]).any()
     ]
-    return float(t[max(0, min(parted) - 1)]) if parted else None
+    if not parted:
+        return None
+    return float(t[min(parted) - 1]) if min(parted) else start
 
 
 def _tenfold(t: Array, errors: list[Array]) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from mstmm.errors import MstmmError, SceneError
 
 from . import compiled_run, second_opinion
 from .checkpoint import Checkpoint, State
-from .error_estimate import ErrorEstimate, compare, tighter
+from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .integrate import Run, Samples, Status
 from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
 from .stability import StepCheck, check_step
@@ -112,7 +113,10 @@ def first_run(
             watch.save(run, earlier)
         else:
             watch.checkpoint.remove()
-    return trajectory(system, run, settings, status, earlier), step
+    found = trajectory(system, run, settings, status, earlier)
+    if step is not None and status is not None and not found.success:
+        found = replace(found, message=step.blamed(found.message))
+    return found, step
 
 
 def _continued(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | None]:
@@ -126,12 +130,15 @@ def second_run(
     model: Model, first: Trajectory, q: Array, u: Array, watch: Watch
 ) -> ErrorEstimate | None:
     """Error of `first` by a more accurate run; None, with a note, if that leads nowhere."""
-    settings, reference = tighter(first)
+    settings, reference = tighter(first, model._engine.packed.breaks)
     watch.run = 1
     second, _ = first_run(model, settings, q, u, watch)
     if not second.success:
         why = "it was interrupted" if second.status is None else second.message
         watch.notes.append(f"the second run, for the error, did not reach the end: {why}")
-    if len(np.intersect1d(first.t, second.t)) < 2 or second.status is None:
+    if alike(first, second):
+        watch.notes.append("no error estimate: the second run made the very steps of the first one")
         return None
-    return compare(model.layout, first, second, reference)
+    if not len(np.intersect1d(first.t, second.t)) or second.status is None:
+        return None
+    return compare(model.layout, first, second, reference, q)

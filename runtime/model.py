@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import Scene
 
 from . import parameters as named_parameters
@@ -113,14 +113,10 @@ class Model:
         )  # fmt: skip
 
     def refuse_undetermined_start(self) -> None:
-        """SceneError naming the hinge if the masses leave a motion of the start undetermined."""
-        q, u = self.initial_state()
-        try:
-            self._engine.accelerations(0.0, q[None].copy(), u[None].copy(), self._memory(1))
-        except UndeterminedMotion as error:
-            raise SceneError(f"scene: {error}") from None
-        except NumericalFailure:
-            pass  # not a matter of masses: reported by whoever computes there
+        """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
+        from .undetermined import refuse_undetermined_start
+
+        refuse_undetermined_start(self)
 
     def _memory(self, n: int) -> Array:
         return np.ascontiguousarray(np.tile(self._engine.start_memory(), (n, 1)))

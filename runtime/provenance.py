@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Version of the layout of a saved result.
 FORMAT = 1
 
-_ERROR = ("horizon", "tenfold", "reference")
+_ERROR = ("horizon", "tenfold", "reference", "moved")
 
 Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
@@ -76,7 +76,7 @@ def attributes(result: Result) -> dict[str, Any]:
         "versions": json.dumps(versions()),
         "settings": json.dumps(settings),
         "status": "INTERRUPTED" if run.status is None else run.status.name,
-        "success": int(run.success),
+        "success": int(result.success),
         "message": run.message,
         "statistics": json.dumps(None if run.statistics is None else asdict(run.statistics)),
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
@@ -136,7 +136,8 @@ def error(data: Any) -> ErrorEstimate | None:
     for name in columns:
         unit = data[name].attrs["units"]
         values[str(name)[6]]["" if unit == "1" else unit] = data[name].values
-    rest = {name: json.loads(data[columns[0]].attrs[name]) for name in _ERROR}
+    kept = data[columns[0]].attrs
+    rest = {name: json.loads(kept[name]) for name in _ERROR if name in kept}
     return ErrorEstimate(data["error_t"].values, values["q"], values["u"], **rest)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene_flexible_checks import short_beams
 
 from .checkpoint import Checkpoint
 from .error_estimate import ErrorEstimate
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: States below this have finite energies in any scene that stands for something.
+_MODEST = 1e60
+
 
 class Result(FlexibleResults):
     """What a run gave: states, and everything that follows from them, over the sample times.
@@ -45,9 +49,7 @@ class Result(FlexibleResults):
         q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
         u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
         event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
-        success: the run reached its end, or an event stopped it, and every number is finite.
         status: why it ended; None if it was interrupted.
-        message: the same as a sentence.
         statistics: counts of the integrator; None for runs of other integrators.
         settings: how the run was made.
     """
@@ -62,7 +64,7 @@ class Result(FlexibleResults):
         self.model, self.trajectory = model, run
         self._error, self._step = error, step
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
-        self.status, self.message = run.status, run.message
+        self.status = run.status
         self.statistics: Statistics | None = run.statistics
         self.settings: Settings = run.settings
         self._observed = Observed(model, run)
@@ -70,8 +72,39 @@ class Result(FlexibleResults):
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or was stopped by an event, with finite numbers."""
-        return self.trajectory.success
+        """True if the run reached its end or was stopped by an event, with finite numbers: states,
+        energies and momenta of every sample.  It does not say that they are right: see `trusted`.
+        """
+        return self.trajectory.success and not self._unusable
+
+    @property
+    def message(self) -> str:
+        """Why the run ended, as a sentence; and which of its samples cannot be used."""
+        text, unusable = self.trajectory.message, self._unusable
+        return f"{text}, but {unusable}" if unusable and self.trajectory.success else text
+
+    @property
+    def trusted(self) -> bool:
+        """True where nothing speaks against the numbers: a success whose balances and estimated
+        error (certify=True) are within bounds and whose models stayed within their range.
+
+        `certificate.verdict(accuracy, balance)` takes bounds of your own and gives the reasons.
+        """
+        return self.certificate.trusted
+
+    @cached_property
+    def _unusable(self) -> str:
+        """What cannot be computed of finite states; "" if everything can."""
+        run = self.trajectory
+        if not self.model.flexible and max(_size(run.q), _size(run.u), _size(run.work)) < _MODEST:
+            return ""
+        sums = self._observed.part("sums")
+        failing = np.isnan(sums).any(axis=1)
+        if self._observed.failures and failing.any():
+            count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
+            return f"{count}: {self._observed.failures[0]}"
+        finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
+        return "" if finite else "its energies or momenta are beyond what numbers hold"
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:
@@ -90,7 +123,12 @@ class Result(FlexibleResults):
     def warnings(self) -> tuple[str, ...]:
         """What is worth knowing before the numbers are used, one sentence each."""
         scene, found = self.model.scene.warnings, self.certificate.warnings
-        return (*scene, *self.trajectory.notes, *found, *self._observed.failures)
+        notes, failures = self.trajectory.notes, self._observed.failures
+        return tuple(dict.fromkeys((*scene, *notes, *found, *failures)))
+
+    def _outside(self) -> tuple[str, ...]:
+        """Models of the scene that are outside their range whatever the run."""
+        return tuple(short_beams(self.model.scene))
 
     # --- bodies and ends ------------------------------------------------------------------------
 
@@ -236,7 +274,11 @@ class Result(FlexibleResults):
         return plot(self, names, None if path is None else Path(path), title)
 
     def __repr__(self) -> str:
-        return f"<Result: {self.message}; {len(self.t)} samples>"
+        return f"<Result: {self.trajectory.message}; {len(self.t)} samples>"
+
+
+def _size(values: Array) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
 
 
 def result_of(

@@ -43,8 +43,9 @@ class StepCheck:
         rate: |lambda| of the fastest motion, 1/s.
         product: h |lambda|.
         amplification: |R(h lambda)|, the factor of that motion in one step.
-        hinge: whose efforts drive that motion most.
+        hinge: whose efforts drive that motion most, a hinge or a flexible body.
         stable_step: the longest step that is stable for it and keeps h |lambda| <= LIMIT, s.
+        kind: "hinge" or "flexible body".
     """
 
     step: float
@@ -53,6 +54,7 @@ class StepCheck:
     amplification: float
     hinge: str
     stable_step: float
+    kind: str = "hinge"
 
     @property
     def warning(self) -> str | None:
@@ -60,11 +62,21 @@ class StepCheck:
         if self.product <= LIMIT and self.amplification <= _GROWTH:
             return None
         return (
-            f'step = {self.step:.4g} s is too long for the fastest motion at the start (hinge "'
-            f'{self.hinge}", {self.rate:.4g} 1/s): h |lambda| = {self.product:.3g}, one step '
+            f"step = {self.step:.4g} s is too long for the fastest motion at the start "
+            f'({self.kind} "{self.hinge}", {self.rate:.4g} 1/s): h |lambda| = {self.product:.3g}, '
+            "one step "
             f"multiplies it by {self.amplification:.3g}; take a step below {self.stable_step:.3g} "
             "s or leave step out for a method that chooses it"
         )
+
+    def blamed(self, message: str) -> str:
+        """Why a run failed, with the step named first where it is too long: what such a run runs
+        into says nothing of the scene."""
+        if self.warning is None:
+            return message
+        cause, *rest = message.split("; ")
+        after = "".join(f"; {part}" for part in rest if part.startswith("last good state"))
+        return f"{self.warning}; the run with it ended: {cause}{after}"
 
 
 def check_step(
@@ -88,7 +100,7 @@ def check_step(
     return StepCheck(
         settings.step, rate, settings.step * rate,
         float(abs(tableau.amplification(settings.step * value))), hinge.name,
-        _longest(tableau, value),
+        _longest(tableau, value), "flexible body" if hinge.name in layout.modal else "hinge",
     )  # fmt: skip
 
 

@@ -51,8 +51,10 @@ def demo(json: Json = False) -> None:
     scene, result_file, table_file, picture = _targets()
     kept = _write_scene(scene)
     result, seconds = _simulate(scene_text())
+    verdict = result.certificate.verdict()
     text = "\n".join([
-        ABOUT, "", f"{report.sizes(result)}", report.effort(result, seconds), "",
+        ABOUT, "", *report.verdict_lines(verdict, 80),
+        f"{report.sizes(result)}", report.effort(result, seconds), "",
         result.table(*TABLE, rows=11), "", *report.certificate_lines(result, 80),
     ])  # fmt: skip
     result.save(result_file)
@@ -65,7 +67,8 @@ def demo(json: Json = False) -> None:
         scene: "the scene" if kept is None else kept,
     } | ({} if picture is None else {picture: "a picture of it"})
     if json:
-        output.emit_json({**report.to_json(result, seconds), "files": [str(path) for path in made]})
+        data = report.to_json(result, seconds, verdict)
+        output.emit_json({**data, "files": [str(path) for path in made]})
         return
     output.say(text)
     output.say()

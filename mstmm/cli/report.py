@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mstmm.runtime.result import Result
+    from mstmm.runtime.verdict import Verdict
 
 
 def sizes(result: Result) -> str:
@@ -71,13 +72,15 @@ def default_panels(result: Result) -> list[str]:
     return [*default_pictures(result), *default_quantities(result)] or ["energy"]
 
 
-def to_json(result: Result, seconds: float) -> dict[str, Any]:
+def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
     """The outcome of a run without its samples, which are in the file."""
     layout = result.model.layout
     last = len(result.t) - 1
     counted = result.statistics
     return {
         "success": result.success,
+        "trusted": verdict.trusted,
+        "verdict": str(verdict),
         "status": "interrupted" if result.status is None else result.status.name.lower(),
         "message": result.message,
         "t": float(result.t[last]) if last >= 0 else None,
@@ -113,10 +116,15 @@ def _certificate(result: Result) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def verdict_lines(verdict: Verdict, width: int) -> list[str]:
+    """The verdict, folded to the width of the terminal."""
+    return textwrap.wrap(str(verdict).replace("certify=True", "--certify"), max(width, 40))
+
+
 def certificate_lines(result: Result, width: int) -> list[str]:
     """What vouches for a result, and every warning, folded to the width of the terminal."""
     certificate = result.certificate
-    lines = str(certificate).replace("certify=True", "--certify").splitlines()
+    lines = certificate.text(verdict=False).replace("certify=True", "--certify").splitlines()
     found = [w for w in result.warnings if w not in certificate.warnings]
     lines += [f"note: {warning}" for warning in found]
     return [part for line in lines for part in _folded(line, width)]

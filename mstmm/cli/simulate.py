@@ -22,6 +22,7 @@ from .progress import Bar, bar
 if TYPE_CHECKING:
     from mstmm.runtime.model import Model
     from mstmm.runtime.result import Result
+    from mstmm.runtime.verdict import Verdict
     from mstmm.scene import Scene
 
 RESULTS = (".nc", ".csv")
@@ -54,6 +55,7 @@ class Plan:
     sweep: str = "riccati"
     engine: str = "auto"
     flexibility: str | None = None
+    accuracy: float | None = None
 
     @property
     def checkpoint(self) -> Path:
@@ -128,6 +130,11 @@ def simulate(
         typer.Option("--flexibility", metavar="LEVEL", help="coupled, one-way, or rigid: level of "
                      "model of all flexible bodies; by default as the scene says."),
     ] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option("--accuracy", metavar="X", parser=positive, help="Error up to which the "
+                     "result counts as trusted: rad, or part of the motion (0.01)."),
+    ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -135,7 +142,7 @@ def simulate(
         scene, t_end, method, step, rtol, atol, times,
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
-        tuple(quantity or ()), certify, resume, sweep, engine, flexibility,
+        tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -151,7 +158,8 @@ def simulate(
         result = _run(plan, model, progress)
         seconds = time.perf_counter() - begin
         result.save(plan.output)
-        if result.success and (seconds < SHORT if plan.certify is None else plan.certify):
+        run = result.trajectory
+        if run.success and (seconds < SHORT if plan.certify is None else plan.certify):
             result = certified(result, progress)
             result.save(plan.output)
     if plan.plot is not None:
@@ -304,7 +312,7 @@ def _report(plan: Plan, result: Result, seconds: float, json: bool) -> None:
 
     made = [str(path) for path in (plan.output, plan.plot) if path is not None]
     if json:
-        data = report.to_json(result, seconds)
+        data = report.to_json(result, seconds, _verdict(plan, result))
         data |= {"scene": plan.scene, "files": made}
         if interrupted(result):
             data["checkpoint"] = str(plan.checkpoint)
@@ -317,10 +325,17 @@ def _report(plan: Plan, result: Result, seconds: float, json: bool) -> None:
         output.complain(f"{plan.scene}: {result.message}; what was computed is in {plan.output}")
 
 
+def _verdict(plan: Plan, result: Result) -> Verdict:
+    given = result.certificate
+    return given.verdict() if plan.accuracy is None else given.verdict(plan.accuracy)
+
+
 def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
     from . import output, report
 
     console = output.console()
+    for line in report.verdict_lines(_verdict(plan, result), console.width):
+        output.say(line)
     output.say(f"{plan.scene}: {report.sizes(result)}, {result.model.engine} engine")
     output.say(report.effort(result, seconds))
     output.say(result.message)

@@ -37,6 +37,18 @@ def test_text_names_scene_steps_and_files(mstmm: Command) -> None:
     assert max(map(len, done.out.splitlines())) <= 80
 
 
+def test_the_verdict_comes_first(mstmm: Command) -> None:
+    command = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv", "--certify")
+    assert mstmm(*command).out.startswith("trusted: errors within 0.01 rad")
+    assert mstmm(*command, "--accuracy", "1e-15").out.startswith("NOT trusted: the error of q may")
+    unjudged = mstmm(*command[:-1], "--no-certify")
+    assert unjudged.out.startswith("not judged: no second run has told its error (--certify)")
+    assert unjudged.code == 0
+    data = json.loads(mstmm(*command, "--accuracy", "1e-15", "--json").out)
+    assert data["success"] and not data["trusted"]
+    assert data["verdict"].startswith("NOT trusted")
+
+
 def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> None:
     assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
     assert package.load_result(folder / "pendulum.nc").t[-1] == 0.1

@@ -91,6 +91,85 @@ def test_angular_momentum_about_a_vertical_pin() -> None:
     assert mstmm.compile(held).simulate(1.0).certificate.momentum == ()
 
 
+def top(center: float, **given: object) -> mstmm.Scene:
+    """A body on a ball, its centre of mass `center` metres from it along z."""
+    body = {"name": "top", "mass": 1.0, "inertia": [0.2, 0.2, 0.3],
+            "center_of_mass": [0, 0, center]}  # fmt: skip
+    ball = {"name": "ball", "type": "ball", "inboard": "ground", "outboard": "top",
+            "initial": {"u": [1.0, 2.0, 3.0]}, **given}  # fmt: skip
+    gravity = (0, 0, -9.81) if center else (0, 0, 0)
+    return mstmm.Scene(gravity=gravity, body=[body], hinge=[ball])
+
+
+def test_a_body_on_a_ball_keeps_its_angular_momentum() -> None:
+    """The ball carries nothing but rounding, against which nothing else can be judged."""
+    run = mstmm.compile(top(0.0)).simulate(2.0)
+    names = [d.name for d in run.certificate.momentum]
+    assert names == [f"angular momentum {axis}" for axis in "xyz"]
+    assert all(0 < d.relative < 1e-8 for d in run.certificate.momentum)
+    coarse = run.model.simulate(2.0, method="rk4", step=0.4)
+    assert any("angular momentum" in text and "not kept" in text for text in coarse.warnings)
+
+
+@pytest.mark.parametrize("place, about", [([0, 0, 0], ""), ([1.0, 2.0, 3.0], ' about "ball"')])
+def test_a_top_keeps_its_angular_momentum_about_the_vertical(
+    place: list[float], about: str
+) -> None:
+    run = mstmm.compile(top(0.3, position=place)).simulate(2.0)
+    (drift,) = run.certificate.momentum
+    assert drift.name == f"angular momentum z{about}"
+    assert 0 < drift.relative < 1e-8
+    assert drift.scale == pytest.approx(np.abs(run.angular_momentum()[0]).max(), rel=3)
+
+
+def test_a_load_along_a_beam_is_a_load() -> None:
+    """It changes the momentum of a beam that flies free, however it is written."""
+    beam = {"name": "pole", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 10.0,
+            "polar_inertia_per_length": 1e-4, "modes": {"y": 2}}  # fmt: skip
+    space = {"name": "space", "type": "free", "inboard": "ground", "outboard": "pole"}
+    load = {"on": "pole", "force_per_length": [0, 1.0, 0]}
+    scene = mstmm.Scene(gravity=(0, 0, 0), beam=[beam], hinge=[space], load=[load])
+    run = mstmm.compile(scene).simulate(0.5, rtol=1e-6)
+    assert run.certificate.momentum == ()
+    assert run.warnings == ()
+
+
+def test_one_sample_has_no_lines_of_momentum() -> None:
+    text = str(mstmm.compile(top(0.0)).simulate(2.0, output_times=[2.0]).certificate)
+    assert "energy balance       not determined: one sample" in text
+    assert "angular momentum" not in text
+
+
+# --- what the estimate covers ---------------------------------------------------------------------
+
+
+def test_the_table_says_what_a_spring_for_a_constraint_gives_by() -> None:
+    """A stiff spring holds the tip of a pinned rod."""
+    spring = {"name": "pin", "from": "ground", "to": "rod0.tip", "position": [1, 0.05, 0],
+              "law": {"stiffness": 1e4, "damping": 1e2}}  # fmt: skip
+    one = pins(1, [0.0]).model_dump(by_alias=True, exclude_unset=True)
+    run = mstmm.compile(mstmm.Scene.from_data(one | {"spring": [spring]})).simulate(
+        1.0, certify=True, rtol=1e-6
+    )
+    give = run.certificate.give
+    assert give is not None
+    assert give.spring == 'spring "pin"'
+    expected = np.linalg.norm(run.position("rod0.tip") - [1, 0.05, 0], axis=1).max()
+    assert give.largest == pytest.approx(expected)
+    assert f'the stiffest, spring "pin", by up to {expected:.1e} m' in str(run.certificate)
+    assert "what this covers" not in str(run.model.simulate(1.0).certificate)
+
+
+def test_the_give_of_an_elastic_hinge_is_seen_too() -> None:
+    mount = {"name": "mount", "type": "elastic", "inboard": "ground", "outboard": "rod",
+             "law": {"stiffness": [1e5, 1e5, 1e5, 1e3, 1e3, 1e3]}}  # fmt: skip
+    scene = mstmm.Scene(gravity=(0, -9.81, 0), body=[rod("rod")], hinge=[mount])
+    give = mstmm.compile(scene).simulate(0.5, rtol=1e-6).certificate.give
+    assert give is not None
+    assert give.spring == 'hinge "mount"'
+    assert 0.5 < give.largest / (9.81 / 1e5) < 4
+
+
 def test_quaternions_between_steps_are_settled_and_their_residual_kept() -> None:
     run = mstmm.compile(free_pair()).simulate(5.0, rtol=1e-4, output_times=np.linspace(0, 5, 50))
     lengths = np.linalg.norm(run.coordinate("ball"), axis=1)

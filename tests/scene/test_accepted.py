@@ -82,6 +82,29 @@ def test_unphysical_inertia_is_accepted_when_asked_and_warned_about(at: str) -> 
     assert warning.startswith('body "rod1": inertia: the principal moments [1, 1, 3] kg m^2')
 
 
+@pytest.mark.parametrize("inertia", [[1, 1, -1], [1, 1, 1, 2, 0, 0]])
+def test_negative_moments_are_accepted_when_asked_and_warned_about(inertia: list[float]) -> None:
+    data = changed(one(), "body", 0, "inertia", to=inertia)
+    (warning,) = Scene(**data, allow_unphysical_inertia=True).warnings
+    assert warning.startswith('body "rod1": inertia: the principal moments [-1, 1, ')
+    assert warning.endswith("kg m^2 are not all positive; accepted as asked")
+
+
+def test_rounding_below_zero_counts_as_zero_and_is_said_once() -> None:
+    """As programs for drawing write the inertia of thin parts."""
+    dusty = [{**one()["body"][0], "name": f"rod{k}", "inertia": [-5e-20, 1e-3, 1e-3]}
+             for k in range(3)]  # fmt: skip
+    hinges = [{"name": f"pin{k}", "type": "pin", "inboard": "ground", "outboard": f"rod{k}"}
+              for k in range(3)]  # fmt: skip
+    scene = Scene(gravity=(0, 0, 0), body=dusty, hinge=hinges)
+    assert scene.warnings == (
+        'body "rod0": inertia: -5e-20 kg m^2 is rounding and counts as zero (and 2 more likewise)',
+    )
+    assert scene.body[0].inertia_matrix[0][0] == 0.0
+    (small,) = Scene(**changed(one(), "body", 0, "inertia", to=[-5e-20] * 3)).warnings
+    assert "counts as zero" in small
+
+
 def test_an_inertia_is_judged_free_of_its_axes(rng: np.random.Generator) -> None:
     for _ in range(20):
         basis = np.linalg.qr(rng.normal(size=(3, 3)))[0]

@@ -54,6 +54,79 @@ def test_undetermined_motion_names_the_hinge(name: str) -> None:
         compiled(UNDETERMINED[name])
 
 
+def test_every_hinge_concerned_is_named_with_a_rotor_as_a_remedy() -> None:
+    """Thin rods on balls behind a sound one; and the rotors do help."""
+    scene = chain(["pin", "ball", "ball", "ball"])
+    for k in (1, 2, 3):
+        scene["body"][k]["inertia"] = [0, ROD, ROD]
+    with pytest.raises(mstmm.SceneError) as caught:
+        compiled(scene)
+    text = str(caught.value)
+    assert 'hinges "hinge1", "hinge2" and "hinge3" at t = 0 s' in text
+    assert "law.inertia" in text
+    for k in (1, 2, 3):
+        scene["hinge"][k]["law"] = {"inertia": 1e-3}
+    model = compiled(scene)
+    assert np.isfinite(model.accelerations(*model.initial_state())).all()
+
+
+def test_of_many_hinges_some_are_named() -> None:
+    body = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0, ROD, ROD],
+            "ends": {"tip": [1.0, 0, 0]}}  # fmt: skip
+    rope = {"name": "rope", "count": 200, "inboard": "ground", "body": body,
+            "hinge": {"type": "ball"}}  # fmt: skip
+    with pytest.raises(mstmm.SceneError, match=r'"rope\[\d+\]\.hinge" and more than 41 others'):
+        compiled({"gravity": (0, 0, 0), "chain": [rope]})
+
+
+# --- negative moments -----------------------------------------------------------------------------
+
+
+def _negative(kind: str, inertia: tuple[float, ...], **given: Any) -> Any:
+    scene = _tip(kind, inertia)
+    scene["body"][1]["allow_unphysical_inertia"] = True
+    scene["hinge"][1] |= given
+    return scene
+
+
+@pytest.mark.parametrize("inertia", [(-0.1, ROD, ROD), (ROD, ROD, ROD, 2 * ROD, 0, 0)])
+def test_negative_moments_run_where_every_pivot_holds(
+    inertia: tuple[float, ...], rng: np.random.Generator
+) -> None:
+    scene = _negative("pin", inertia)
+    q, u = drawn_state(scene, rng)
+    assert worst(compiled(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-12
+    run = compiled(scene).simulate(1.0, certify=True)
+    assert run.trusted
+    assert any("accepted as asked" in text for text in run.warnings)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        _negative("pin", (ROD, ROD, -0.3)),
+        _negative("ball", (-0.1, ROD, ROD)),
+        _negative("ball", (1.0, 1.0, 1.0, 1.0, 0, 1.2)),
+    ],
+    ids=["along an axis", "about the rod", "between the axes"],
+)
+def test_a_pivot_that_negative_moments_take_is_refused(scene: dict[str, Any]) -> None:
+    with pytest.raises(mstmm.SceneError, match=r'hinge "hinge1".*no positive inertia'):
+        compiled(scene)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4"])
+def test_a_pivot_that_goes_on_the_way_ends_the_run(method: str) -> None:
+    """The drive draws the tip in until its negative moment takes all of the pin's inertia."""
+    scene = _negative("prismatic", (ROD, ROD, -0.5), axis=[1, 0, 0], drive="1 - 3*t")
+    scene["body"][0] |= {"mass": 0.01, "inertia": [0, 1e-3, 1e-3]}
+    step = 0.05 if method == "rk4" else None
+    result = compiled(scene).simulate(1.0, method, step=step)
+    assert not result.success
+    assert "hinge0" in result.message
+    assert 0.5 < result.t[-1] < 0.65  # (2.5 - 3 t)^2 + 1e-3 + 0.01/4 = 0.5
+
+
 def test_nearly_nothing_counts_as_nothing() -> None:
     """A relative pivot of 1e-16 is rounding, not inertia."""
     with pytest.raises(mstmm.SceneError, match=r'hinge "hinge1".*undetermined'):

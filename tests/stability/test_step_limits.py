@@ -79,3 +79,24 @@ def test_an_adaptive_run_takes_the_stiff_spring() -> None:
     expected = 1e-3 * np.cos(np.sqrt(1e6 / MU) * times)
     assert np.abs(result.q[:, 0] - expected).max() < 1e-11
     assert not result.warnings
+
+
+@pytest.mark.parametrize("hinge", ["fixed", "pin"])
+def test_a_failure_of_a_step_that_is_too_long_is_put_down_to_the_step(hinge: str) -> None:
+    """What such a run runs into says nothing of the scene; and a beam is not called a hinge."""
+    beam = {"name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
+            "modes": {"y": 3}}  # fmt: skip
+    holds = {"name": "wall", "type": hinge, "inboard": "ground", "outboard": "rod"}
+    tip = {"name": "tip", "mass": 0.1, "inertia": [1e-4, 1e-4, 1e-4]}
+    weld = {"name": "weld", "type": "fixed", "inboard": "rod.tip", "outboard": "tip"}
+    scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[beam], body=[tip], hinge=[holds, weld])
+    model = mstmm.compile(scene)
+    fine = model.simulate(0.01, method="rk4", step=1e-5).certificate.step
+    assert fine is not None
+    result = model.simulate(5.0, method="rk4", step=39 * fine.stable_step)
+    assert not result.success
+    assert result.message.startswith("step = ")
+    assert 'flexible body "rod"' in result.message
+    assert "last good state at t =" in result.message
+    assert "split the body" not in result.message
+    assert "shapes" not in result.message

@@ -80,6 +80,10 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
         made, said = in_frame(data, choice.direction, shapes, choice.frame)
         modes += made
         notes += [_described(choice, len(made)), *said]
+    if any(c.frame.kind != "tangent" and c.direction in held.turns for c in chosen):
+        notes.append(
+            f'the angle of {held.said} is that of the section "{held.name}", not of the frame'
+        )
     frames = [c.frame for c in chosen]
     shapes_all = BeamShapes(
         data, tuple(modes), beam.stiffening, {c.direction: c.frame for c in chosen}

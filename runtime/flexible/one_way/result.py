@@ -98,10 +98,9 @@ class OneWayResult(Result):
             raise SceneError(f'"{body}": expected a body that responds one way: {", ".join(found)}')
         return found[body]
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
+    def _outside(self) -> tuple[str, ...]:
         """As of any result, and where the response is not to be trusted."""
-        found = (*super().warnings, *self._one_way.warnings, *_let_go(self.model))
+        found = (*super()._outside(), *self._one_way.warnings, *_let_go(self.model))
         return (*found, *map(_too_coupled, self.couplings.items()))
 
     @cached_property

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.scene_lines import lines
+
 from . import estimators as e
 from .coupling import couplings
 from .observe import elastic_moment
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: What brings a warning: slope, load ratio of a linear beam and spin in first frequencies, bending
-#: energy that the shapes miss, coupling error, shear, rotation of a section (rad), buckling.
-SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9
+#: energy that the shapes miss, shear, rotation of a section (rad), buckling, strain.
+SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
 
 #: Samples that are looked at, and flexible bodies of a scene.
 SAMPLES, LARGEST = 160, 400
@@ -52,6 +54,8 @@ class Flexibility:
             and this mode.
         shear: error of the highest bending frequency without shear (and rotary inertia), None where
             the section's radius of gyration is not known.
+        strain: largest strain of its axis and, where the radius of gyration is known, of its
+            outermost fibres; None where it has no length.
         said: what is known of the body's model before it moves, one sentence each.
     """
 
@@ -68,12 +72,19 @@ class Flexibility:
     tail: float | None
     coupling: tuple[float, str] | None
     shear: float | None
+    strain: float | None = None
     said: tuple[str, ...] = ()
 
     @property
     def frame_error(self) -> float:
         """kappa^2 / 2, at most 1: what one frame may err by, as a part of the deflection."""
         return min(self.slope**2 / 2, 1.0)
+
+    @property
+    def shortening_error(self) -> float:
+        """kappa^2: the same as a part of how far a bent body shortens, which goes with the square
+        of its deflection and so errs by twice as much."""
+        return self.slope**2
 
     @property
     def load_ratio(self) -> float:
@@ -86,28 +97,35 @@ def flexibilities(flexible: FlexibleBodies) -> tuple[Flexibility, ...]:
     if not len(flexible.run.t) or not 0 < len(flexible.known) <= LARGEST:
         return ()
     shares = couplings(flexible)
-    return tuple(_one(flexible, name, shares.get(name)) for name in flexible.known)
+    welded = lines(flexible.model.scene)
+    return tuple(
+        _one(flexible, name, shares.get(name), welded[name].length if name in welded else None)
+        for name in flexible.known
+    )
 
 
-def _one(flexible: FlexibleBodies, name: str, coupling: Array | None) -> Flexibility:
+def _one(
+    flexible: FlexibleBodies, name: str, coupling: Array | None, line: float | None
+) -> Flexibility:
     whole = flexible.motion(name)
     body, finite = whole.body, np.isfinite(whole.eta).all(axis=1)
+    bent_all = whole.some(finite)  # also where the rest of the motion cannot be evaluated
     finite &= np.isfinite(whole.etadd).all(axis=1) & np.isfinite(whole.acceleration).all(axis=1)
     good = np.flatnonzero(finite)
     bent = strain_energy(whole.some(good))
     picked = np.unique(np.linspace(0, len(good) - 1, min(SAMPLES, len(good))).astype(int))
     picked = np.union1d(picked, [int(np.argmax(bent))]) if len(good) else picked
     motion, some = whole.some(good), good[picked]
-    slope, shapes = e.largest_slope(motion), body.shapes
+    slope, shapes = e.largest_slope(bent_all), body.shapes
     first = float(frequencies(body)[0])
     judged = shapes is not None and slope > _STRAIGHT
     return Flexibility(
         name, len(body.modes), body.frame,
         bool(np.any(body.G)) if shapes is None else bool(shapes.stiffening),
-        slope, e.largest_turn(motion), first, e.cross_spin(motion) / first if first > 0 else 0.0,
+        slope, e.largest_turn(bent_all), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         _tail(flexible, name, some) if judged else None, _leading(motion, coupling),
-        e.shear_error(body), body.warnings,
+        e.shear_error(body, line), e.largest_strain(bent_all), body.warnings,
     )  # fmt: skip
 
 
@@ -178,11 +196,15 @@ def rows(found: Sequence[Flexibility]) -> list[tuple[str, str]]:
     steepest = max(found, key=lambda one: one.slope)
     fastest = max(found, key=lambda one: one.spin_ratio)
     loaded = max(found, key=lambda one: one.load_ratio)
+    strains = [one for one in found if one.strain is not None]
     parts = [
         ("largest slope", f'{steepest.slope:.2g} at "{steepest.name}"'),
         ("largest spin ratio", f'{fastest.spin_ratio:.2g} at "{fastest.name}"'),
         ("largest load ratio", f'{loaded.load_ratio:.2g} at "{loaded.name}"'),
     ]
+    if strains:
+        worst = max(strains, key=lambda one: one.strain or 0.0)
+        parts.append(("largest strain", f'{worst.strain:.1e} at "{worst.name}"'))
     tails = [one for one in found if one.tail is not None]
     if tails:
         worst = max(tails, key=lambda one: one.tail or 0.0)
@@ -191,7 +213,12 @@ def rows(found: Sequence[Flexibility]) -> list[tuple[str, str]]:
 
 
 def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
-    went = [f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e})"]
+    went = [
+        f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e} of the deflection, "
+        f"{one.shortening_error:.0e} of the shortening)"
+    ]
+    if one.strain is not None:
+        went.append(f"strain {one.strain:.1e}")
     went.append(f"spin {one.spin_ratio:.2g} of omega_1 = {one.first_frequency:.4g} rad/s")
     if one.gamma is not None:
         low, high = one.gamma
@@ -212,7 +239,7 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
 
 def warnings(found: Sequence[Flexibility]) -> list[str]:
     """What speaks against the model, one sentence per kind, for the worst body of each."""
-    kinds = (_linear, _steep, _turned, _missed, _buckled, _sheared)
+    kinds = (_linear, _steep, _turned, _strained, _missed, _buckled, _sheared)
     sentences = []
     for kind in kinds:
         said = [text for text in map(kind, _worst_first(found)) if text]
@@ -250,8 +277,18 @@ def _steep(one: Flexibility) -> str:
         return ""
     return (
         f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{SLOPE:g} one frame is too little (error up to {one.frame_error:.0%}): split the body "
-        "into welded parts"
+        f"{SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the deflection, "
+        f"{min(one.shortening_error, 9.99):.0%} of the shortening): split the body into welded "
+        "parts"
+    )
+
+
+def _strained(one: Flexibility) -> str:
+    if one.strain is None or one.strain <= STRAIN:
+        return ""
+    return (
+        f'"{one.name}" is strained by {one.strain:.2g}; beyond {STRAIN:g} the model, which is '
+        "linear in the strain, has no meaning: check stiffness and loads"
     )
 
 

@@ -7,6 +7,7 @@ shapes could not follow, coupling chi, shear.  Thresholds and reasons stand besi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from .observe import Motion, tilde, turns, values_at
 from .observe_energy import modal_energy
 
 if TYPE_CHECKING:
+    from ..beam.beam_shapes import BeamShapes
     from ..modal_body import ModalBody
 
 Array = NDArray[np.float64]
@@ -143,21 +145,70 @@ def bends(body: ModalBody, plane: str) -> bool:
     return any(name.startswith(plane) for name in body.modes)
 
 
-def shear_error(body: ModalBody) -> float | None:
+def gyration_radii(shapes: BeamShapes, x: Array) -> Array:
+    """(3, m) radii of gyration in m of the sections at x, about their y and z axes in rows 1 and 2;
+    zero where they are not known.
+
+    From rotary inertia, else from E I / E A, else from half the polar inertia.
+    """
+    s = shapes.sections(x)
+    radii = np.sqrt(s.rho_I / s.mass_per_length)
+    if not shapes.data.rotary:
+        for row, bending in ((1, s.EI_y), (2, s.EI_z)):
+            known = s.EA > 0
+            radii[row, known] = np.sqrt(bending[known] / s.EA[known])
+    return np.asarray(radii)
+
+
+def largest_strain(motion: Motion) -> float | None:
+    """Largest strain of a beam: |s'| of its axis, and of the outermost fibre sqrt(3) r |curvature|
+    where the radius of gyration r is known, as of a rectangle.
+
+    Of another body the stretch of the lines between its ends, over their lengths.  None where
+    neither is known.
+    """
+    body = motion.body
+    if body.shapes is None:
+        return _stretch_of_lines(motion)
+    x = np.linspace(0.0, body.shapes.length, SECTIONS)
+    at, radii = values_at(body.shapes, x), gyration_radii(body.shapes, x)
+    if not at.stretch.any() and not radii[1:].any():
+        return None
+    strain = np.abs(np.einsum("mk,tk->tm", at.stretch, motion.eta))
+    for row in (1, 2):
+        bent = np.einsum("mk,tk->tm", at.curvature[:, row], motion.eta)
+        strain += np.sqrt(3.0) * radii[row] * np.abs(bent)
+    return float(np.max(strain, initial=0.0))
+
+
+def _stretch_of_lines(motion: Motion) -> float | None:
+    """Largest change of the distance of two ends along their line at rest, over that distance."""
+    found = []
+    for a, b in combinations(motion.body.ports.values(), 2):
+        line = b.position - a.position
+        square = float(line @ line)
+        if square > 0:
+            stretch = np.einsum("a,ak,tk->t", line, b.phi - a.phi, motion.eta) / square
+            found.append(float(np.max(np.abs(stretch), initial=0.0)))
+    return max(found, default=None)
+
+
+def shear_error(body: ModalBody, line: float | None = None) -> float | None:
     """Relative error of the highest bending frequency of a beam for want of shear (and of rotary
     inertia where the model has none); None where the section's radius of gyration is not known.
 
     1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the highest
-    shape in 1/m, r the radius of gyration in m; the 1 is rotary inertia.
+    shape in 1/m, r the radius of gyration in m; the 1 is rotary inertia.  `line` (m) is the length
+    of the beams that are welded in line with it: as many shapes are judged on all of that.
     """
     shapes = body.shapes
     if shapes is None:
         return None
     x, weights = shapes.rule()
-    sections, worst = shapes.sections(x), None
+    worst = None
     for plane, about in (("y", 2), ("z", 1)):
         bent = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
-        gyration = np.sqrt(np.max(sections.rho_I[about] / sections.mass_per_length))
+        gyration = float(np.max(gyration_radii(shapes, x)[about]))
         if not bent or not gyration > 0:
             continue
         phi, bending = (
@@ -165,8 +216,9 @@ def shear_error(body: ModalBody) -> float | None:
             values_at(shapes, x).curvature[:, about],
         )
         squares = (weights @ bending[:, bent] ** 2) / (weights @ phi[:, bent] ** 2)
-        fourth = np.max(squares)  # int phi''^2 / int phi^2 = beta^4
-        error = 0.5 * np.sqrt(fourth) * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
+        wave = np.sqrt(np.max(squares))  # int phi''^2 / int phi^2 = beta^4
+        wave *= (shapes.length / line) ** 2 if line else 1.0
+        error = 0.5 * wave * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
         worst = max(worst or 0.0, float(error))
     return worst
 

@@ -1,0 +1,75 @@
+"""How far springs give way: what an estimate of the error of a run does not count as one.
+
+A stiff spring often stands for a constraint.  To the equations it is a spring like any other, so
+that what it gives by is part of their solution, however accurate the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from mstmm.scene import Spring
+
+    from .result import Result
+
+Array = NDArray[np.float64]
+
+#: Springs of a scene up to which they are looked at.
+_MOST = 200
+
+
+@dataclass(frozen=True)
+class Give:
+    """The stiffest spring of a scene: how far its ends were from its rest length, at most.
+
+    Attributes:
+        spring: in words, 'spring "loop"' or 'hinge "mount"'.
+        stiffness: N/m.
+        largest: m, over the samples.
+    """
+
+    spring: str
+    stiffness: float
+    largest: float
+
+
+def stiffest(result: Result) -> Give | None:
+    """Of the springs between ends and the elastic hinges; None where there is none, where nothing
+    was sampled, and for scenes of very many."""
+    scene = result.model.scene
+    springs = [s for s in scene.spring if s.type == "spring" and s.law.stiffness > 0]
+    mounts = [h for h in scene.hinge if h.type == "elastic"]
+    if not len(result.t) or not 0 < len(springs) + len(mounts) <= _MOST:
+        return None
+    stiff = max(springs, key=lambda s: s.law.stiffness, default=None)
+    found: list[Give] = []
+    if stiff is not None:
+        found.append(Give(f'spring "{stiff.name}"', stiff.law.stiffness, _stretch(result, stiff)))
+    for mount in mounts:
+        entries = [mount.law.entry(k) for k in range(3)]
+        if any(e.stiffness > 0 for e in entries):
+            away = result.coordinate(mount.name)[:, :3] - [e.rest for e in entries]
+            stiffness = max(e.stiffness for e in entries)
+            held = away[:, [e.stiffness > 0 for e in entries]]
+            found.append(Give(f'hinge "{mount.name}"', stiffness, _largest(held)))
+    return max(found, key=lambda give: give.stiffness, default=None)
+
+
+def _stretch(result: Result, spring: Spring) -> float:
+    """Largest |length - rest| in m."""
+    ends = [
+        np.array(spring.position) if end == "ground" else result.position(end)
+        for end in (spring.from_, spring.to)
+    ]
+    between = np.asarray(ends[1] - ends[0])
+    return _largest((np.linalg.norm(between, axis=1) - spring.law.rest)[:, None])
+
+
+def _largest(rows: Array) -> float:
+    lengths = np.linalg.norm(rows, axis=1)
+    return float(np.max(lengths[np.isfinite(lengths)], initial=0.0))
