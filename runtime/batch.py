@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+from mstmm.errors import NumericalFailure, UndeterminedMotion
 
+from .arrays import threads_of
 from .engine import UNDETERMINED, Engine
 from .fused import FusedLibrary
 from .fusing import Fusing
@@ -64,8 +65,6 @@ def accelerations(
     SceneError for an impossible number of threads; NumericalFailure, UndeterminedMotion naming the
     state and the hinge.
     """
-    if threads is not None and not (isinstance(threads, int) and threads >= 1):
-        raise SceneError(f"threads = {threads!r}: expected a whole number from 1 up, or None")
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
     if not states.lead and fusing.library is not None:
         failed = _one(engine, fusing.library, fusing.numbers, states, udot)
@@ -77,7 +76,7 @@ def accelerations(
             run = _lanes(engine, lanes, fusing.numbers, states, udot)
             step, least = lanes.lanes, _LEAST_LANES
         smallest = -(-least // max(1, engine.nu))
-        failed = in_threads(run, n, step, smallest, threads or processors())
+        failed = in_threads(run, n, step, smallest, threads_of(threads) or processors())
     if failed is not None:
         raise _error(engine, states, failed)
     _refuse_not_finite(engine, states, udot)

@@ -20,7 +20,7 @@ from mstmm.errors import EnvironmentFailure, SceneError
 from .files import replacing
 from .integrate import Samples
 from .provenance import kernels_hash
-from .simulate import Settings
+from .settings import Settings
 
 if TYPE_CHECKING:
     from .model import Model

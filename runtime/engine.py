@@ -5,13 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+from mstmm.errors import NumericalFailure, UndeterminedMotion
 
 from .pack import Packed
 
@@ -81,21 +80,6 @@ class Engine:
     def start_memory(self) -> Array:
         """Memory at the start: nothing released, no turns counted."""
         return np.zeros(max(1, self.packed.n_memory))
-
-    def batch(
-        self, name: str, value: ArrayLike, width: int, lead: tuple[int, ...] | None = None
-    ) -> Array:
-        """(n, width) contiguous copy of the last axis; SceneError for a misfit or a non-number."""
-        array = np.ascontiguousarray(np.asarray(value, dtype=np.float64))
-        if array.ndim == 0 or array.shape[-1] != width:
-            raise SceneError(f"{name} has shape {array.shape}, expected (..., {width})")
-        if lead is not None and array.shape[:-1] != lead:
-            array = np.ascontiguousarray(np.broadcast_to(array, (*lead, width)))
-        if not np.isfinite(array).all():
-            place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
-            where = f"{name}[{', '.join(map(str, place))}]"
-            raise SceneError(f"{where} = {array[place]}: expected a finite number")
-        return array.reshape(prod(array.shape[:-1]), width)
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None

@@ -17,7 +17,8 @@ import mstmm
 
 from .error_estimate import ErrorEstimate
 from .integrate import Statistics, Status
-from .simulate import Settings, Trajectory
+from .settings import Settings
+from .simulate import Trajectory
 
 if TYPE_CHECKING:
     from .model import Model

@@ -21,7 +21,8 @@ from .integrate import Statistics, Status
 from .layout import HingeSlots
 from .observed import Observed
 from .quantities import Quantities, Quantity
-from .simulate import Settings, Trajectory
+from .settings import Settings
+from .simulate import Trajectory
 from .stability import StepCheck
 
 if TYPE_CHECKING:

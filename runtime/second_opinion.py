@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from mstmm.errors import SceneError
 
 from .integrate import Samples, Statistics, Status
-from .simulate import SceneSystem, Settings, Trajectory, busiest, interruptible, split, tolerances
+from .settings import Settings
+from .simulate import SceneSystem, Trajectory, busiest, interruptible, split, tolerances
 
 if TYPE_CHECKING:
     from .model import Model

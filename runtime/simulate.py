@@ -20,6 +20,7 @@ from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
 from .layout import StateNames
 from .pack import resize
+from .settings import Settings
 from .steppers import get
 
 Array = NDArray[np.float64]
@@ -35,22 +36,6 @@ _QUATERNIONS = 2**18
 
 #: The work is a by-product of a run: it may err by this many times rtol of the energy.
 _WORK_TOLERANCE = 10.0
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`."""
-
-    t_end: float
-    t_start: float = 0.0
-    method: str = "dop853"
-    step: float | None = None
-    rtol: float = 1e-9
-    atol: float = 1e-12
-    output_times: tuple[float, ...] | None = None
-    max_step: float = 0.0
-    max_steps: int = 0
-    first_step: float = 0.0
 
 
 @dataclass(frozen=True)
