@@ -212,7 +212,10 @@ class Engine:
             )
         if reason == _FORCE:
             name = self.packed.scene.spring[element].name
-            return f'spring "{name}" {at}: its direction is undefined because its ends coincide'
+            return (
+                f'spring "{name}" {at}: its direction is undefined because its ends coincide; move '
+                "one of them, or put an elastic hinge in its place"
+            )
         if reason == _HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
         if reason == _SECTION:

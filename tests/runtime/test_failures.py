@@ -90,6 +90,17 @@ def test_a_run_into_a_state_in_which_a_motion_is_undetermined() -> None:
     assert not run.success and len(run.t) > 2 and np.isfinite(run.u).all()
 
 
+@pytest.mark.parametrize("method", ["dop853", "rk4", "scipy-DOP853", "scipy-RK45", "scipy-Radau"])
+def test_a_spring_whose_ends_coincide_at_the_start_is_named(method: str) -> None:
+    spring = {"name": "band", "from": "ground", "to": "rod0", "law": {"stiffness": 100.0}}
+    data = pins(1, [0.3]).model_dump(by_alias=True, exclude_unset=True) | {"spring": [spring]}
+    model = mstmm.compile(mstmm.Scene.from_data(data))
+    run = model.simulate(1.0, method=method, step=0.01 if method == "rk4" else None)
+    assert not run.success and run.status is Status.RHS_FAILED
+    assert 'spring "band" at t = 0 s' in run.message and "coincide; move one" in run.message
+    assert str(run.certificate) and len(run.t) == 1
+
+
 def test_success_is_never_said_of_numbers_that_are_not_finite() -> None:
     from dataclasses import replace
 
