@@ -8,7 +8,7 @@ from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from . import scene_flexible_checks, topology
+from . import scene_flexible_checks, scene_units, topology
 from .expression import Expression
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, flexible, problem_with
@@ -157,14 +157,14 @@ def _inertias(scene: Scene) -> Iterator[Problem]:
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
-    """What is accepted but worth knowing: inertias that no body can have, beams that are asked
-    for what they cannot do well."""
+    """What is accepted but worth knowing: inertias that no body can have, angles that look like
+    degrees, beams that are asked for what they cannot do well."""
     found = []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
             found.append(f"{name}: inertia: {excess}; accepted as asked")
-    return (*found, *scene_flexible_checks.warnings(scene))
+    return (*found, *scene_units.notes(scene), *scene_flexible_checks.warnings(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------
