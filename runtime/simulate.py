@@ -43,8 +43,8 @@ class Trajectory:
     """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
 
     q and u hold unit quaternions and exact driven coordinates; `norm_residual` is how far the
-    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state, which
-    output times may leave out.
+    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state and `start`
+    (q, u) at the beginning, which output times may leave out.
     """
 
     t: Array
@@ -61,6 +61,16 @@ class Trajectory:
     notes: tuple[str, ...] = field(default=())
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
+    start: tuple[Array, Array] | None = None
+
+    @property
+    def first(self) -> tuple[float, Array, Array]:
+        """(t, q, u) of the beginning; of the first sample where an older file knows no other."""
+        if self.start is not None:
+            return (self.settings.t_start, *self.start)
+        if not len(self.t):
+            raise SceneError("the file of this result does not tell how its run began")
+        return float(self.t[0]), self.q[0], self.u[0]
 
     @property
     def success(self) -> bool:
