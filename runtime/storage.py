@@ -17,7 +17,7 @@ from mstmm.scene import Scene
 
 from . import provenance, store
 from .dataset import MOST_SPEEDS, dataset, extra
-from .files import replacing
+from .files import refuse_special, replacing
 from .stability import check_step
 from .steppers import get
 
@@ -79,6 +79,7 @@ def _csv(result: Result, path: Path) -> None:
 
 def load(path: Path) -> Result:
     """A result from NetCDF; its scene is validated and compiled again."""
+    refuse_special(path, "result file")
     try:
         import h5netcdf  # noqa: F401
         import xarray
