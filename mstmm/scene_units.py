@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from .errors import ExpressionError
 from .expression import parse
@@ -68,9 +68,17 @@ def notes(scene: Scene) -> Iterator[str]:
         for k, table in enumerate(chain.hinge):
             yield from _of_hinge(f'hinge {k + 1} of chain "{chain.name}"', table)
         yield from _of_angles(f'chain "{chain.name}": orientation', chain.orientation or ())
-    for body in (*scene.body, *scene.beam, *scene.elastic):
-        for name, end in body.ends.items():
-            yield from _of_angles(f'"{body.name}.{name}": orientation', end.orientation)
+    for body in scene.body:
+        yield from _of_ends(body.name, body.ends)
+    for beam in scene.beam:
+        yield from _of_ends(beam.name, beam.ends)
+    for elastic in scene.elastic:
+        yield from _of_ends(elastic.name, elastic.ends)
+
+
+def _of_ends(owner: str, ends: Mapping[str, Any]) -> Iterator[str]:
+    for name, end in ends.items():
+        yield from _of_angles(f'"{owner}.{name}": orientation', end.orientation)
 
 
 def _of_hinge(name: str, hinge: HingeTable) -> Iterator[str]:
@@ -78,7 +86,7 @@ def _of_hinge(name: str, hinge: HingeTable) -> Iterator[str]:
     kind = HINGE_TYPES.get(hinge.type)
     if kind is None or kind.quaternion is not None:
         return
-    start = () if hinge.initial is None else hinge.initial.q
+    start = () if hinge.initial is None else hinge.initial.q or ()
     for k, coordinate in enumerate(kind.coordinates):
         if coordinate.unit != "rad":
             continue

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.errors import NumericalFailure, UndeterminedMotion
+from mstmm.errors import NumericalFailure
 
 from .arrays import threads_of
-from .engine import UNDETERMINED, Engine
+from .engine import Engine
 from .fused import FusedLibrary
 from .fusing import Fusing
 
@@ -156,9 +156,9 @@ def _looped(engine: Engine, states: States, udot: Array) -> Callable[[int, int],
 
 
 def _error(engine: Engine, states: States, failed: Failed) -> NumericalFailure:
-    kind = UndeterminedMotion if int(failed.failure.reason) == UNDETERMINED else NumericalFailure
-    text = engine.failure_text(failed.failure, float(states.t[failed.index]))
-    return kind(_named(states.lead, failed.index) + text)
+    i = failed.index
+    error = engine.failed(failed.failure, float(states.t[i]), states.q[i], states.u[i])
+    return type(error)(f"{_named(states.lead, i)}{error}")
 
 
 def _named(lead: tuple[int, ...], index: int) -> str:
@@ -174,7 +174,7 @@ def _refuse_not_finite(engine: Engine, states: States, udot: Array) -> None:
         return
     row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
     name = engine.packed.layout.u_name(column)
-    raise NumericalFailure(
-        f"{_named(states.lead, row)}the acceleration of {name} is not finite "
-        f"at t = {states.t[row]:.9g} s"
-    )
+    raise engine.not_finite(
+        f"{_named(states.lead, row)}the acceleration of {name}",
+        float(states.t[row]), states.q[row], states.u[row],
+    )  # fmt: skip

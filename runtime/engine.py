@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
+from .culprit import culprit
 from .pack import Packed
 
 Array = NDArray[np.float64]
@@ -81,6 +83,17 @@ class Engine:
         """Memory at the start: nothing released, no turns counted."""
         return np.zeros(max(1, self.packed.n_memory))
 
+    @cached_property
+    def inertia_alone(self) -> Engine:
+        """The same tree without gravity, laws, drives and loads."""
+        model = self.ffi.new("mstmm_model *", self.packed.model[0])
+        for k in range(3):
+            model.gravity[k] = 0.0
+        model.n_laws = model.n_drives = model.n_values = 0
+        model.n_loads = model.n_forces = model.needs_pose = 0
+        model.product = self.ffi.NULL
+        return Engine(replace(self.packed, model=model))
+
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
     ) -> tuple[Array, Array]:
@@ -96,16 +109,28 @@ class Engine:
             self.pointer(qdot), self.pointer(udot), failure, at,
         )  # fmt: skip
         if code:
-            kind = UndeterminedMotion if code == UNDETERMINED else NumericalFailure
-            raise kind(self.failure_text(failure, float(times[at[0]])))
-        self._finite("acceleration", udot, times)
+            row = int(at[0])
+            raise self.failed(failure, float(times[row]), q[row], u[row])
+        if not np.isfinite(udot).all():
+            row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
+            name = self.packed.layout.u_name(column)
+            raise self.not_finite(f"the acceleration of {name}", float(times[row]), q[row], u[row])
         return qdot, udot
 
-    def _finite(self, what: str, array: Array, times: Array) -> None:
-        if not np.isfinite(array).all():
-            row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
-            name = self.packed.layout.u_name(column)
-            raise NumericalFailure(f"the {what} of {name} is not finite at t = {times[row]:.9g} s")
+    def failed(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
+        """The error of a state that cannot be evaluated: an expression's, else the element's."""
+        cause = culprit(self, t, q, u)
+        if cause:
+            return NumericalFailure(cause)
+        undetermined = int(failure.reason) == UNDETERMINED
+        return (UndeterminedMotion if undetermined else NumericalFailure)(
+            self.failure_text(failure, t)
+        )
+
+    def not_finite(self, what: str, t: float, q: Array, u: Array) -> NumericalFailure:
+        """The error of a state at which `what` is no number; names the expression behind it."""
+        cause = culprit(self, t, q, u)
+        return NumericalFailure(f"{what} is not finite at t = {t:.9g} s{cause and ': '}{cause}")
 
     def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
         """Efforts (nu,) of one state that `udot` needs beyond the laws' own."""
@@ -116,7 +141,10 @@ class Engine:
             self.pointer(memory), self.pointer(udot), self.pointer(efforts), failure,
         )  # fmt: skip
         if code:
-            raise NumericalFailure(self.failure_text(failure, t))
+            raise self.failed(failure, t, q, u)
+        if not np.isfinite(efforts).all():
+            name = self.packed.layout.u_name(int(np.argmin(np.isfinite(efforts))))
+            raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
     def probes(self, probes: Sequence[Probe]) -> Any:

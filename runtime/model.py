@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -181,7 +180,7 @@ class Model:
         return np.array(matrices).reshape(*lead, self.nu, self.nu)
 
     def _mass_matrix(self, q: Array) -> Array:
-        engine, still = self._static, np.zeros(self.nu)
+        engine, still = self._engine.inertia_alone, np.zeros(self.nu)
         memory = engine.start_memory()
         strained = engine.inverse_dynamics(0.0, q, still, still, memory)
         columns = [
@@ -190,18 +189,6 @@ class Model:
         ]
         matrix = np.array(columns).reshape(self.nu, self.nu).T
         return np.asarray((matrix + matrix.T) / 2)
-
-    @cached_property
-    def _static(self) -> Engine:
-        """The same tree without gravity, laws, drives and loads: inertia alone."""
-        packed, ffi = self._engine.packed, self._engine.ffi
-        model = ffi.new("mstmm_model *", packed.model[0])
-        for k in range(3):
-            model.gravity[k] = 0.0
-        model.n_laws = model.n_drives = model.n_values = 0
-        model.n_loads = model.n_forces = model.needs_pose = 0
-        model.product = ffi.NULL
-        return Engine(replace(packed, model=model))
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10

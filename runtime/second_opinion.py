@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from mstmm.errors import SceneError
 
+from .endings import busiest, cause_of
 from .integrate import Samples, Statistics, Status
 from .jacobian import Jacobian
 from .settings import Settings
-from .simulate import SceneSystem, Trajectory, busiest, interruptible, split, tolerances
+from .simulate import SceneSystem, Trajectory, interruptible, split, tolerances
 
 if TYPE_CHECKING:
     from .model import Model
@@ -185,7 +186,7 @@ class _Loop:
                 return np.array(self.last)
             if self.outputs is None:
                 self.sample(end, solver.y)
-            self.truth &= self.system.events(end, solver.y) >= 0
+            self.truth &= self.events(end, solver.y) >= 0
         return np.array(self.last)
 
     def refuse_start(self, y: Array) -> None:
@@ -236,20 +237,32 @@ class _Loop:
 
     def failed(self, y: Array, text: str | None) -> _Ended:
         at = f"last good state at t = {self.t:.9g} s"
-        if self.system.failure:
-            return _Ended(Status.RHS_FAILED, f"{self.system.failure}; {at}")
+        status = Status.RHS_FAILED if self.system.failure else Status.STEP_TOO_SMALL
+        cause = cause_of(self.system.scene, status, self.t, self.last, self.t)
+        if cause or self.system.failure:
+            return _Ended(status, f"{cause or self.system.failure}; {at}")
         if not np.isfinite(y).all():
             name = self.system.scene.components()[int(np.argmin(np.isfinite(y)))]
             return _Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
         text = (text or "the integrator failed").strip(". ")
         where = busiest(self.system.scene, self.t, self.last)
-        return _Ended(Status.STEP_TOO_SMALL, f"{text}; {at}{where}")
+        return _Ended(status, f"{text}; {at}{where}")
 
     # --- events ---------------------------------------------------------------------------------
 
+    def events(self, t: float, y: Array) -> Array:
+        """Conditions at a state; one that is not a number ends the run."""
+        found = self.system.events(t, y)
+        if np.isnan(found).any():
+            name = self.system.scene.event_names[int(np.argmax(np.isnan(found)))]
+            text = f"the condition of {name} is not a number at t = {t:.9g} s"
+            at = f"last good state at t = {self.t:.9g} s"
+            raise _Ended(Status.EVENT_FAILED, f"{text}; {at}")
+        return found
+
     def fire_here(self, y: Array) -> bool:
         """Fire what has become true at self.t; True if the integrator must start again."""
-        values = self.system.events(self.t, y)
+        values = self.events(self.t, y)
         self.truth &= values >= 0
         self.last = np.array(y)
         for i in np.flatnonzero((values >= 0) & ~self.truth):
@@ -276,9 +289,9 @@ class _Loop:
         if not len(self.truth):
             return None
         dense, left = solver.dense_output(), solver.t_old
-        false = self.system.events(left, dense(left)) < 0
+        false = self.events(left, dense(left)) < 0
         for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
-            values = self.system.events(right, dense(right))
+            values = self.events(right, dense(right))
             risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]
             if risen:
                 time, event = min((self.locate(dense, i, left, right), i) for i in risen)
@@ -292,7 +305,7 @@ class _Loop:
             middle = left + (right - left) / 2
             if not left < middle < right:
                 return right
-            if self.system.events(middle, dense(middle))[event] >= 0:
+            if self.events(middle, dense(middle))[event] >= 0:
                 right = middle
             else:
                 left = middle

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 from . import values
+from .endings import message_of
 from .engine import Engine, Probe
 from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
@@ -266,7 +267,7 @@ def trajectory(
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    message = _interrupted(run) if status is None else _message(system, run)
+    message = _interrupted(run) if status is None else message_of(system, run)
     return split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
@@ -340,26 +341,3 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
             engine.pointer(y),
         )  # fmt: skip
     return y, residual
-
-
-def _message(system: SceneSystem, run: Run) -> str:
-    failure = run.failure
-    if failure is not None and failure.status in (Status.RHS_FAILED, Status.EVENT_FAILED):
-        return (
-            system.engine.failure_text(system.run.failure, failure.time)
-            + f"; last good state at t = {run.t:.9g} s"
-        )
-    message = run.message(system.components(), system.event_names)
-    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
-    return message + (busiest(system, run.t, run.y) if work else "")
-
-
-def busiest(system: SceneSystem, t: float, y: Array) -> str:
-    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
-    engine = system.engine
-    q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
-    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
-    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
-    if not rates.any():
-        return ""
-    return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"

@@ -170,7 +170,8 @@ def _lanes_message(model: Model, library: FusedLibrary, system: SceneSystem, out
         return model._engine.failure_text(failure, outcome.fail_time) + last
     component = None if outcome.component < 0 else int(outcome.component)
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
-    return failure_text(failure, system.components()) + last
+    way_out = "simulate this one alone to learn the cause" if status is Status.NOT_FINITE else ""
+    return failure_text(failure, system.components(), cause=way_out) + last
 
 
 def _one_by_one(

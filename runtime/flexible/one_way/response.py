@@ -213,7 +213,7 @@ def _response(model: Model, body: ModalBody, grid: Cells, loads: Array, times: A
 def _start(model: Model, body: ModalBody, load: Array) -> tuple[Array, Array]:
     """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
     if _starts_static(model, body.name):
-        return np.linalg.solve(body.K, load), np.zeros(body.n)
+        return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
     return body.eta, body.etad
 
 
@@ -231,5 +231,5 @@ def _at_start(model: Model, run: Trajectory) -> dict[str, Response]:
         states = np.array(rows).reshape(len(rows), 3, body.n)
         eta, etad = states[:, 0], states[:, 1]
         forces = states[:, 2] - eta @ body.K.T - etad @ body.D.T
-        found[name] = Response(eta, etad, np.linalg.solve(body.Mff, forces.T).T)
+        found[name] = Response(eta, etad, np.asarray(np.linalg.solve(body.Mff, forces.T).T))
     return found
