@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import SceneError
+from mstmm.errors import NumericalFailure, SceneError
 
 from . import values
 from .endings import message_of
@@ -209,16 +209,35 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
 
 def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
     """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
-    engine, found = system.engine, np.full(len(start), settings.atol)
+    found = np.full(len(start), settings.atol)
     if system.with_power:
-        q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
-        at = np.array([settings.t_start])
-        seen = engine.observe(at, q[None], u[None], system.memory[None], parts=("sums",))
-        energy = float(np.abs(seen.sums[0, :3]).sum())
-        if not (np.isfinite(energy) and energy > 0):  # a state at fault is named by the run itself
-            energy = 1.0
+        energy = _energy(system, settings.t_start, start) or 1.0
         found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
     return found
+
+
+def _energy(system: SceneSystem, t: float, y: Array) -> float:
+    """Sum of the sizes of the energies of a state, J; 0 where the motion itself cannot be computed,
+    which the run will say.
+
+    Raises NumericalFailure where the motion can, but not what the state shows.
+    """
+    engine, memory = system.engine, system.memory[None]
+    q, u = y[None, : engine.nq].copy(), y[None, engine.nq : engine.nq + engine.nu].copy()
+    seen = engine.observe(np.array([t]), q, u, memory, parts=("sums",))
+    energy = float(np.abs(seen.sums[0, :3]).sum())
+    if np.isfinite(energy):
+        return energy
+    try:
+        engine.accelerations(t, q, u, memory.copy())
+    except NumericalFailure:
+        return 0.0
+    raise NumericalFailure(
+        seen.failures[0]
+        if seen.failures
+        else f"the energy at t = {t:.9g} s is not finite; see "
+        "whether masses, speeds and stiffnesses are of the size that was meant"
+    )
 
 
 @contextmanager

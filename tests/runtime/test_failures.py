@@ -101,6 +101,19 @@ def test_a_spring_whose_ends_coincide_at_the_start_is_named(method: str) -> None
     assert str(run.certificate) and len(run.t) == 1
 
 
+def test_a_start_that_cannot_be_shown_is_refused_by_its_own_reason() -> None:
+    """Bent so far that its tip turns by more than a section may: no matter of tolerances."""
+    beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
+            "modes": {"y": 1}, "initial": {"eta": [2.0]}}  # fmt: skip
+    root = {"name": "root", "type": "fixed", "inboard": "ground", "outboard": "blade.root"}
+    load = {"on": "blade.tip", "force": [0, 0.1, 0]}
+    scene = mstmm.Scene(gravity=(0, 0, -9.81), beam=[beam], hinge=[root], load=[load])
+    with pytest.raises(
+        mstmm.NumericalFailure, match=r'"blade\.tip" at t = 0 s: a section turns by'
+    ):
+        mstmm.compile(scene).simulate(0.1)
+
+
 def test_success_is_never_said_of_numbers_that_are_not_finite() -> None:
     from dataclasses import replace
 
