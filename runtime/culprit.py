@@ -1,4 +1,4 @@
-"""Which expression of a scene is not a number at a state, where motions are not either."""
+"""Which expression of a scene, or quaternion, makes the motion at a state no number."""
 
 from __future__ import annotations
 
@@ -30,9 +30,15 @@ _FARTHER, _FARTHEST = 4.0, 1e-9
 def culprit(engine: Engine, t: float, q: Array, u: Array) -> str:
     """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
 
-    q (nq,) and u (nu,) of one state.
+    q (nq,) and u (nu,) of one state.  A quaternion without length is named as well.
     """
-    scene = engine.packed.described
+    scene, layout = engine.packed.described, engine.packed.layout
+    for first in layout.quaternions:
+        if not np.linalg.norm(q[first : first + 4]) > 0:
+            return (
+                f"the quaternion that begins with {layout.q_name(int(first))} has no length at "
+                f"t = {t:.9g} s; no rotation is 1, 0, 0, 0"
+            )
     for where, drive in _drives(scene):
         for kind, number in zip(("", " speed", " acceleration"), motion_at(drive, t), strict=True):
             if not math.isfinite(number):

@@ -352,7 +352,8 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         some = y[first : first + rows]
         lengths = np.sqrt(np.sum(some[:, entries] ** 2, axis=2))
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
-        some[:, entries] /= lengths[:, :, None]
+        with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
+            some[:, entries] /= lengths[:, :, None]
     if engine.packed.model.n_drives:
         times, known = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(

@@ -90,6 +90,17 @@ def test_a_condition_that_is_not_a_number_ends_the_run_by_name(method: str) -> N
     assert "last good state at t = " in run.message
 
 
+def test_a_quaternion_of_zeros_is_named() -> None:
+    ball = {"name": "ball", "type": "ball", "inboard": "ground", "outboard": "rod"}
+    model = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[rod("rod")], hinge=[ball]))
+    words = "the quaternion that begins with ball.w has no length at t = 0 s; no rotation is 1, 0"
+    with pytest.raises(mstmm.NumericalFailure, match=words):
+        model.accelerations(np.zeros(4), np.zeros(3))
+    for method in ("dop853", "scipy-RK45"):
+        run = model.simulate(0.1, method=method, initial=(np.zeros(4), np.zeros(3)))
+        assert not run.success and words in run.message
+
+
 def test_a_motion_that_really_is_undetermined_blames_no_expression() -> None:
     thin = rod("rod") | {"inertia": [0, 1 / 12, 1 / 12]}
     ball = {"name": "ball", "type": "ball", "inboard": "ground", "outboard": "rod",
