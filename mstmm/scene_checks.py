@@ -8,7 +8,7 @@ from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from . import scene_flexible_checks, topology
+from . import scene_flexible_checks, scene_units, topology
 from .expression import Expression
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, flexible, problem_with
@@ -162,8 +162,8 @@ _ACCEPTED = "allow_unphysical_inertia = true"
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
-    """What is accepted but worth knowing: inertias that no body can have, beams that are asked
-    for what they cannot do well."""
+    """What is accepted but worth knowing: inertias that no body can have, angles that look like
+    degrees, beams that are asked for what they cannot do well."""
     found, dusty = [], []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
@@ -175,7 +175,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
         name, entry = dusty[0]
         more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
         found.append(f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}")
-    return (*found, *scene_flexible_checks.warnings(scene))
+    return (*found, *scene_units.notes(scene), *scene_flexible_checks.warnings(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------

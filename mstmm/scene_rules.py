@@ -18,6 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
 from .rotations import norm, unit
+from .scene_units import instead
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
@@ -152,9 +153,7 @@ def plain(value: Any) -> Any:
 def finite(value: Any, expected: str, *place: str | int) -> float:
     """A finite number, or Refused."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        hint = ""
-        if isinstance(value, str):
-            hint = "; write the number without quotes"
+        hint = instead(value) if isinstance(value, str) else ""
         raise refuse(f"expected {expected}, found {found(value)}{hint}", *place)
     try:
         result = float(value)

@@ -23,6 +23,7 @@ from .scene_rules import (
     plain,
     refuse,
 )
+from .scene_units import with_unit
 
 
 def name(expected: str, missing: str = "") -> Rule:
@@ -155,7 +156,7 @@ def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
     try:
         return expression.parse(value)
     except ExpressionError as error:
-        raise refuse(str(error), *place) from None
+        raise refuse(f"{error}{with_unit(value)}", *place) from None
 
 
 def quantity(value: Any, expected: str, *place: str | int) -> Expression:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+from mstmm.errors import NumericalFailure
 
-from .engine import UNDETERMINED, Engine
+from .arrays import threads_of
+from .engine import Engine
 from .fused import FusedLibrary
 from .fusing import Fusing
 
@@ -64,8 +65,6 @@ def accelerations(
     SceneError for an impossible number of threads; NumericalFailure, UndeterminedMotion naming the
     state and the hinge.
     """
-    if threads is not None and not (isinstance(threads, int) and threads >= 1):
-        raise SceneError(f"threads = {threads!r}: expected a whole number from 1 up, or None")
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
     if not states.lead and fusing.library is not None:
         failed = _one(engine, fusing.library, fusing.numbers, states, udot)
@@ -77,7 +76,7 @@ def accelerations(
             run = _lanes(engine, lanes, fusing.numbers, states, udot)
             step, least = lanes.lanes, _LEAST_LANES
         smallest = -(-least // max(1, engine.nu))
-        failed = in_threads(run, n, step, smallest, threads or processors())
+        failed = in_threads(run, n, step, smallest, threads_of(threads) or processors())
     if failed is not None:
         raise _error(engine, states, failed)
     _refuse_not_finite(engine, states, udot)
@@ -157,9 +156,9 @@ def _looped(engine: Engine, states: States, udot: Array) -> Callable[[int, int],
 
 
 def _error(engine: Engine, states: States, failed: Failed) -> NumericalFailure:
-    kind = UndeterminedMotion if int(failed.failure.reason) == UNDETERMINED else NumericalFailure
-    text = engine.failure_text(failed.failure, float(states.t[failed.index]))
-    return kind(_named(states.lead, failed.index) + text)
+    i = failed.index
+    error = engine.failed(failed.failure, float(states.t[i]), states.q[i], states.u[i])
+    return type(error)(f"{_named(states.lead, i)}{error}")
 
 
 def _named(lead: tuple[int, ...], index: int) -> str:
@@ -175,7 +174,7 @@ def _refuse_not_finite(engine: Engine, states: States, udot: Array) -> None:
         return
     row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
     name = engine.packed.layout.u_name(column)
-    raise NumericalFailure(
-        f"{_named(states.lead, row)}the acceleration of {name} is not finite "
-        f"at t = {states.t[row]:.9g} s"
-    )
+    raise engine.not_finite(
+        f"{_named(states.lead, row)}the acceleration of {name}",
+        float(states.t[row]), states.q[row], states.u[row],
+    )  # fmt: skip

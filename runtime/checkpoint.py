@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from mstmm.errors import EnvironmentFailure, SceneError
 
-from .files import replacing
+from .files import refuse_special, replacing
 from .integrate import Samples
 from .provenance import kernels_hash
-from .simulate import Settings
+from .settings import Settings
 
 if TYPE_CHECKING:
     from .model import Model
@@ -63,6 +63,7 @@ class Checkpoint:
 
     def load(self) -> tuple[State, Samples]:
         """State and samples.  SceneError if the file is no checkpoint, or one of another run."""
+        refuse_special(self.path, "checkpoint")
         try:
             with self.path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 data = {name: file[name] for name in file.files}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .fused import FusedLibrary
     from .integrate import Run
     from .model import Model
-    from .simulate import Settings
+    from .settings import Settings
 
 #: Evaluations after which the length of a run is foretold.
 _LOOK_AFTER = 2000

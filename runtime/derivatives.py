@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.hinge_types import HINGE_TYPES
 
+from .arrays import batch
 from .pack import pack
 from .seeded import slopes
 from .structure import structure_of
@@ -160,15 +161,13 @@ def derivatives(
     efforts: ArrayLike | None,
 ) -> Derivatives:
     """`Model.derivatives` of all states of a batch."""
-    lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
-    engine, nu = model._engine, model.nu
-    given = np.zeros(nu) if efforts is None else efforts
-    coordinates = engine.batch("q", q, model.nq, lead)
-    speeds = engine.batch("u", u, nu, lead)
-    extra = engine.batch("efforts", given, nu, lead)
-    times = np.broadcast_to(np.asarray(t, dtype=np.float64), lead).reshape(-1)
+    nu = model.nu
+    lead, (coordinates, speeds, times, extra) = batch(
+        ("q", q, model.nq), ("u", u, nu), ("t", t, None),
+        ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
+    )  # fmt: skip
     udot = model.accelerations(q, u, t, efforts)  # refuses states that have no accelerations
-    found = differentiation.at(times[:, None].copy(), coordinates, speeds, extra)
+    found = differentiation.at(times[:, None], coordinates, speeds, extra)
 
     def shaped(name: str, *shape: int) -> Array:
         return found[name].reshape(*lead, *shape)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from math import prod
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+from mstmm.errors import NumericalFailure, UndeterminedMotion
 
+from .culprit import culprit
 from .pack import Packed
 
 Array = NDArray[np.float64]
@@ -82,20 +83,16 @@ class Engine:
         """Memory at the start: nothing released, no turns counted."""
         return np.zeros(max(1, self.packed.n_memory))
 
-    def batch(
-        self, name: str, value: ArrayLike, width: int, lead: tuple[int, ...] | None = None
-    ) -> Array:
-        """(n, width) contiguous copy of the last axis; SceneError for a misfit or a non-number."""
-        array = np.ascontiguousarray(np.asarray(value, dtype=np.float64))
-        if array.ndim == 0 or array.shape[-1] != width:
-            raise SceneError(f"{name} has shape {array.shape}, expected (..., {width})")
-        if lead is not None and array.shape[:-1] != lead:
-            array = np.ascontiguousarray(np.broadcast_to(array, (*lead, width)))
-        if not np.isfinite(array).all():
-            place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
-            where = f"{name}[{', '.join(map(str, place))}]"
-            raise SceneError(f"{where} = {array[place]}: expected a finite number")
-        return array.reshape(prod(array.shape[:-1]), width)
+    @cached_property
+    def inertia_alone(self) -> Engine:
+        """The same tree without gravity, laws, drives and loads."""
+        model = self.ffi.new("mstmm_model *", self.packed.model[0])
+        for k in range(3):
+            model.gravity[k] = 0.0
+        model.n_laws = model.n_drives = model.n_values = 0
+        model.n_loads = model.n_forces = model.needs_pose = 0
+        model.product = self.ffi.NULL
+        return Engine(replace(self.packed, model=model))
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
@@ -112,18 +109,28 @@ class Engine:
             self.pointer(qdot), self.pointer(udot), failure, at,
         )  # fmt: skip
         if code:
-            text = self.failure_text(failure, float(times[at[0]]))
-            if code == UNDETERMINED:
-                raise UndeterminedMotion(text, int(failure.element))
-            raise NumericalFailure(text)
-        self._finite("acceleration", udot, times)
+            row = int(at[0])
+            raise self.failed(failure, float(times[row]), q[row], u[row])
+        if not np.isfinite(udot).all():
+            row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
+            name = self.packed.layout.u_name(column)
+            raise self.not_finite(f"the acceleration of {name}", float(times[row]), q[row], u[row])
         return qdot, udot
 
-    def _finite(self, what: str, array: Array, times: Array) -> None:
-        if not np.isfinite(array).all():
-            row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
-            name = self.packed.layout.u_name(column)
-            raise NumericalFailure(f"the {what} of {name} is not finite at t = {times[row]:.9g} s")
+    def failed(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
+        """The error of a state that cannot be evaluated: an expression's, else the element's."""
+        cause = culprit(self, t, q, u)
+        if cause:
+            return NumericalFailure(cause)
+        text = self.failure_text(failure, t)
+        if int(failure.reason) == UNDETERMINED:
+            return UndeterminedMotion(text, int(failure.element))
+        return NumericalFailure(text)
+
+    def not_finite(self, what: str, t: float, q: Array, u: Array) -> NumericalFailure:
+        """The error of a state at which `what` is no number; names the expression behind it."""
+        cause = culprit(self, t, q, u)
+        return NumericalFailure(f"{what} is not finite at t = {t:.9g} s{cause and ': '}{cause}")
 
     def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
         """Efforts (nu,) of one state that `udot` needs beyond the laws' own."""
@@ -134,7 +141,10 @@ class Engine:
             self.pointer(memory), self.pointer(udot), self.pointer(efforts), failure,
         )  # fmt: skip
         if code:
-            raise NumericalFailure(self.failure_text(failure, t))
+            raise self.failed(failure, t, q, u)
+        if not np.isfinite(efforts).all():
+            name = self.packed.layout.u_name(int(np.argmin(np.isfinite(efforts))))
+            raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
     def probes(self, probes: Sequence[Probe]) -> Any:
@@ -231,7 +241,10 @@ class Engine:
             )
         if reason == _FORCE:
             name = self.packed.scene.spring[element].name
-            return f'spring "{name}" {at}: its direction is undefined because its ends coincide'
+            return (
+                f'spring "{name}" {at}: its direction is undefined because its ends coincide; move '
+                "one of them, or put an elastic hinge in its place"
+            )
         if reason == _HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
         if reason == _SECTION:

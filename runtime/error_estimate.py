@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .layout import Layout
-from .simulate import Settings, Trajectory
+from .settings import Settings
+from .simulate import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from . import compiled_run, second_opinion
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .integrate import Run, Samples, Status
-from .simulate import SceneSystem, Settings, Trajectory, advance, make_run, trajectory
+from .settings import Settings
+from .simulate import SceneSystem, Trajectory, advance, make_run, trajectory
 from .stability import StepCheck, check_step
 from .steppers import get
 

@@ -1,4 +1,4 @@
-"""Writing files so that a reader never sees half of one."""
+"""Reading files that are files, and writing them so that a reader never sees half of one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from mstmm.errors import EnvironmentFailure
+from mstmm.errors import EnvironmentFailure, SceneError
+
+
+def refuse_special(path: Path, where: str) -> None:
+    """SceneError for a folder, a device or a named pipe, which a reader would wait on for ever.
+
+    A file that is missing is left to whoever opens it.
+    """
+    if os.path.exists(path) and not os.path.isfile(path):  # False where a folder is closed to us
+        raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
 
 
 @contextmanager

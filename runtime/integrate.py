@@ -318,13 +318,17 @@ class Run:
         )
 
     def message(
-        self, components: Sequence[str] | None = None, events: Sequence[str] | None = None
+        self,
+        components: Sequence[str] | None = None,
+        events: Sequence[str] | None = None,
+        cause: str = "",
     ) -> str:
         """The status as a sentence.
 
         Args:
             components: a name per component of y.
             events: a name per event.
+            cause: what is known to have made the numbers fail.
         """
         fail = self.failure
         if fail is None:
@@ -333,7 +337,10 @@ class Run:
                 Status.FINISHED: f"finished at t = {self.t:.9g} s",
                 Status.STOPPED: f"stopped by {event} at t = {self.t:.9g} s",
             }.get(self.status, f"running, t = {self.t:.9g} s")
-        return failure_text(fail, components, events) + f"; last good state at t = {self.t:.9g} s"
+        return (
+            failure_text(fail, components, events, cause)
+            + f"; last good state at t = {self.t:.9g} s"
+        )
 
     def state(self) -> dict[str, Array | Integers]:
         """The run as plain arrays {"real", "integer"}: everything a new process needs to continue
@@ -372,16 +379,24 @@ def _name(kind: str, index: int, names: Sequence[str] | None) -> str:
 
 
 def failure_text(
-    fail: Failure, components: Sequence[str] | None = None, events: Sequence[str] | None = None
+    fail: Failure,
+    components: Sequence[str] | None = None,
+    events: Sequence[str] | None = None,
+    cause: str = "",
 ) -> str:
     """One sentence for each failure, with a way out where there is one; names as in `message`."""
     what = _name("component", -1 if fail.component is None else fail.component, components)
     event = _name("event", -1 if fail.event is None else fail.event, events)
     at = f"at t = {fail.time:.9g} s"
     texts = {
-        Status.STEP_TOO_SMALL: f"step too small {at}: {what} has the largest error; the motion "
-        "may be singular or too stiff for an explicit method, or the tolerance too tight",
-        Status.NOT_FINITE: f"not finite {at}: {what}; a smaller step or tolerance may help",
+        Status.STEP_TOO_SMALL: f"step too small {at}: {what} has the largest error; "
+        + (
+            cause
+            or "the motion may be singular or too stiff for an explicit method, or the "
+            "tolerance too tight"
+        ),
+        Status.NOT_FINITE: f"not finite {at}: {what}; "
+        + (cause or "a smaller step or tolerance may help"),
         Status.RHS_FAILED: f"the equations of motion cannot be evaluated {at} (code {fail.code})",
         Status.ACCEPT_FAILED: f"the state cannot be accepted {at} (code {fail.code})",
         Status.EVENT_FAILED: f"an event condition cannot be evaluated {at} (code {fail.code})"

@@ -15,7 +15,8 @@ from mstmm.errors import SceneError
 from .engine import Engine
 from .fused import FusedLibrary
 from .integrate import Status
-from .simulate import SLICE, SceneSystem, Settings, interruptible
+from .settings import Settings
+from .simulate import SLICE, SceneSystem, interruptible
 from .steppers import get
 from .tableau_in_c import c_tableau
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +14,12 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import Scene
 
 from . import parameters as named_parameters
+from .arrays import batch, one, pair, real
 from .engine import Engine
 from .fusing import Fusing, NotFused
 from .layout import Layout, refuse_dense
 from .pack import Known, Packed, pack
-from .simulate import Settings
+from .settings import Settings, checked, times_of
 from .start import start_values
 
 if TYPE_CHECKING:
@@ -142,60 +142,49 @@ class Model:
         """
         from .batch import States, accelerations
 
-        lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1], np.shape(t))
-        engine = self._engine
-        states = States(
-            lead,
-            np.array(np.broadcast_to(np.asarray(t, dtype=np.float64), lead)).reshape(-1),
-            engine.batch("q", q, self.nq, lead),
-            engine.batch("u", u, self.nu, lead),
-            None if efforts is None else engine.batch("efforts", efforts, self.nu, lead),
-        )
-        return accelerations(engine, self.fusion, states, threads).reshape(*lead, self.nu)
+        extra = () if efforts is None else (("efforts", efforts, self.nu),)
+        lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
+        states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
+        return accelerations(self._engine, self.fusion, states, threads).reshape(*lead, self.nu)
 
     def inverse_dynamics(
-        self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: float = 0.0
+        self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: ArrayLike = 0.0
     ) -> Array:
-        """Efforts (nu,) beyond the laws' own that give `udot`; for driven coordinates the drive's.
+        """Efforts (..., nu) beyond the laws' own that give `udot`; for driven coordinates the
+        drive's.  q (..., nq), u and udot (..., nu), t (s).
 
-        Newton-Euler inverse dynamics over the tree, O(bodies).
+        Newton-Euler inverse dynamics over the tree, O(bodies).  Raises SceneError for a shape that
+        does not fit.
         """
         engine = self._engine
-        one = [
-            engine.batch(name, value, width)[0].copy()
-            for name, value, width in (
-                ("q", q, self.nq),
-                ("u", u, self.nu),
-                ("udot", udot, self.nu),
-            )
+        memory, nu = engine.start_memory(), self.nu
+        lead, (times, coordinates, speeds, rates) = batch(
+            ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
+        )
+        rows = [
+            engine.inverse_dynamics(float(at), a, b, c, memory)
+            for at, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
         ]
-        return engine.inverse_dynamics(t, one[0], one[1], one[2], engine.start_memory())
+        return np.array(rows).reshape(*lead, nu)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """Symmetric (nu, nu) mass matrix, kg, kg*m, kg*m2; driven coordinates as if free."""
+        """Symmetric (..., nu, nu) mass matrix at q (..., nq), kg, kg*m, kg*m2; driven coordinates
+        as if free.  Raises SceneError for a shape that does not fit."""
         refuse_dense(self.nu, "the mass matrix")
-        engine, still = self._static, np.zeros(self.nu)
-        coordinates = engine.batch("q", q, self.nq)[0].copy()
+        lead, (states,) = batch(("q", q, self.nq))
+        matrices = [self._mass_matrix(one_state) for one_state in states]
+        return np.array(matrices).reshape(*lead, self.nu, self.nu)
+
+    def _mass_matrix(self, q: Array) -> Array:
+        engine, still = self._engine.inertia_alone, np.zeros(self.nu)
         memory = engine.start_memory()
-        strained = engine.inverse_dynamics(0.0, coordinates, still, still, memory)
+        strained = engine.inverse_dynamics(0.0, q, still, still, memory)
         columns = [
-            engine.inverse_dynamics(0.0, coordinates, still, unit, memory) - strained
+            engine.inverse_dynamics(0.0, q, still, unit, memory) - strained
             for unit in np.eye(self.nu)
         ]
         matrix = np.array(columns).reshape(self.nu, self.nu).T
         return np.asarray((matrix + matrix.T) / 2)
-
-    @cached_property
-    def _static(self) -> Engine:
-        """The same tree without gravity, laws, drives and loads: inertia alone."""
-        packed, ffi = self._engine.packed, self._engine.ffi
-        model = ffi.new("mstmm_model *", packed.model[0])
-        for k in range(3):
-            model.gravity[k] = 0.0
-        model.n_laws = model.n_drives = model.n_values = 0
-        model.n_loads = model.n_forces = model.needs_pose = 0
-        model.product = ffi.NULL
-        return Engine(replace(packed, model=model))
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
@@ -207,8 +196,9 @@ class Model:
         """
         from .equilibrium import equilibrium
 
-        start = self.initial_state()[0] if q is None else self._engine.batch("q", q, self.nq)[0]
-        return equilibrium(self, start, t, tolerance)
+        instead = "call equilibrium for each of several"
+        start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
+        return equilibrium(self, start, real("t", t, "a time in s"), real("tolerance", tolerance))
 
     def derivatives(
         self,
@@ -292,16 +282,17 @@ class Model:
         """
         from .result import simulate
 
-        times = None
-        if output_times is not None:
-            times = tuple(float(x) for x in np.atleast_1d(np.asarray(output_times, dtype=float)))
-        if not isinstance(t_end, (int, float)) or not np.isfinite(t_end) or t_end < t_start:
-            raise SceneError(f"t_end = {t_end!r}: expected a time in s, not before t_start")
-        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step, max_steps)
-        q, u = self.initial_state() if initial is None else initial
+        settings = checked(
+            Settings(
+                t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
+                max_steps,
+            )
+        )  # fmt: skip
+        q, u = self.initial_state() if initial is None else pair("initial", initial)
+        instead = "simulate_batch takes many"
         return simulate(
-            self, settings, self._engine.batch("q", q, self.nq)[0],
-            self._engine.batch("u", u, self.nu)[0],
+            self, settings, one("initial q", q, self.nq, instead),
+            one("initial u", u, self.nu, instead),
             certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
         )  # fmt: skip
 
@@ -337,14 +328,15 @@ class Model:
 
         Raises SceneError for settings, shapes or parameters that make no sense.
         """
-        from .simulate_batch import checked, simulate_batch
+        from .simulate_batch import prepared, simulate_batch
 
-        times = None if output_times is None else tuple(np.ravel(output_times).tolist())
-        if not np.isfinite(t_end) or not t_end > t_start:
-            raise SceneError(f"t_end = {t_end!r}: expected a time in s, after t_start")
-        settings = Settings(t_end, t_start, method, step, rtol, atol, times, max_step, max_steps)
-        settings, q, u = checked(self, settings, initial_states)
-        return simulate_batch(self, settings, q, u, parameters or {}, threads)
+        settings = Settings(
+            t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps
+        )
+        settings, q, u = prepared(self, settings, initial_states)
+        return simulate_batch(
+            self, settings, q, u, {} if parameters is None else parameters, threads
+        )
 
 
 __all__ = ["Model", "NumericalFailure"]

@@ -15,6 +15,8 @@ from typing import Any
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
+from .arrays import by_name, real
+
 TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
@@ -65,7 +67,8 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """
     data = _data(scene)
     known: dict[str, float] | None = None
-    for path, value in changes.items():
+    for path, given in by_name("parameters", changes).items():
+        value = real(f'parameter "{path}"', given)
         if not _set(data, path, value):
             known = known or read(scene)
             raise _unknown(path, known)

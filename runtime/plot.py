@@ -69,6 +69,8 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
         from matplotlib.figure import Figure
     except ImportError as error:
         raise extra("plot", "a picture", error) from None
+    if not len(result.t):
+        raise SceneError("there is nothing to plot: the run has no sample; ask for other times")
     panels = _panels(result, names)
     if not panels:
         raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")

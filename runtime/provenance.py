@@ -17,7 +17,8 @@ import mstmm
 
 from .error_estimate import ErrorEstimate
 from .integrate import Statistics, Status
-from .simulate import Settings, Trajectory
+from .settings import Settings
+from .simulate import Trajectory
 
 if TYPE_CHECKING:
     from .model import Model
@@ -102,6 +103,9 @@ def variables(result: Result) -> dict[str, Variable]:
         found["last_t"] = ((), run.last[0], about)
         found["last_q"] = (("coordinate",), run.last[1], {"long_name": "q of the last good state"})
         found["last_u"] = (("speed",), run.last[2], {"long_name": "u of the last good state"})
+    if run.start is not None:
+        for name, values, of in zip("qu", run.start, ("coordinate", "speed"), strict=True):
+            found[f"start_{name}"] = ((of,), values, {"long_name": f"{name} at the beginning"})
     found |= _error(result.certificate.error)
     if run.settings.output_times is not None:
         times = np.array(run.settings.output_times)
@@ -158,7 +162,11 @@ def trajectory(data: Any) -> Trajectory:
     last = None
     if "last_t" in data:
         last = (float(data["last_t"]), data["last_q"].values, data["last_u"].values)
+    start = None
+    if "start_q" in data:
+        start = (data["start_q"].values, data["start_u"].values)
     return Trajectory(
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
+        start,
     )  # fmt: skip

@@ -22,7 +22,8 @@ from .integrate import Statistics, Status
 from .layout import HingeSlots
 from .observed import Observed
 from .quantities import Quantities, Quantity
-from .simulate import Settings, Trajectory
+from .settings import Settings
+from .simulate import Trajectory
 from .stability import StepCheck
 
 if TYPE_CHECKING:
@@ -313,6 +314,7 @@ def simulate(
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
     run, step = first_run(model, settings, q, u, watch, resume)
+    run = replace(run, start=(q, u))
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))

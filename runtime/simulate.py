@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import SceneError
+from mstmm.errors import NumericalFailure, SceneError
 
 from . import values
+from .endings import message_of
 from .engine import Engine, Probe
 from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
 from .layout import StateNames
 from .pack import resize
+from .settings import Settings
 from .steppers import get
 
 Array = NDArray[np.float64]
@@ -38,28 +40,12 @@ _WORK_TOLERANCE = 10.0
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`."""
-
-    t_end: float
-    t_start: float = 0.0
-    method: str = "dop853"
-    step: float | None = None
-    rtol: float = 1e-9
-    atol: float = 1e-12
-    output_times: tuple[float, ...] | None = None
-    max_step: float = 0.0
-    max_steps: int = 0
-    first_step: float = 0.0
-
-
-@dataclass(frozen=True)
 class Trajectory:
     """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
 
     q and u hold unit quaternions and exact driven coordinates; `norm_residual` is how far the
-    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state, which
-    output times may leave out.
+    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state and `start`
+    (q, u) at the beginning, which output times may leave out.
     """
 
     t: Array
@@ -76,6 +62,16 @@ class Trajectory:
     notes: tuple[str, ...] = field(default=())
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
+    start: tuple[Array, Array] | None = None
+
+    @property
+    def first(self) -> tuple[float, Array, Array]:
+        """(t, q, u) of the beginning; of the first sample where an older file knows no other."""
+        if self.start is not None:
+            return (self.settings.t_start, *self.start)
+        if not len(self.t):
+            raise SceneError("the file of this result does not tell how its run began")
+        return float(self.t[0]), self.q[0], self.u[0]
 
     @property
     def success(self) -> bool:
@@ -213,14 +209,35 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
 
 def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
     """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
-    engine, found = system.engine, np.full(len(start), settings.atol)
+    found = np.full(len(start), settings.atol)
     if system.with_power:
-        q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
-        at = np.array([settings.t_start])
-        seen = engine.observe(at, q[None], u[None], system.memory[None], parts=("sums",))
-        energy = float(np.abs(seen.sums[0, :3]).sum()) or 1.0
+        energy = _energy(system, settings.t_start, start) or 1.0
         found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
     return found
+
+
+def _energy(system: SceneSystem, t: float, y: Array) -> float:
+    """Sum of the sizes of the energies of a state, J; 0 where the motion itself cannot be computed,
+    which the run will say.
+
+    Raises NumericalFailure where the motion can, but not what the state shows.
+    """
+    engine, memory = system.engine, system.memory[None]
+    q, u = y[None, : engine.nq].copy(), y[None, engine.nq : engine.nq + engine.nu].copy()
+    seen = engine.observe(np.array([t]), q, u, memory, parts=("sums",))
+    energy = float(np.abs(seen.sums[0, :3]).sum())
+    if np.isfinite(energy):
+        return energy
+    try:
+        engine.accelerations(t, q, u, memory.copy())
+    except NumericalFailure:
+        return 0.0
+    raise NumericalFailure(
+        seen.failures[0]
+        if seen.failures
+        else f"the energy at t = {t:.9g} s is not finite; see "
+        "whether masses, speeds and stiffnesses are of the size that was meant"
+    )
 
 
 @contextmanager
@@ -269,7 +286,7 @@ def trajectory(
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    message = _interrupted(run) if status is None else _message(system, run)
+    message = _interrupted(run) if status is None else message_of(system, run)
     return split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
@@ -335,7 +352,8 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         some = y[first : first + rows]
         lengths = np.sqrt(np.sum(some[:, entries] ** 2, axis=2))
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
-        some[:, entries] /= lengths[:, :, None]
+        with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
+            some[:, entries] /= lengths[:, :, None]
     if engine.packed.model.n_drives:
         times, known = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(
@@ -343,26 +361,3 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
             engine.pointer(y),
         )  # fmt: skip
     return y, residual
-
-
-def _message(system: SceneSystem, run: Run) -> str:
-    failure = run.failure
-    if failure is not None and failure.status in (Status.RHS_FAILED, Status.EVENT_FAILED):
-        return (
-            system.engine.failure_text(system.run.failure, failure.time)
-            + f"; last good state at t = {run.t:.9g} s"
-        )
-    message = run.message(system.components(), system.event_names)
-    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
-    return message + (busiest(system, run.t, run.y) if work else "")
-
-
-def busiest(system: SceneSystem, t: float, y: Array) -> str:
-    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
-    engine = system.engine
-    q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
-    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
-    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
-    if not rates.any():
-        return ""
-    return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"

@@ -22,9 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import MstmmError, SceneError
 
+from .arrays import batch, by_name, numbers, pair, threads_of
 from .integrate import Failure, Run, Status, failure_text
 from .lanes_run import Lanes, run_lanes
-from .simulate import Compiled, SceneSystem, Settings, advance, make_run, settled, trajectory
+from .settings import Settings, checked
+from .simulate import Compiled, SceneSystem, advance, make_run, settled, trajectory
 from .steppers import get
 
 if TYPE_CHECKING:
@@ -82,7 +84,7 @@ def simulate_batch(
     n, times = len(q), np.asarray(settings.output_times)
     library = _lanes(model)
     models = _models(model, parameters, n)
-    count = min(threads or os.cpu_count() or 1, max(1, n))
+    count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(
         np.full((n, len(times), model.nq + model.nu), np.nan),
         np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64),
@@ -109,8 +111,8 @@ def _models(model: Model, parameters: Mapping[str, ArrayLike], n: int) -> list[M
     if not parameters:
         return [model] * n
     columns = {}
-    for name, values in parameters.items():
-        column = np.asarray(values, dtype=np.float64)
+    for name, values in by_name("parameters", parameters).items():
+        column = numbers(f'parameter "{name}"', values)
         if column.shape not in ((), (n,)):
             raise SceneError(f'parameter "{name}" has shape {column.shape}, expected ({n},)')
         columns[name] = np.broadcast_to(column, (n,))
@@ -168,7 +170,8 @@ def _lanes_message(model: Model, library: FusedLibrary, system: SceneSystem, out
         return model._engine.failure_text(failure, outcome.fail_time) + last
     component = None if outcome.component < 0 else int(outcome.component)
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
-    return failure_text(failure, system.components()) + last
+    way_out = "simulate this one alone to learn the cause" if status is Status.NOT_FINITE else ""
+    return failure_text(failure, system.components(), cause=way_out) + last
 
 
 def _one_by_one(
@@ -220,37 +223,21 @@ def _alone(
     rows.evaluations[i] = found.statistics.evaluations
 
 
-def checked(model: Model, settings: Settings, initial: tuple[ArrayLike, ArrayLike]) -> Any:
+def prepared(
+    model: Model, settings: Settings, initial: tuple[ArrayLike, ArrayLike]
+) -> tuple[Settings, Array, Array]:
     """(settings with output times, q (n, nq), u (n, nu)) of a batch; SceneError for a misfit."""
+    settings = checked(settings)
+    if not settings.t_end > settings.t_start:
+        raise SceneError(f"t_end = {settings.t_end:g}: expected a time in s, after t_start")
     if settings.output_times is None:
         settings = replace(settings, output_times=(settings.t_end,))
+    if not settings.output_times:
+        raise SceneError("output_times: expected one time in s or more")
     if settings.step is None and not get(settings.method).adaptive:
         raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
-    if settings.step is not None and not settings.step > 0:
-        raise SceneError(f"step = {settings.step!r}: expected a time above zero, in s")
-    if not (settings.atol > 0 and settings.rtol >= 0):
-        raise SceneError("tolerances: expected atol above zero and rtol not below")
-    times = np.asarray(settings.output_times)
-    if not np.all(np.diff(times) > 0) or not np.isfinite(times).all() or not len(times):
-        raise SceneError("output_times: expected increasing times in s")
-    if times[0] < settings.t_start or times[-1] > settings.t_end:
-        raise SceneError(
-            f"output_times from {times[0]:g} to {times[-1]:g} s: expected times between "
-            f"t_start = {settings.t_start:g} and t_end = {settings.t_end:g}"
-        )
-    q, u = initial
-    try:
-        lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1])
-    except ValueError:
-        raise SceneError(
-            f"initial_states: q has shape {np.shape(q)} and u {np.shape(u)}; expected as many rows "
-            "in both, or one of them for all"
-        ) from None
+    q, u = pair("initial_states", initial)
+    lead, (q_rows, u_rows) = batch(("initial q", q, model.nq), ("initial u", u, model.nu))
     if len(lead) > 1:
         raise SceneError(f"initial_states have {len(lead)} leading axes, expected one: (n, nq)")
-    lead = lead or (1,)
-    rows = (
-        model._engine.batch("q", q, model.nq, lead),
-        model._engine.batch("u", u, model.nu, lead),
-    )
-    return settings, *rows
+    return settings, q_rows, u_rows

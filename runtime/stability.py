@@ -20,7 +20,7 @@ from .engine import Engine
 from .steppers import Tableau
 
 if TYPE_CHECKING:
-    from .simulate import Settings
+    from .settings import Settings
 
 Array = NDArray[np.float64]
 

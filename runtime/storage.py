@@ -17,7 +17,7 @@ from mstmm.scene import Scene
 
 from . import provenance, store
 from .dataset import MOST_SPEEDS, dataset, extra
-from .files import replacing
+from .files import refuse_special, replacing
 from .stability import check_step
 from .steppers import get
 
@@ -79,6 +79,7 @@ def _csv(result: Result, path: Path) -> None:
 
 def load(path: Path) -> Result:
     """A result from NetCDF; its scene is validated and compiled again."""
+    refuse_special(path, "result file")
     try:
         import h5netcdf  # noqa: F401
         import xarray
@@ -113,8 +114,8 @@ def _rebuilt(data: Any, path: Path) -> Result:
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
     step = None
-    if run.settings.step is not None and len(run.t):
-        start = np.concatenate([run.q[0], run.u[0]])
-        tableau = get(run.settings.method)
-        step = check_step(model._engine, tableau, run.settings, start, run.memory[0])
+    if run.settings.step is not None and (run.start is not None or len(run.t)):
+        start = np.concatenate(run.first[1:])
+        engine, tableau = model._engine, get(run.settings.method)
+        step = check_step(engine, tableau, run.settings, start, engine.start_memory())
     return result_of(model, run, provenance.error(data), step)

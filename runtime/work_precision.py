@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from mstmm.errors import NumericalFailure
 
 from . import compiled_run
-from .simulate import SceneSystem, Settings, make_run
+from .settings import Settings
+from .simulate import SceneSystem, make_run
 
 if TYPE_CHECKING:
     from .model import Model

@@ -16,7 +16,7 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.flexible.one_way.oscillators import Cells, Oscillators
-from mstmm.runtime.flexible.one_way.response import modal_loads, rigidity
+from mstmm.runtime.flexible.one_way.response import Response, modal_loads, rigidity
 from mstmm.runtime.flexible.one_way.result import OneWayResult
 from mstmm.runtime.observed import Observed
 
@@ -314,6 +314,39 @@ def test_oscillators_follow_any_load() -> None:
     balance = found[2] @ mass + found[1] @ damping + found[0] @ stiffness - loads(times)
     assert np.abs(balance).max() < 1e-7
     assert cells.jumps(polynomials).max() < 1e-9  # the jump at a break is none
+
+
+@pytest.mark.parametrize("initial", [{}, {"initial": "static"}])
+def test_the_response_begins_with_the_run_whatever_is_sampled(
+    initial: dict[str, Any], tmp_path: Path
+) -> None:
+    """Samples that leave the start out, one sample, none: the vibration is the same."""
+    model = mstmm.compile(scene(**initial), flexibility="one-way")
+    whole = response_of(model.simulate(0.4, output_times=TIMES))
+    for rows in ([10, 20], [20], [0], []):
+        run = model.simulate(0.4, output_times=TIMES[rows])
+        found = response_of(run)
+        assert found.eta.shape == (len(rows), 5)
+        for part in ("eta", "etad", "etadd"):
+            ours, all_ = getattr(found, part), getattr(whole, part)
+            scale = np.abs(all_).max() + 1e-12
+            np.testing.assert_allclose(ours / scale, all_[rows] / scale, atol=2e-6)
+        assert str(run.certificate)
+    loaded = mstmm.load_result(model.simulate(0.4, output_times=[0.4]).save(tmp_path / "run.nc"))
+    np.testing.assert_allclose(response_of(loaded).eta[-1], whole.eta[-1], rtol=1e-6, atol=1e-12)
+
+
+def response_of(run: mstmm.Result) -> Response:
+    assert isinstance(run, OneWayResult)
+    return run.response("arm")
+
+
+def test_a_run_that_cannot_be_repeated_is_named() -> None:
+    model = mstmm.compile(scene(), flexibility="one-way")
+    run = model.simulate(0.4, output_times=TIMES)
+    again = replace(run.trajectory, settings=replace(run.settings, max_steps=2))
+    with pytest.raises(mstmm.NumericalFailure, match="could not be repeated: more steps than"):
+        OneWayResult(model, again).response("arm")
 
 
 @pytest.mark.parametrize("rate", [1.0, 300.0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from support.result_scenes import motor, pins, rod
@@ -88,6 +90,39 @@ def test_a_run_into_a_state_in_which_a_motion_is_undetermined() -> None:
     assert run.status is Status.RHS_FAILED and 'hinge "roll"' in run.message
     assert run.last_state[0] == pytest.approx(0.5, abs=1e-3)
     assert not run.success and len(run.t) > 2 and np.isfinite(run.u).all()
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4", "scipy-DOP853", "scipy-RK45", "scipy-Radau"])
+def test_a_spring_whose_ends_coincide_at_the_start_is_named(method: str) -> None:
+    spring = {"name": "band", "from": "ground", "to": "rod0", "law": {"stiffness": 100.0}}
+    data = pins(1, [0.3]).model_dump(by_alias=True, exclude_unset=True) | {"spring": [spring]}
+    model = mstmm.compile(mstmm.Scene.from_data(data))
+    run = model.simulate(1.0, method=method, step=0.01 if method == "rk4" else None)
+    assert not run.success and run.status is Status.RHS_FAILED
+    assert 'spring "band" at t = 0 s' in run.message and "coincide; move one" in run.message
+    assert str(run.certificate) and len(run.t) == 1
+
+
+def bent(**more: Any) -> mstmm.Scene:
+    """A blade bent so far that its tip turns by more than a section may."""
+    beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
+            "modes": {"y": 1}, "initial": {"eta": [2.0]}, "damping": 0.1}  # fmt: skip
+    root = {"name": "root", "type": "fixed", "inboard": "ground", "outboard": "blade.root"}
+    return mstmm.Scene(gravity=(0, 0, -9.81), beam=[beam], hinge=[root], **more)
+
+
+def test_a_start_that_cannot_be_shown_is_refused_by_its_own_reason() -> None:
+    """The modes move by themselves, but where the tip is nobody knows: no matter of tolerances."""
+    with pytest.raises(
+        mstmm.NumericalFailure, match=r'"blade\.tip" at t = 0 s: a section turns by'
+    ):
+        mstmm.compile(bent()).simulate(0.1)
+
+
+def test_a_start_beyond_the_model_s_range_has_a_certificate_all_the_same() -> None:
+    run = mstmm.compile(bent(load=[{"on": "blade.tip", "force": [0, 0.1, 0]}])).simulate(0.1)
+    assert run.status is Status.RHS_FAILED and '"blade.tip" at t = 0 s' in run.message
+    assert str(run.certificate) and any("blade.tip" in text for text in run.warnings)
 
 
 def test_success_is_never_said_of_numbers_that_are_not_finite() -> None:

@@ -61,7 +61,7 @@ def test_an_empty_batch_and_a_scene_without_freedom() -> None:
     ("q", "u", "message"),
     [
         ([0.0], [0.0, 0.0], r"q has shape \(1,\), expected \(\.\.\., 2\)"),
-        ([0.0, 0.0], 0.0, r"u has shape \(1,\), expected \(\.\.\., 2\)"),
+        ([0.0, 0.0], 0.0, r"u has shape \(\), expected \(\.\.\., 2\)"),
         ([0.0, np.nan], [0.0, 0.0], r"q\[1\] = nan: expected a finite number"),
         ([0.0, 0.0], [np.inf, 0.0], r"u\[0\] = inf: expected a finite number"),
     ],

@@ -88,3 +88,10 @@ def test_a_run_of_one_sample_and_numbers_that_are_not_finite() -> None:
     x, y = curve(t, Quantity("x", values, "m", "x"))
     np.testing.assert_array_equal(x, t)
     np.testing.assert_array_equal(y[:, 0], values)
+
+
+def test_a_run_without_samples_is_refused() -> None:
+    from support.result_scenes import pins
+
+    with pytest.raises(mstmm.SceneError, match="the run has no sample; ask for other times"):
+        mstmm.compile(pins(1, [0.3])).simulate(1.0, output_times=[]).plot()

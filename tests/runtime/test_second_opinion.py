@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import signal
+from typing import Any
+
 import numpy as np
 import pytest
+import scipy.integrate
+from numpy.typing import NDArray
 from support.result_scenes import motor, pins, rod, tree
 
 import mstmm
+from mstmm.runtime import second_opinion
 from mstmm.runtime.integrate import Status
+
+Array = NDArray[np.float64]
 
 METHODS = ("scipy-DOP853", "scipy-RK45", "scipy-Radau", "scipy-BDF", "scipy-LSODA")
 
@@ -84,6 +92,52 @@ def test_blowing_up_is_a_failure_with_everything_so_far(method: str) -> None:
     assert run.last_state[0] == pytest.approx(np.exp(-3) / 9, rel=1e-3)
     assert "motor" in run.message and "last good state" in run.message
     assert len(run.t) > 5 and np.isfinite(run.q).all() and np.isfinite(run.energy()).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_output_times_and_a_last_one_that_a_coarse_run_does_not_reach(method: str) -> None:
+    """A result without samples is a result: its state is the last good one."""
+    model = mstmm.compile(motor("exp(u[0])^3", speed=1.0))
+    for times in ([], [1.0]):
+        run = model.simulate(1.0, method=method, rtol=1e-2, output_times=times)
+        assert run.t.shape == (0,) and run.q.shape == (0, 1) and not run.success
+        assert 0 < run.last_state[0] < 0.01 and str(run.certificate)
+    assert len(mstmm.compile(pins(1, [0.3])).simulate(1.0, method=method, output_times=[]).t) == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_largest_number_of_steps(method: str) -> None:
+    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, method=method, max_steps=7)
+    assert run.status is Status.TOO_MANY_STEPS and "more steps than allowed" in run.message
+    assert run.statistics is not None and run.statistics.steps == 7 and len(run.t) == 8
+
+
+def test_a_trial_that_failed_and_recovered_is_not_blamed_for_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Stumbling(second_opinion.Equations):
+        def rates(self, t: float, y: Array) -> Array:
+            if 0.01 < t < 0.1:
+                self.failure = 'spring "band" at t = 0.05 s'
+            return super().rates(t, y)
+
+    monkeypatch.setattr(second_opinion, "Equations", Stumbling)
+    model = mstmm.compile(motor("1/max(0.5 - t, 0)^2", speed=1.0))
+    run = model.simulate(1.0, method="scipy-RK45", rtol=1e-6)
+    assert not run.success and "band" not in run.message and "0.5" in run.message
+
+
+def test_ctrl_c_ends_a_step_of_endless_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Endless(scipy.integrate.RK45):
+        def _step_impl(self) -> Any:
+            for _ in range(1000):
+                self.fun(self.t, self.y)
+                signal.raise_signal(signal.SIGINT)
+            raise AssertionError("nobody has ended it")
+
+    monkeypatch.setattr(scipy.integrate, "RK45", Endless)
+    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, method="scipy-RK45")
+    assert run.status is None and "interrupted at t = 0 s" in run.message and len(run.t) == 1
 
 
 def test_settings_that_make_no_sense() -> None:

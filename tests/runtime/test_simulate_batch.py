@@ -177,7 +177,7 @@ def test_what_makes_no_sense_is_refused(pins: Model) -> None:
         ((q, u), {"parameters": {"rod0.mass": [1.0, 2.0, -1.0]}}, "trajectory 2"),
         ((q, u), {"method": "rk5"}, "not known"),
         ((q, u), {"method": "rk4"}, "fixed steps"),
-        ((q, u), {"atol": 0.0}, "tolerances"),
+        ((q, u), {"atol": 0.0}, "atol = 0: expected"),
     ):
         with pytest.raises(SceneError, match=message):
             pins.simulate_batch(initial, **RUN | more)

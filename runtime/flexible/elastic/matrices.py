@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 from mstmm.scene_errors import near
 
+from ...files import refuse_special
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -79,6 +80,7 @@ def load_matrices(path: Path, where: str) -> ElasticModel:
 
 def _arrays(path: Path, where: str) -> dict[str, Any]:
     way_out = "write it with mstmm.runtime.flexible.elastic.save_matrices"
+    refuse_special(path, where)
     try:
         with np.load(path, allow_pickle=False) as file:
             return {key: file[key] for key in file.files}

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 from ...dataset import extra
+from ...files import refuse_special
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -68,6 +69,7 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     Raises SceneError for a file that is no mesh, has no solid cells or several kinds of them,
     EnvironmentFailure without the extra.
     """
+    refuse_special(path, where)
     skfem = _library("a mesh")
     try:
         import meshio

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
 from ...observed import Observed
@@ -91,14 +92,14 @@ class OneWay:
 def respond(model: Model, run: Trajectory) -> OneWay:
     """Responses of every one-way body at the samples of a run of the rigid bodies.
 
-    The rigid run is repeated with samples where the loads are wanted, twice as many each time until
-    their polynomials join.
+    The rigid run is repeated from its start with samples where the loads are wanted, twice as many
+    each time until their polynomials join.  Raises NumericalFailure where it cannot be repeated.
     """
     rigid = rigidity(model)
     total = sum(body.n for body in rigid.one_way.values())
     times, cells, spent = _times(model, run), FIRST_CELLS, 0
     if times[-1] == times[0]:
-        return OneWay(_resting(rigid, run), Cost(0, 0, 0, total, 0.0))
+        return OneWay(_at_start(model, run), Cost(0, 0, 0, total, 0.0))
     while True:
         grid = Cells.between(times, cells)
         sampled = _sampled(model, run, grid)
@@ -128,19 +129,21 @@ def rigidity(model: Model) -> Rigidified:
 
 
 def _times(model: Model, run: Trajectory) -> Array:
-    """First and last time, and those between at which loads may jump."""
-    first, last = float(run.t[0]), float(run.t[-1])
+    """Times of the start and the last sample, and those between at which loads may jump."""
+    first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
     between = [t for t in (*model._engine.packed.breaks, *events) if first < t < last]
     return np.unique([first, *between, last])
 
 
 def _sampled(model: Model, run: Trajectory, grid: Cells) -> Trajectory:
-    s = run.settings
+    s, (t, q, u) = run.settings, run.first
     result = model.simulate(
-        float(run.t[-1]), s.method, s.step, s.rtol, s.atol, grid.samples, t_start=float(run.t[0]),
-        initial=(run.q[0], run.u[0]), max_step=s.max_step, max_steps=s.max_steps,
+        float(grid.samples[-1]), s.method, s.step, s.rtol, s.atol, grid.samples, t_start=t,
+        initial=(q, u), max_step=s.max_step, max_steps=s.max_steps,
     )  # fmt: skip
+    if not result.success:
+        raise NumericalFailure(f"one-way response: the run could not be repeated: {result.message}")
     return _without_events(result.trajectory, grid)
 
 
@@ -204,10 +207,14 @@ def _held_by(model: Model, name: str) -> str | None:
 
 def _response(model: Model, body: ModalBody, grid: Cells, loads: Array, times: Array) -> Response:
     oscillators = Oscillators(body.K, body.D, body.Mff)
-    eta, etad = body.eta, body.etad
+    return Response(*oscillators.motion(grid, loads, _start(model, body, loads[0, 0]), times))
+
+
+def _start(model: Model, body: ModalBody, load: Array) -> tuple[Array, Array]:
+    """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
     if _starts_static(model, body.name):
-        eta, etad = np.linalg.solve(body.K, loads[0, 0]), np.zeros(body.n)
-    return Response(*oscillators.motion(grid, loads, (eta, etad), times))
+        return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
+    return body.eta, body.etad
 
 
 def _starts_static(model: Model, name: str) -> bool:
@@ -215,11 +222,14 @@ def _starts_static(model: Model, name: str) -> bool:
     return any(b.initial.static for b in (*scene.beam, *scene.elastic) if b.name == name)
 
 
-def _resting(rigid: Rigidified, run: Trajectory) -> dict[str, Response]:
-    rows = len(run.t)
-    return {
-        name: Response(
-            np.tile(body.eta, (rows, 1)), np.tile(body.etad, (rows, 1)), np.zeros((rows, body.n))
-        )
-        for name, body in rigid.one_way.items()
-    }
+def _at_start(model: Model, run: Trajectory) -> dict[str, Response]:
+    """Responses of a run whose samples, if there are any, all stand at its beginning."""
+    found, observed = {}, Observed(model, run)
+    for name, body in rigidity(model).one_way.items():
+        loads = modal_loads(model, body, observed)
+        rows = [(*_start(model, body, load), load) for load in loads]
+        states = np.array(rows).reshape(len(rows), 3, body.n)
+        eta, etad = states[:, 0], states[:, 1]
+        forces = states[:, 2] - eta @ body.K.T - etad @ body.D.T
+        found[name] = Response(eta, etad, np.asarray(np.linalg.solve(body.Mff, forces.T).T))
+    return found

@@ -152,7 +152,8 @@ class _OneWayBodies(FlexibleBodies):
         model = self.model
         coupled = Model(with_level(model.scene, "coupled"), model.known)
         q, _ = coupled.initial_state()
-        q[: len(self.run.q[0])] = self.run.q[0]
+        start = self.run.first[1]
+        q[: len(start)] = start
         return coupled, q
 
     def motion(self, name: str, what: str = "its motion") -> Motion:

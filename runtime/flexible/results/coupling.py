@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
 if TYPE_CHECKING:
@@ -27,11 +28,15 @@ LARGEST = 300
 
 def couplings(flexible: FlexibleBodies) -> dict[str, Array]:
     """Body -> chi (modes,) at the start of the run; without bodies that no moving hinge carries.
-    Empty for scenes with more than LARGEST speeds."""
+    Empty for scenes with more than LARGEST speeds, and for a start that has no inertia matrix, as
+    the run itself says."""
     if flexible.model.nu > LARGEST or not len(flexible.run.t):
         return {}
     model, q = flexible.coupled_start()
-    inertia = model.mass_matrix(q)
+    try:
+        inertia = model.mass_matrix(q)
+    except NumericalFailure:
+        return {}
     found, tree = dict[str, Array](), _Tree(model)
     for name in flexible.known:
         own, others = tree.hinge_of(name)

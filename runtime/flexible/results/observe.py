@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import SceneError
 
+from ...arrays import numbers
+
 if TYPE_CHECKING:
     from ..beam.beam_shapes import BeamShapes, ShapeValues
     from ..modal_body import ModalBody
@@ -117,7 +119,7 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
 def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     """x in m as (m,); SceneError for a place off the beam or a number that is none."""
     length = float(shapes_of(body, what).length)
-    places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    places = np.atleast_1d(numbers(f'{what} of "{body.name}": x', x))
     if places.ndim != 1:
         raise SceneError(f"{what}: x has shape {places.shape}, expected one number or (m,)")
     off = ~((places >= -_BEYOND * length) & (places <= length * (1 + _BEYOND)))

@@ -62,7 +62,7 @@ class FlexibleBodies:
 
     def coupled_start(self) -> tuple[Model, Array]:
         """A model in which all of them are coupled, and its q at the start of the run."""
-        return self.model, self.run.q[0]
+        return self.model, self.run.first[1]
 
     @cached_property
     def gravity(self) -> Array:

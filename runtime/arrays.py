@@ -1,0 +1,124 @@
+"""Numbers and arrays that users give, checked in one place: kind, finite, shape, leading axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.errors import SceneError
+
+Array = NDArray[np.float64]
+
+
+def real(name: str, value: Any, expected: str = "a finite number") -> float:
+    """A finite Python float of any library's real number (not of text, truth values, arrays)."""
+    number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
+        raise SceneError(f"{name} = {_short(value)}: expected {expected}")
+    if not math.isfinite(number):
+        raise SceneError(f"{name} = {float(number)}: expected {expected}")
+    return float(number)
+
+
+def whole(name: str, value: Any, least: int, expected: str) -> int:
+    """A whole number from `least` up."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
+        raise SceneError(f"{name} = {_short(value)}: expected {expected}")
+    return int(value)
+
+
+def threads_of(value: int | None) -> int | None:
+    """How many threads to start; None for as many as there are processors."""
+    if value is None:
+        return None
+    return whole("threads", value, 1, "a whole number from 1 up, or None")
+
+
+def _short(value: Any) -> str:
+    shown = " ".join(repr(value).split())
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."
+
+
+def numbers(name: str, value: ArrayLike) -> Array:
+    """A new contiguous array of finite numbers; SceneError for anything else."""
+    try:
+        found = np.asarray(value)
+        if found.dtype.kind in "cSU":
+            raise TypeError
+        array = np.array(found, dtype=np.float64, order="C")
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(
+            f"{name} = {_short(value)}: expected an array of real numbers, every row as long"
+        ) from None
+    if not np.isfinite(array).all():
+        if array.ndim == 0:
+            raise SceneError(f"{name} = {array}: expected a finite number")
+        place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
+        where = f"{name}[{', '.join(map(str, place))}]"
+        raise SceneError(f"{where} = {array[place]}: expected a finite number")
+    return array
+
+
+def by_name(name: str, value: Any) -> dict[str, Any]:
+    """A table of values by their names, not yet looked into."""
+    if not isinstance(value, Mapping):
+        raise SceneError(f"{name}: expected numbers by their names, found {_short(value)}")
+    return {str(key): entry for key, entry in value.items()}
+
+
+def pair(name: str, value: Any) -> tuple[ArrayLike, ArrayLike]:
+    """(q, u), not yet looked into."""
+    try:
+        q, u = value
+    except (TypeError, ValueError):
+        raise SceneError(f"{name}: expected two arrays (q, u), found {_short(value)}") from None
+    return q, u
+
+
+def _row(array: Array, width: int | None) -> Array:
+    """A number alone stands for the row that holds nothing else."""
+    return array.reshape(1) if width == 1 and array.ndim == 0 else array
+
+
+def one(name: str, value: ArrayLike, width: int, instead: str) -> Array:
+    """(width,) of one state.  `instead` says what to do with several."""
+    array = _row(numbers(name, value), width)
+    if array.shape != (width,):
+        several = array.ndim > 1 and array.shape[-1] == width
+        more = f", one state; {instead}" if several else ""
+        raise SceneError(f"{name} has shape {array.shape}, expected ({width},){more}")
+    return array
+
+
+def batch(*given: tuple[str, ArrayLike, int | None]) -> tuple[tuple[int, ...], list[Array]]:
+    """Leading axes, and for each (name, value, width) a contiguous copy (n, width) over all states.
+
+    The leading axes are broadcast against each other.  Width None stands for one number per state:
+    then the copy is (n,).  SceneError for a misfit or for what is no finite number.
+    """
+    arrays = [_row(numbers(name, value), width) for name, value, width in given]
+    for (name, _, width), array in zip(given, arrays, strict=True):
+        if width is not None and (array.ndim == 0 or array.shape[-1] != width):
+            raise SceneError(f"{name} has shape {array.shape}, expected (..., {width})")
+    tails = [() if width is None else (width,) for _, _, width in given]
+    leads = [a.shape[: a.ndim - len(tail)] for a, tail in zip(arrays, tails, strict=True)]
+    try:
+        lead = leads[0] if len(set(leads)) == 1 else np.broadcast_shapes(*leads)
+    except ValueError:
+        shapes = ", ".join(f"{g[0]} {a.shape}" for g, a in zip(given, arrays, strict=True))
+        raise SceneError(f"shapes do not fit: {shapes}; expected as many states in each") from None
+    n = math.prod(lead)
+    return lead, [
+        _spread(array, lead + tail).reshape(n, *tail)
+        for array, tail in zip(arrays, tails, strict=True)
+    ]
+
+
+def _spread(array: Array, shape: tuple[int, ...]) -> Array:
+    """The array, or a contiguous copy of it broadcast to `shape`."""
+    return array if array.shape == shape else np.array(np.broadcast_to(array, shape), order="C")

@@ -1,0 +1,156 @@
+"""Which expression of a scene, or quaternion, makes the motion at a state no number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.drive import motion_at
+from mstmm.errors import NumericalFailure
+from mstmm.expression import Expression, Name
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge, Scene
+    from mstmm.scene_parts import Spring
+
+    from .engine import Engine
+
+Array = NDArray[np.float64]
+
+#: States looked at past the last good one lie this many times farther ahead each, up to this part
+#: of the time: a run ends within rounding of the place where an expression stops being a number.
+_FARTHER, _FARTHEST = 4.0, 1e-9
+
+
+def culprit(engine: Engine, t: float, q: Array, u: Array) -> str:
+    """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
+
+    q (nq,) and u (nu,) of one state.  A quaternion without length is named as well.
+    """
+    scene, layout = engine.packed.described, engine.packed.layout
+    for first in layout.quaternions:
+        if not np.linalg.norm(q[first : first + 4]) > 0:
+            return (
+                f"the quaternion that begins with {layout.q_name(int(first))} has no length at "
+                f"t = {t:.9g} s; no rotation is 1, 0, 0, 0"
+            )
+    for where, drive in _drives(scene):
+        for kind, number in zip(("", " speed", " acceleration"), motion_at(drive, t), strict=True):
+            if not math.isfinite(number):
+                return _sentence(f"{where}{kind}", drive, number, t)
+    seen = _State(engine, t, q, u)
+    for where, expression, own in _efforts(scene):
+        number = expression.evaluate(partial(seen.of, own=own))
+        if not math.isfinite(number):
+            return _sentence(where, expression, number, t)
+    for spring in scene.spring:
+        effort = spring.law.effort
+        if not effort.is_constant:
+            number = effort.evaluate(partial(seen.of_spring, own=spring))
+            if not math.isfinite(number):
+                return _sentence(f'spring "{spring.name}": law.effort', effort, number, t)
+    return ""
+
+
+def culprit_ahead(
+    engine: Engine, t: float, q: Array, u: Array, memory: Array, failed_at: float
+) -> str:
+    """The same at the last good state of a run, or where its rates lead from there; `failed_at` is
+    the time of the trial that failed."""
+    found = culprit(engine, t, q, u)
+    if found:
+        return found
+    try:
+        qdot, udot = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
+    except NumericalFailure:
+        return ""
+    ahead = max(failed_at - t, 4 * math.ulp(t))
+    farthest = max(2 * ahead, _FARTHEST * max(1.0, abs(t)))
+    while ahead <= farthest and not found:
+        found = culprit(engine, t + ahead, q + ahead * qdot[0], u + ahead * udot[0])
+        ahead *= _FARTHER
+    return found
+
+
+def _sentence(where: str, expression: Expression, number: float, t: float) -> str:
+    text = expression.text if len(expression.text) <= 80 else f"{expression.text[:77]}..."
+    return f'{where} = "{text}" is {number} at t = {t:.9g} s; keep it finite where the motion goes'
+
+
+# --- the expressions of a scene -------------------------------------------------------------------
+
+
+def _drives(scene: Scene) -> Iterator[tuple[str, Expression]]:
+    for hinge in scene.hinge:
+        for k, drive in enumerate(hinge.drive or ()):
+            if drive is not None and not drive.is_constant:
+                yield f'hinge "{hinge.name}": drive[{k}]', drive
+
+
+def _efforts(scene: Scene) -> Iterator[tuple[str, Expression, Hinge | None]]:
+    """Place, expression and own hinge of whatever is no constant; those of springs not."""
+    for hinge in scene.hinge:
+        yield from _of_hinge(f'hinge "{hinge.name}"', hinge)
+    for first, chain in zip(scene.hinges.starts, scene.chain, strict=False):
+        tables = [any(not e.is_constant for e in table.law.effort) for table in chain.hinge]
+        for k in range(chain.count) if any(tables) else ():
+            own = scene.hinges[first + k]
+            yield from _of_hinge(f'hinge "{own.name}"', own)
+    for load in scene.load:
+        for key in ("force", "moment", "force_per_length"):
+            for k, expression in enumerate(getattr(load, key) or ()):
+                if not expression.is_constant:
+                    yield f'load "{load.name}": {key}[{k}]', expression, None
+
+
+def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge]]:
+    for k, effort in enumerate(hinge.law.effort):
+        if not effort.is_constant:
+            yield f"{where}: law.effort[{k}]", effort, hinge
+
+
+class _State:
+    """The numbers that names of expressions stand for at one state."""
+
+    def __init__(self, engine: Engine, t: float, q: Array, u: Array) -> None:
+        self.engine, self.t, self.q, self.u = engine, t, q, u
+
+    def of(self, name: Name, own: Hinge | None) -> float:
+        """t, q and u of hinges, the own ones, parameters of the own hinge."""
+        if name.text == "t":
+            return self.t
+        if name.quantity not in ("q", "u") and own is not None:
+            return own.parameters[name.quantity]
+        slots = self.engine.packed.layout.hinges[name.hinge or (own.name if own else "")]
+        index = name.index or 0
+        values, first = (self.q, slots.q) if name.quantity == "q" else (self.u, slots.u)
+        return float(values[first + index])
+
+    def of_spring(self, name: Name, own: Spring) -> float:
+        """The same, where q and u alone are the spring's length and its rate."""
+        if name.text not in ("q", "u"):
+            return self.of(name, None)
+        length, rate = self._length(own)
+        return length if name.text == "q" else rate
+
+    def _length(self, spring: Spring) -> tuple[float, float]:
+        """Length in m and its rate in m/s; nan where the ends coincide."""
+        from .engine import Probe
+
+        bare, probes = self.engine.inertia_alone, []
+        for reference in (spring.from_, spring.to):
+            body, axes, offset = self.engine.packed.end(reference)
+            probes.append(Probe(body, axes, spring.position if body < 0 else offset))
+        seen = bare.observe(
+            np.array([self.t]), self.q[None], self.u[None], bare.start_memory()[None], probes,
+            parts=("points",),
+        )  # fmt: skip
+        points = seen.points[0]
+        apart, moving = points[1, 0:3] - points[0, 0:3], points[1, 3:6] - points[0, 3:6]
+        length = float(np.linalg.norm(apart))
+        return length, float(apart @ moving) / length if length else math.nan

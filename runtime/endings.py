@@ -1,0 +1,51 @@
+"""Why a run ended, in words: the expression, the element or the speed that is behind it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .culprit import culprit_ahead
+from .integrate import Run, Status
+
+if TYPE_CHECKING:
+    from .simulate import SceneSystem
+
+Array = NDArray[np.float64]
+
+#: What a run ends with where call-backs of the scene fail; their code says how.
+_EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED)
+
+
+def message_of(system: SceneSystem, run: Run) -> str:
+    """How a run ended or stands, as a sentence."""
+    failure = run.failure
+    cause = "" if failure is None else cause_of(system, failure.status, run.t, run.y, failure.time)
+    if failure is not None and failure.code and failure.status in _EVALUATIONS:
+        text = cause or system.engine.failure_text(system.run.failure, failure.time)
+        return f"{text}; last good state at t = {run.t:.9g} s"
+    message = run.message(system.components(), system.event_names, cause)
+    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
+    return message + (busiest(system, run.t, run.y) if work else "")
+
+
+def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at: float) -> str:
+    """The expression that stopped a run whose last good state is (t, y); empty if none did."""
+    if status not in (Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED):
+        return ""
+    engine = system.engine
+    q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
+    return culprit_ahead(engine, t, q, u, system.memory, failed_at)
+
+
+def busiest(system: SceneSystem, t: float, y: Array) -> str:
+    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
+    engine = system.engine
+    q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
+    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
+    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
+    if not rates.any():
+        return ""
+    return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"

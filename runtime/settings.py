@@ -1,0 +1,92 @@
+"""How a run is made, and the one place where that is checked, whichever integrator runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.errors import SceneError
+
+from .arrays import numbers, real, whole
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`."""
+
+    t_end: float
+    t_start: float = 0.0
+    method: str = "dop853"
+    step: float | None = None
+    rtol: float = 1e-9
+    atol: float = 1e-12
+    output_times: tuple[float, ...] | None = None
+    max_step: float = 0.0
+    max_steps: int = 0
+    first_step: float = 0.0
+
+
+def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Output times as a tuple; one number stands for itself.  SceneError unless they increase."""
+    if output_times is None:
+        return None
+    found = numbers("output_times", output_times)
+    if found.ndim > 1:
+        raise SceneError(f"output_times have shape {found.shape}, expected (n,): times in s")
+    times = np.atleast_1d(found)
+    falls = np.flatnonzero(~(np.diff(times) > 0))
+    if len(falls):
+        before, after = times[falls[0]], times[falls[0] + 1]
+        raise SceneError(
+            f"output_times: {after:g} s follows {before:g} s; expected increasing times in s"
+        )
+    return tuple(times.tolist())
+
+
+def checked(settings: Settings) -> Settings:
+    """The settings as plain finite numbers.
+
+    Raises SceneError naming the first that makes no sense.
+    """
+    t_start = real("t_start", settings.t_start, "a time in s")
+    t_end = real("t_end", settings.t_end, "a time in s, not before t_start")
+    if t_end < t_start:
+        raise SceneError(f"t_end = {t_end:g}: expected a time in s, not before t_start")
+    if not isinstance(settings.method, str):
+        raise SceneError(f"method = {settings.method!r}: expected a name such as dop853")
+    rtol = real("rtol", settings.rtol, "a relative tolerance, 0 or more")
+    if rtol < 0:
+        raise SceneError(f"rtol = {rtol:g}: expected a relative tolerance, 0 or more")
+    _times_within(settings.output_times, t_start, t_end)
+    longest = settings.max_step
+    return replace(
+        settings,
+        t_start=t_start, t_end=t_end, rtol=rtol,
+        atol=_above_zero("atol", settings.atol, "an absolute tolerance above zero"),
+        step=None if settings.step is None
+        else _above_zero("step", settings.step, "a time above zero, in s"),
+        max_step=0.0 if longest == np.inf or longest == 0
+        else _above_zero("max_step", longest, "a time above zero in s, or 0 for no limit"),
+        max_steps=whole(
+            "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
+        ),
+    )  # fmt: skip
+
+
+def _above_zero(name: str, value: float, expected: str) -> float:
+    found = real(name, value, expected)
+    if not found > 0:
+        raise SceneError(f"{name} = {found:g}: expected {expected}")
+    return found
+
+
+def _times_within(times: tuple[float, ...] | None, t_start: float, t_end: float) -> None:
+    """SceneError for output times outside the run."""
+    if times and (times[0] < t_start or times[-1] > t_end):
+        raise SceneError(
+            f"output_times from {times[0]:g} to {times[-1]:g} s: expected times between "
+            f"t_start = {t_start:g} and t_end = {t_end:g}"
+        )

@@ -1,0 +1,140 @@
+"""What users hand to a model: shapes, kinds and settings are checked in one place, by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from support.result_scenes import pins
+
+import mstmm
+
+Q = np.array([0.3, 0.4])
+U = np.array([0.1, -0.2])
+MANY = np.array([Q, Q + 1.0, Q - 2.0])
+
+
+@pytest.fixture(scope="module")
+def model() -> mstmm.Model:
+    return mstmm.compile(pins(2, [0.3, 0.4]))
+
+
+def test_the_mass_matrix_of_a_batch_is_that_of_each_state(model: mstmm.Model) -> None:
+    found = model.mass_matrix(MANY)
+    assert found.shape == (3, 2, 2)
+    np.testing.assert_array_equal(found, [model.mass_matrix(q) for q in MANY])
+    assert model.mass_matrix(MANY[:, None]).shape == (3, 1, 2, 2)
+
+
+def test_inverse_dynamics_of_a_batch_gives_the_accelerations_back(model: mstmm.Model) -> None:
+    udot = np.array([[0.5, -1.0], [2.0, 0.0], [-3.0, 1.5]])
+    efforts = model.inverse_dynamics(MANY, U, udot, [0.0, 1.0, 2.0])
+    assert efforts.shape == (3, 2)
+    np.testing.assert_allclose(model.accelerations(MANY, U, efforts=efforts), udot, atol=1e-12)
+
+
+def test_efforts_may_be_the_only_batch(model: mstmm.Model) -> None:
+    efforts = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    found = model.accelerations(Q, U, efforts=efforts)
+    np.testing.assert_array_equal(found, [model.accelerations(Q, U, efforts=e) for e in efforts])
+    assert model.derivatives(Q, U, efforts=efforts).q.shape == (3, 2, 2)
+
+
+def test_a_number_alone_is_the_row_of_one_coordinate() -> None:
+    alone = mstmm.compile(pins(1, [0.3]))
+    assert alone.accelerations(0.3, 0.0) == alone.accelerations([0.3], [0.0])
+    assert alone.mass_matrix(0.3).shape == (1, 1)
+
+
+Call = Callable[[Any], Any]  # on purpose with arguments of the wrong type
+MISFITS: dict[str, tuple[Call, str]] = {
+    "one state of several": (
+        lambda m: m.simulate(0.1, initial=(MANY, U)),
+        "initial q has shape (3, 2), expected (2,), one state; simulate_batch takes many",
+    ),
+    "speeds of several": (
+        lambda m: m.simulate(0.1, initial=(Q, MANY)), "initial u has shape (3, 2)",
+    ),
+    "equilibrium of several": (
+        lambda m: m.equilibrium(MANY), "q has shape (3, 2), expected (2,), one state",
+    ),
+    "a misfit of width": (lambda m: m.mass_matrix([0.1]), "q has shape (1,), expected (..., 2)"),
+    "a misfit of rows": (
+        lambda m: m.accelerations(MANY, MANY[:2]),
+        "shapes do not fit: t (), q (3, 2), u (2, 2); expected as many states in each",
+    ),
+    "rows of derivatives": (lambda m: m.derivatives(MANY, MANY[:2]), "shapes do not fit"),
+    "efforts of other rows": (
+        lambda m: m.accelerations(MANY, U, efforts=MANY[:2]), "efforts (2, 2)",
+    ),
+    "rows of unequal length": (
+        lambda m: m.accelerations([[0.1, 0.2], [0.3]], U), "every row as long",
+    ),
+    "text": (lambda m: m.accelerations("30 deg", U), "q = '30 deg': expected an array of real"),
+    "complex numbers": (lambda m: m.inverse_dynamics(Q, U, [1j, 0]), "udot = [1j, 0]"),
+    "no number": (lambda m: m.accelerations(Q, [np.nan, 0]), "u[0] = nan: expected a finite"),
+    "no time": (lambda m: m.accelerations(Q, U, np.inf), "t = inf: expected a finite number"),
+    "a time of several": (lambda m: m.equilibrium(t=[0, 1]), "t = [0, 1]: expected a time in s"),
+    "half a state": (lambda m: m.simulate(0.1, initial=Q[:1]), "initial: expected two arrays"),
+    "half a batch": (
+        lambda m: m.simulate_batch((Q,), t_end=0.1), "initial_states: expected two arrays",
+    ),
+    "threads": (lambda m: m.simulate_batch((Q, U), t_end=0.1, threads=0), "threads = 0"),
+    "a table of parameters": (lambda m: m.with_parameters([1.0]), "expected numbers by their"),
+    "a table of parameters of a batch": (
+        lambda m: m.simulate_batch((Q, U), [1.0], t_end=0.1), "expected numbers by their",
+    ),
+    "a parameter of several": (
+        lambda m: m.with_parameters({"rod0.mass": [1, 2]}),
+        'parameter "rod0.mass" = [1, 2]: expected a finite number',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISFITS)
+def test_what_does_not_fit_is_refused_by_name(model: mstmm.Model, case: str) -> None:
+    call, message = MISFITS[case]
+    with pytest.raises(mstmm.SceneError, match=re.escape(message)):
+        call(model)
+
+
+SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
+    "times that fall": ({"output_times": [0.5, 0.2, 1.0]}, "0.2 s follows 0.5 s"),
+    "a time twice": ({"output_times": [0.5, 0.5]}, "0.5 s follows 0.5 s"),
+    "no time": ({"output_times": [0.5, np.nan]}, "output_times[1] = nan"),
+    "times beyond the end": ({"output_times": [0.5, 2.0]}, "between t_start = 0 and t_end = 1"),
+    "times in rows": ({"output_times": [[0.0, 0.5]]}, "output_times have shape (1, 2)"),
+    "times as text": ({"output_times": "all"}, "output_times = 'all'"),
+    "no rtol": ({"rtol": np.nan}, "rtol = nan"),
+    "endless rtol": ({"rtol": np.inf}, "rtol = inf"),
+    "negative rtol": ({"rtol": -1e-9}, "rtol = -1e-09"),
+    "text as rtol": ({"rtol": "1e-9"}, "rtol = '1e-9'"),
+    "no atol": ({"atol": np.nan}, "atol = nan"),
+    "atol zero": ({"atol": 0}, "atol = 0: expected an absolute tolerance above zero"),
+    "several atol": ({"atol": [1e-9, 1e-6]}, "atol = [1e-09, 1e-06]"),
+    "no max_step": ({"max_step": np.nan}, "max_step = nan"),
+    "negative max_step": ({"max_step": -0.1}, "max_step = -0.1"),
+    "half a step": ({"max_steps": 1.5}, "max_steps = 1.5: expected a whole number"),
+    "no start": ({"t_start": np.nan}, "t_start = nan"),
+    "an end before the start": ({"t_start": 2.0}, "t_end = 1: expected a time in s, not before"),
+    "a method that is no name": ({"method": ["dop853"]}, "method = ['dop853']"),
+}
+
+
+@pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
+@pytest.mark.parametrize("case", SETTINGS)
+def test_settings_are_refused_by_name_for_every_integrator(
+    model: mstmm.Model, method: str, case: str
+) -> None:
+    changes, message = SETTINGS[case]
+    with pytest.raises(mstmm.SceneError, match=re.escape(message)):
+        model.simulate(1.0, **({"method": method} | changes))
+
+
+def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
+    run = model.simulate(np.float32(0.5), rtol=np.float64(1e-6), max_steps=np.int64(1000),
+                         output_times=np.array([0, 0.5], np.float32), max_step=np.inf)  # fmt: skip
+    assert run.success and list(run.t) == [0.0, 0.5]
