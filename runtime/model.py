@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
 from . import parameters as named_parameters
