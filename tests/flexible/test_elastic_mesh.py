@@ -102,6 +102,17 @@ def test_files_that_are_no_solid_meshes(tmp_path: Path) -> None:
         bar.body(table(written(tmp_path / "flat.vtu", flat)))
 
 
+@pytest.mark.parametrize("ending", ["vtu", "msh", "xdmf", "inp"])
+@pytest.mark.parametrize("node", [10**9, 999, -3])
+def test_cells_with_nodes_that_are_not_there(tmp_path: Path, ending: str, node: int) -> None:
+    cells = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    points = np.vstack([np.zeros(3), np.eye(3), np.ones(3)])
+    cells[1, 2] = node
+    path = written(tmp_path / f"bar.{ending}", meshio.Mesh(points, [("tetra", cells)]))
+    with pytest.raises(SceneError, match=r'elastic "bar": bar.*: expected cells of nodes|no mesh'):
+        bar.body(table(path))
+
+
 @pytest.mark.parametrize("package", ["skfem", "meshio"])
 def test_missing_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str

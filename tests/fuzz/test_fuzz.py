@@ -39,7 +39,7 @@ def test_what_once_broke(worker: Worker, path: Path) -> None:
     assert outcome.kind not in BAD, outcome
 
 
-@pytest.mark.parametrize("name", ["boxes"])
+@pytest.mark.parametrize("name", ["beams", "boxes"])
 def test_the_scenes_of_many_tables_are_lawful(worker: Worker, name: str) -> None:
     worker.ask(seeds()[name], turn=0)
     assert worker.answer().kind in GOOD[1:]

@@ -169,8 +169,8 @@ def _run(model: Model, method: str) -> Outcome:
 
 def _silent(result: Result, everything: bool) -> str:
     """The name of what is not finite although the run succeeded and nothing warns; "" if all is."""
+    str(result.certificate)
     if not result.success:
-        str(result.certificate)
         return ""
     numbers = {"q": result.q, "u": result.u, "t": result.t, "work": result.work}
     if everything:
@@ -180,8 +180,9 @@ def _silent(result: Result, everything: bool) -> str:
                 numbers[name] = np.asarray(result.quantity(name).values)
             except MstmmError:
                 continue
-    said = [*result.warnings, str(result.certificate)]
     bad = [name for name, values in numbers.items() if not np.isfinite(values).all()]
-    if not bad or any("finite" in x or "overflow" in x or "nan" in x for x in said[:-1]):
+    said = " ".join(result.warnings)
+    told = result._observed.failures or any(word in said for word in ("finite", "overflow", "nan"))
+    if not bad or told:
         return ""
     return bad[0].rsplit(".", 1)[-1]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 from ...dataset import extra
+from .matrices import refuse_special
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -76,11 +77,16 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         raise extra("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
+    refuse_special(path, where)
     try:
         with redirect_stdout(StringIO()):  # it prints empty lines
             read = meshio.read(path)
-    except (meshio.ReadError, OSError, ValueError, SystemExit) as error:
-        raise SceneError(f"{where}: {path.name} is no mesh that meshio reads: {error}") from None
+    except (Exception, SystemExit) as error:  # dozens of formats, each fails in its own way
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise SceneError(
+            f"{where}: {path.name} is no mesh that meshio reads: {why:.300}; write it again"
+        ) from None
+    _refuse_lost_nodes(read, path, where)
     kinds = sorted({block.type for block in read.cells if block.dim == 3})
     if len(kinds) != 1 or kinds[0] not in SOLIDS:
         raise SceneError(
@@ -94,6 +100,22 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     ):  # such as the centres of arcs
         mesh = mesh.remove_unused_nodes()
     return mesh.scaled(scale) if scale != 1.0 else mesh
+
+
+def _refuse_lost_nodes(read: Any, path: Path, where: str) -> None:
+    """Cells must name nodes that are there: what works with them would read past their end."""
+    for block in read.cells:
+        data = np.asarray(block.data)
+        odd = data.dtype == object or (
+            data.size and not 0 <= data.min() <= data.max() < len(read.points)
+        )
+        if odd:
+            raise SceneError(
+                f"{where}: {path.name}: expected cells of nodes 0 to {len(read.points) - 1}, found "
+                f"a {block.type} with a node that the mesh does not have; write the mesh again"
+            )
+    if not np.isfinite(read.points).all():
+        raise SceneError(f"{where}: {path.name}: expected nodes at finite places, found nan or inf")
 
 
 def _curved(skfem: Any, mesh: Any) -> bool:
