@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -241,12 +240,6 @@ def test_a_file_with_changed_bytes(tmp_path: Path, rng: np.random.Generator) -> 
             bar.body(bar.from_arrays(matrices=str(path)))
         except SceneError as error:
             assert str(error).startswith('elastic "bar"')
-
-
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "bar.npz")
-    message = refusal(bar.from_arrays(matrices=str(tmp_path / "bar.npz")))
-    assert "not a regular file" in message
 
 
 FACE = [[0, -1, -1], [0, 1, 1]]

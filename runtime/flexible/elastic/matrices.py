@@ -86,7 +86,6 @@ def load_matrices(path: Path, where: str) -> ElasticModel:
 
 def _arrays(path: Path, where: str) -> dict[str, Any]:
     way_out = "write it with mstmm.runtime.flexible.elastic.save_matrices"
-    refuse_special(path, where)
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             return {key: file[key] for key in file.files}
@@ -96,12 +95,6 @@ def _arrays(path: Path, where: str) -> dict[str, Any]:
         raise SceneError(
             f"{where}: {path} is no file of arrays (.npz): {error}; {way_out}"
         ) from None
-
-
-def refuse_special(path: Path, where: str) -> None:
-    """SceneError for what is there but no file with an end, such as a named pipe."""
-    if path.exists() and not path.is_file():
-        raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
 
 
 def _needed(arrays: dict[str, Any], key: str, where: str) -> Any:

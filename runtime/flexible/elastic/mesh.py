@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 
 from ...dataset import extra
-from .matrices import refuse_special
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -77,7 +76,6 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         raise extra("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
-    refuse_special(path, where)
     try:
         with redirect_stdout(StringIO()):  # it prints empty lines
             read = meshio.read(path)
