@@ -113,6 +113,22 @@ def test_cells_with_nodes_that_are_not_there(tmp_path: Path, ending: str, node: 
         bar.body(table(path))
 
 
+def test_ends_are_looked_at_before_anything_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("mstmm.runtime.flexible.elastic.mesh._stiffness")
+    wrong = bar.table(ends={"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 7.0]}})
+    with pytest.raises(SceneError, match=r"ends.tip: the plane holds no node"):
+        bar.body(wrong)
+
+
+def test_a_mesh_too_large_is_refused_unmade(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("mstmm.runtime.flexible.elastic.bodies.box_mesh")
+    fine = bar.table()["box"] | {"divisions": [384, 384, 384]}
+    with pytest.raises(SceneError, match=r"18289 hexahedra of degree 2 or fewer, found 56623104"):
+        bar.body(bar.table(box=fine))
+    with pytest.raises(SceneError, match=r"208333 hexahedra of degree 1 or fewer"):
+        bar.body(bar.table(box=fine, order=1))
+
+
 @pytest.mark.parametrize("package", ["skfem", "meshio"])
 def test_missing_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
