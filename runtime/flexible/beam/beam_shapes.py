@@ -68,6 +68,16 @@ def gauss_between(places: Iterable[float], density: float) -> tuple[Array, Array
 _WAVES = 8.0
 
 
+#: Numbers of one array that are handled together, 8 MB.
+_TOGETHER = 2**20
+
+
+def slices(count: int, each: int) -> list[slice]:
+    """0 to `count` in parts of so many entries of `each` numbers as are handled together."""
+    step = max(1, _TOGETHER // max(1, each))
+    return [slice(first, min(first + step, count)) for first in range(0, count, step)]
+
+
 class BeamShapes:
     """All shapes of a beam in the floating frame.
 
@@ -166,10 +176,12 @@ class BeamShapes:
         order = np.argsort(x, kind="stable")
         ends = np.union1d(np.clip(x, 0.0, self.length), self.pieces)
         total, table = np.zeros((self.n, self.n)), {float(ends[0]): np.zeros((self.n, self.n))}
-        slopes = self._slopes_between(ends)
-        for b, (places, weights) in zip(ends[1:], slopes, strict=True):
-            total = total + np.einsum("m,mkl->kl", weights, places)
-            table[float(b)] = total
+        for some in slices(len(ends) - 1, 16 * self.n**2):
+            pieces = ends[some.start : some.stop + 1]
+            slopes = self._slopes_between(pieces)
+            for b, (places, weights) in zip(pieces[1:], slopes, strict=True):
+                total = total + np.einsum("m,mkl->kl", weights, places)
+                table[float(b)] = total
         result = np.zeros((len(x), self.n, self.n))
         for i in order:
             result[i] = table[float(np.clip(x[i], 0.0, self.length))]
