@@ -21,6 +21,8 @@ from .direct import Undefined, evaluate_matrix
 from .element import Body, ForceElement, Hinge, Symbols
 from .hinge import HingeMotion, motion_of, speeds_of
 from .registry import Element, builtin_elements, kind_of
+from .smoothness import refuse_jumps
+from .switches import slope
 from .units import Dimension, Misfit, dimension, dimension_of, text
 
 _DIGITS = 40
@@ -134,7 +136,16 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
         ("bias(q, u, p)",
          stated.optional(where, "bias(q, u, p)", hinge.bias, q, u, p), motion.bias),
     )  # fmt: skip
-    for point in _points(motion):
+    points = list(_points(motion))
+    refuse_jumps(
+        where,
+        {"position(q, p)": motion.position, "rotation(q, p)": motion.rotation,
+         "the velocity that follows from position and rotation": motion.subspace},
+        {s: _range(c) for s, c in zip(motion.q, hinge.coordinates, strict=True)},
+        points[:2],
+        "that would be an impulse; let the branches meet with equal values and slopes",
+    )  # fmt: skip
+    for point in points:
         _is_rotation(where, motion, point)
         _numeric(f"{where}: position(q, p)", motion.position, point)
         _has_full_rank(where, motion, point)
@@ -165,6 +176,12 @@ def _draw(parameter: Param, numbers: random.Random) -> float:
     if high is None:
         high = max(1.0, low + 2.0)
     return numbers.uniform(low, high)
+
+
+def _range(parameter: Param) -> tuple[float, float]:
+    """Where a coordinate is looked at: between its bounds, or a turn about zero."""
+    low = -3.5 if parameter.minimum is None else parameter.minimum
+    return low, max(3.5, low + 7.0) if parameter.maximum is None else parameter.maximum
 
 
 def _numeric(where: str, matrix: sp.Matrix, point: Numbers) -> mpmath.matrix:
@@ -301,12 +318,13 @@ def check_body(body: Body) -> None:
     forces, energies = "residual(a, alpha, w, p)", "kinetic_energy(v, w, p)"
     residual = stated.matrix(where, forces, body.residual, (6, 1), a, alpha, w, p)
     _refuse_strange(where, forces, residual, {*a, *alpha, *w, *p})
-    mass = residual.jacobian(sp.Matrix.vstack(a, alpha))
+    mass = _slopes(residual, sp.Matrix.vstack(a, alpha))
     if mass.applyfunc(sp.expand).free_symbols & {*a, *alpha}:
         raise ElementError(f"{where}: {forces} is not linear in a and alpha")
     energy = stated.scalar(where, energies, body.kinetic_energy, v, w, p)
     _refuse_strange(where, energies, energy, {*v, *w, *p})
-    from_energy = sp.hessian(energy, list(sp.Matrix.vstack(v, w)))
+    speeds = sp.Matrix.vstack(v, w)
+    from_energy = _slopes(_slopes(sp.Matrix([energy]), speeds).T, speeds)
     rate = _energy_rate(residual, energy, (a, alpha, v, w))
     numbers = random.Random(20261)
     for _ in range(_POINTS):
@@ -321,6 +339,11 @@ def check_body(body: Body) -> None:
     _body_units(where, body, (residual, energy), p, (a, alpha, w, v))
 
 
+def _slopes(matrix: sp.Matrix, symbols: sp.Matrix) -> sp.Matrix:
+    """Jacobian of a column, a column for each symbol."""
+    return sp.Matrix.hstack(*(sp.Matrix(slope(matrix, s)) for s in symbols))
+
+
 def _close(one: mpmath.matrix, two: mpmath.matrix) -> bool:
     with mpmath.workdps(_DIGITS):
         size = 1 + max(abs(x) for x in (*one, *two))
@@ -331,7 +354,7 @@ def _energy_rate(residual: sp.Matrix, energy: sp.Expr, names: tuple[sp.Matrix, .
     """[dT/dt; power of the residual] (classical acceleration a, velocity in body axes)."""
     a, alpha, v, w = names
     v_rate = a - w.cross(v)
-    rate = sum(energy.diff(s) * r for s, r in zip((*v, *w), (*v_rate, *alpha), strict=True))
+    rate = sum(slope(energy, s) * r for s, r in zip((*v, *w), (*v_rate, *alpha), strict=True))
     power = residual[:3, :].dot(v) + residual[3:, :].dot(w)
     return sp.Matrix([rate, power])
 
@@ -368,6 +391,14 @@ def check_force(force: ForceElement) -> None:
     known |= {effort: dimension("N"), t: dimension("s")}
     _refuse_strange(where, what, sp.Matrix.vstack(push, turn), set(known))
     _refuse_strange(where, "potential(x, p)", energy, {*x, *p})
+    numbers = random.Random(20262)
+    drawn = [{s: numbers.uniform(-1, 1) for s in x} for _ in range(2)]
+    for point in drawn:
+        point |= {s: _draw(one, numbers) for s, one in zip(p, force.parameters, strict=True)}
+    refuse_jumps(
+        where, {"potential(x, p)": sp.Matrix([energy])}, dict.fromkeys(x, (-2.0, 2.0)), drawn,
+        "energy would appear from nothing; let the branches meet with equal values",
+    )  # fmt: skip
     _expect(where, "the force of wrench", push, "N", known)
     _expect(where, "the moment of wrench", turn, "N*m", known)
     _expect(where, "potential", sp.Matrix([energy]), "J", known)

@@ -6,6 +6,7 @@ import sympy as sp
 
 from .derivation import Derivation, Equation, Quantity, tilde, vector
 from .element import ForceElement, Symbols, described
+from .switches import slope
 
 #: Failure code of a force element whose direction is undefined (`defined_when`).
 UNDEFINED = 2
@@ -50,7 +51,7 @@ def wrench(element: ForceElement) -> Derivation:
     x, v, rotation, w = (_explicit(a) for a in arrays)
     names = sp.Matrix(sp.symbols("X_1 X_2 X_3", real=True))
     energy = sp.sympify(element.potential(names, p))
-    gradient = [energy.diff(n).xreplace(dict(zip(names, x, strict=True))) for n in names]
+    gradient = [slope(energy, n).xreplace(dict(zip(names, x, strict=True))) for n in names]
     force, moment = element.wrench(x, v, rotation, w, p, effort, t)
     force, moment = sp.Matrix(force), sp.Matrix(moment)
     lost = force.dot(v) + moment.dot(w) + sum(g * r for g, r in zip(gradient, v, strict=True))

@@ -21,6 +21,7 @@ from mstmm.errors import ElementError
 from . import stated
 from .derivation import Derivation, Equation, Quantity, axial, vector
 from .element import Hinge, Param, Symbols, described
+from .switches import slope
 
 #: Trigonometric entries with more operations than this are left as differentiation gave them.
 SIMPLIFY_LIMIT = 400
@@ -102,8 +103,8 @@ def _subspace(
         along = rates.diff(speed)  # coordinate rates when this speed alone is one
         d_rotation, d_position = sp.zeros(3, 3), sp.zeros(3, 1)
         for coordinate, rate in zip(q, along, strict=True):
-            d_rotation += rotation.diff(coordinate) * rate
-            d_position += position.diff(coordinate) * rate
+            d_rotation += slope(rotation, coordinate) * rate
+            d_position += slope(position, coordinate) * rate
         v = rotation.T * d_position
         columns.append(sp.Matrix.vstack(v, sp.Matrix(axial(rotation.T * d_rotation))))
     return sp.Matrix.hstack(*columns) if columns else sp.zeros(6, 0)
@@ -112,8 +113,8 @@ def _subspace(
 def _bias(v: sp.Matrix, w: sp.Matrix, rates: sp.Matrix, q: Symbols) -> sp.Matrix:
     v_rate, w_rate = sp.zeros(3, 1), sp.zeros(3, 1)
     for coordinate, rate in zip(q, rates, strict=True):
-        v_rate += v.diff(coordinate) * rate
-        w_rate += w.diff(coordinate) * rate
+        v_rate += slope(v, coordinate) * rate
+        w_rate += slope(w, coordinate) * rate
     return sp.Matrix.vstack(v_rate + w.cross(v), w_rate)
 
 

@@ -32,6 +32,9 @@ DIFFERENCES = 1e-22
 ALGEBRA = 1e-40
 #: Accelerations of a body of unit size above which its hinge's coordinates count as singular.
 SINGULAR = 1e9
+#: Time before and after a point where branches meet, and how far values may differ over it.
+BESIDE = mpmath.mpf(10) ** -12
+CONTINUOUS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,15 @@ class Worst:
         error = float(max(gaps, default=0))
         error = error if error == error else float("inf")
         self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
+
+    def include(self, other: Worst) -> None:
+        """Take over what another has seen."""
+        for name, (error, limit) in other._found.items():
+            self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
+
+    @property
+    def passed(self) -> bool:
+        return all(error <= limit for error, limit in self._found.values())
 
     def properties(self) -> tuple[Property, ...]:
         return tuple(Property(name, *found) for name, found in self._found.items())
@@ -151,13 +163,48 @@ def hinge_properties(call: Call, generic: Call, source: Source, nu: int) -> tupl
             p = source.parameter_values(len(source.parameters), numbers)
             q: list[Any] = [mpmath.mpf(v) for v in source.coordinate_values(numbers, turn)]
             u, s = some(nu, numbers), some(nu, numbers)
+            drawn = numbers.getstate()
+
+            def seen(
+                at: list[Any], p: Numbers = p, u: Any = u, s: Any = s, drawn: Any = drawn
+            ) -> Worst:
+                one = Worst()
+                numbers.setstate(drawn)
+                _relative_motion(_Hinge(call, p, at, u, [0] * nu), nu, one)
+                _bias_motion(_Hinge(call, p, at, u, s), nu, numbers, one)
+                _specialised(call, generic, p, at, u, s, numbers, one)
+                return one
+
             try:
-                _relative_motion(_Hinge(call, p, q, u, [0] * nu), nu, worst)
-                _bias_motion(_Hinge(call, p, q, u, s), nu, numbers, worst)
-                _specialised(call, generic, p, q, u, s, numbers, worst)
+                found = seen(q)
+                if not found.passed:
+                    found = _beside(_Hinge(call, p, q, u, [0] * nu), seen)
+                worst.include(found)
             except ArithmeticError:  # a singular configuration of the coordinates
                 continue
     return worst.properties()
+
+
+def _beside(hinge: _Hinge, seen: Callable[[list[Any]], Worst]) -> Worst:
+    """The statements before and after a point where branches of the formulas may meet.
+
+    Differences across it err there.  What has to be continuous is compared at the point itself;
+    the bias may jump, and then lies between both sides.
+    """
+    before, after = hinge.coordinates(-BESIDE), hinge.coordinates(BESIDE)
+    worst = seen(before)
+    worst.include(seen(after))
+    here, *sides = (hinge.kernel(q, hinge.u) for q in (hinge.q, before, after))
+    for side in sides:
+        got = [x for name in ("R", "d", "v", "w") for x in here[name]]
+        other = [x for name in ("R", "d", "v", "w") for x in side[name]]
+        worst.see("motion is continuous", got, other, CONTINUOUS)
+    one, two = (side["c"] for side in sides)
+    between = [
+        max(min(a, b), min(max(a, b), c)) for a, b, c in zip(one, two, here["c"], strict=True)
+    ]
+    worst.see("bias c lies between both sides", here["c"], between, CONTINUOUS)
+    return worst
 
 
 def some(count: int, numbers: random.Random) -> list[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import stat
 import tomllib
 from collections.abc import Mapping
@@ -16,7 +17,13 @@ from .spec import ElementSpec
 if TYPE_CHECKING:
     from .scene import Scene
 
-MAX_BYTES = 64 * 1024 * 1024
+#: Largest file in MB by ending: what is read and validated within about half a minute.
+MAX_SIZE = {".toml": 8, ".json": 64}
+#: Most parts of a dotted key: tables nest four deep, and each part costs all before it once more.
+MAX_PARTS = 64
+_LONG_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}+"""
+)
 
 
 def load_scene(
@@ -84,13 +91,18 @@ def _content(path: Path, where: str) -> bytes:
             raise SceneError(f"{where}: this is a folder; name the scene file inside it")
         if not stat.S_ISREG(status.st_mode):
             raise SceneError(f"{where}: this is not a regular file; name a scene file")
-        if status.st_size > MAX_BYTES:
+        ending = path.suffix.lower()
+        limit = MAX_SIZE[ending]
+        if status.st_size > limit * 2**20:
+            way_out = "build large scenes in Python, repeated bodies with [[chain]]"
+            if ending == ".toml":
+                way_out += f", or write JSON, up to {MAX_SIZE['.json']} MB"
             raise SceneError(
-                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is "
-                f"{MAX_BYTES // 2**20} MB; build large scenes in Python"
+                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is {limit} MB; "
+                + way_out
             )
         with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
+            return file.read(limit * 2**20 + 1)
     except FileNotFoundError:
         raise SceneError(f"{where}: there is no such file{_neighbour(path)}") from None
     except (OSError, ValueError) as error:
@@ -111,6 +123,11 @@ def _neighbour(path: Path) -> str:
 
 
 def _toml(text: str, where: str) -> dict[str, Any]:
+    if long := _LONG_KEY.search(text):
+        raise SceneError(
+            f"{where}: line {text.count(chr(10), 0, long.start()) + 1}: a key of more than "
+            f"{MAX_PARTS} parts, {long.group()[:20]}...; tables of a scene nest four deep at most"
+        )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -146,6 +146,11 @@ def plain_file(path: Path) -> None:
     path.write_bytes(b"no arrays")
 
 
+def one_array(path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, np.eye(3))
+
+
 def without_nodes(path: Path) -> None:
     np.savez(path, mass=np.eye(3), stiffness=np.eye(3))
 
@@ -167,6 +172,7 @@ def odd_order(path: Path) -> None:
     [
         (None, "there is no file"),
         (plain_file, "is no file of arrays"),
+        (one_array, "is no file of arrays"),
         (without_nodes, "the array 'nodes' is missing"),
         (odd_key, "unknown array 'stifness'; did you mean \"stiffness\"?"),
         (half_sparse, "a sparse mass needs mass_data, mass_indices, mass_indptr"),
@@ -178,6 +184,62 @@ def test_files(tmp_path: Path, write: Callable[[Path], None] | None, words: str)
     if write is not None:
         write(path)
     assert words in refusal(bar.from_arrays(matrices=str(path)))
+
+
+SPOILED: dict[str, tuple[Callable[[Arrays], object], str]] = {
+    "column out of range": (lambda z: z["mass_indices"].__setitem__(5, 10**8), "columns from 0"),
+    "negative column": (lambda z: z["mass_indices"].__setitem__(0, -7), "columns from 0 to 80"),
+    "falling rows": (lambda z: z["stiffness_indptr"].__setitem__(3, 0), "numbers that rise"),
+    "rows beyond the data": (lambda z: z["mass_indptr"].__setitem__(-1, 10**6), "that rise from 0"),
+    "short indices": (
+        lambda z: z.update(mass_indices=z["mass_indices"][:-1]), "one per entry of data"
+    ),
+    "indices that are no whole numbers": (
+        lambda z: z.update(mass_indices=z["mass_indices"] + 0.5), "mass_indices: expected whole"
+    ),
+    "a table of rows": (
+        lambda z: z.update(mass_indptr=z["mass_indptr"][None]), "mass_indptr: expected whole"
+    ),
+    "one number": (lambda z: z.update(mass_indptr=np.array(3)), "mass_indptr: expected whole"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", SPOILED)
+def test_sparse_parts_that_do_not_fit(tmp_path: Path, how: str) -> None:
+    """SciPy takes them, and reads and writes beyond its arrays."""
+    spoil, words = SPOILED[how]
+    model = bar.model(elements=1)
+    path = save_matrices(tmp_path / "bar.npz", model.mass, model.stiffness, model.nodes)
+    with np.load(path) as file:
+        arrays = dict(file)
+    spoil(arrays)
+    np.savez(path, **arrays)
+    message = refusal(bar.from_arrays(matrices=str(path)))
+    assert words in message and "is no sparse matrix in row form" in message
+
+
+def test_a_file_cut_off_anywhere(tmp_path: Path) -> None:
+    model = bar.model(elements=1)
+    path = save_matrices(tmp_path / "bar.npz", model.mass, model.stiffness, model.nodes)
+    whole = path.read_bytes()
+    for length in range(0, len(whole), len(whole) // 40):
+        path.write_bytes(whole[:length])
+        assert "is no file of arrays" in refusal(bar.from_arrays(matrices=str(path)))
+
+
+def test_a_file_with_changed_bytes(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Refused, or as good as it was: the checksums of the archive see most changes."""
+    model = bar.model(elements=1)
+    path = save_matrices(tmp_path / "bar.npz", model.mass, model.stiffness, model.nodes)
+    whole = path.read_bytes()
+    for _ in range(60):
+        content = bytearray(whole)
+        content[rng.integers(len(whole))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(content)
+        try:
+            bar.body(bar.from_arrays(matrices=str(path)))
+        except SceneError as error:
+            assert str(error).startswith('elastic "bar"')
 
 
 FACE = [[0, -1, -1], [0, 1, 1]]

@@ -102,6 +102,33 @@ def test_files_that_are_no_solid_meshes(tmp_path: Path) -> None:
         bar.body(table(written(tmp_path / "flat.vtu", flat)))
 
 
+@pytest.mark.parametrize("ending", ["vtu", "msh", "xdmf", "inp"])
+@pytest.mark.parametrize("node", [10**9, 999, -3])
+def test_cells_with_nodes_that_are_not_there(tmp_path: Path, ending: str, node: int) -> None:
+    cells = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    points = np.vstack([np.zeros(3), np.eye(3), np.ones(3)])
+    cells[1, 2] = node
+    path = written(tmp_path / f"bar.{ending}", meshio.Mesh(points, [("tetra", cells)]))
+    with pytest.raises(SceneError, match=r'elastic "bar": bar.*: expected cells of nodes|no mesh'):
+        bar.body(table(path))
+
+
+def test_ends_are_looked_at_before_anything_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("mstmm.runtime.flexible.elastic.mesh._stiffness")
+    wrong = bar.table(ends={"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 7.0]}})
+    with pytest.raises(SceneError, match=r"ends.tip: the plane holds no node"):
+        bar.body(wrong)
+
+
+def test_a_mesh_too_large_is_refused_unmade(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("mstmm.runtime.flexible.elastic.bodies.box_mesh")
+    fine = bar.table()["box"] | {"divisions": [384, 384, 384]}
+    with pytest.raises(SceneError, match=r"18289 hexahedra of degree 2 or fewer, found 56623104"):
+        bar.body(bar.table(box=fine))
+    with pytest.raises(SceneError, match=r"208333 hexahedra of degree 1 or fewer"):
+        bar.body(bar.table(box=fine, order=1))
+
+
 @pytest.mark.parametrize("package", ["skfem", "meshio"])
 def test_missing_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str

@@ -269,6 +269,14 @@ def test_loads_are_in_balance() -> None:
     assert np.abs(left).max() < 1e-9
 
 
+def test_mass_points_have_no_part_in_it() -> None:
+    """Momenta of a body that would carry its mass in points, were it coupled."""
+    rotary = {"rotary_inertia": 5e-4}
+    plain, points = one_way(**rotary), one_way(**rotary, quadrature=True)
+    assert points.momentum_of("arm") == pytest.approx(plain.momentum_of("arm"), rel=1e-12)
+    assert points.response("arm").eta == pytest.approx(plain.response("arm").eta, rel=1e-12)
+
+
 def test_a_hinge_that_lets_go_is_told() -> None:
     hinge = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "arm",
              "release": "t >= 0.1"}  # fmt: skip

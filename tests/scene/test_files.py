@@ -166,8 +166,26 @@ def test_paths_that_are_no_scene_file(tmp_path: Path) -> None:
 
 def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
     path = write(tmp_path, TOML)
+    os.truncate(path, 9 * 2**20)
+    assert "the file has 9 MB, the limit is 8 MB; build large scenes in Python" in refusal(path)
+    path = write(tmp_path, "{}", "arm.json")
     os.truncate(path, 65 * 2**20)
     assert "the file has 65 MB, the limit is 64 MB" in refusal(path)
+
+
+@pytest.mark.parametrize("form", ["{} = 1", "[{}]", "x = {{ {} = 1 }}", "[[ {} ]]"])
+@pytest.mark.parametrize("part", ["a", '"a b"', "'a.b' "])
+def test_a_key_of_thousands_of_parts_is_refused_unread(
+    tmp_path: Path, form: str, part: str
+) -> None:
+    """TOML's reader takes the square of their number in memory."""
+    path = write(tmp_path, "gravity = [0, 0, 0]\n" + form.format(".".join([part] * 50000)))
+    assert "line 2: a key of more than 64 parts" in refusal(path)
+
+
+def test_long_words_and_texts_are_no_keys(tmp_path: Path) -> None:
+    text = "# " + "a" * 500000 + " ... " + "1.5, " * 1000 + "\n" + TOML
+    load_scene(write(tmp_path, text))
 
 
 def test_the_environment_cannot_be_reached(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+from fuzz.mutate import places
 from hypothesis import HealthCheck, given, settings
 from reference.random_scenes import random_scene
 
@@ -42,16 +43,6 @@ VALUES = st.recursive(
     ),
     max_leaves=12,
 )
-
-
-def places(data: Any, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Every place in nested tables and lists."""
-    found = [here] if here else []
-    items = data.items() if isinstance(data, dict) else enumerate(data)
-    for key, value in items:
-        inner = (*here, key)
-        found += places(value, inner) if isinstance(value, (dict, list)) else [inner]
-    return found
 
 
 def damaged(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:

@@ -7,9 +7,7 @@ import numpy as np
 from ..modal_body import Array, Moments
 from . import kernels as beam_kernels
 from .beam_shapes import BeamShapes, without_noise
-
-#: Numbers of one batch of pairs of shapes at points, about 8 MB an array.
-_BATCH = 2**20
+from .parts import slices
 
 
 def mass_moments(shapes: BeamShapes) -> Moments:
@@ -31,12 +29,24 @@ def drag_moments(shapes: BeamShapes) -> Moments | None:
 def stiffness(shapes: BeamShapes) -> Array:
     """K (n, n) from the strain energy."""
     x, w = shapes.rule()
-    inputs = _inputs(shapes, x)
-    inputs["stiffness"] = shapes.data.stiffness[:, shapes.data.piece(x)][:, None, None, :]
-    k = beam_kernels.evaluate("moments", inputs)["K"][0] @ w
+    data = shapes.data.stiffness[:, shapes.data.piece(x)]
+    k = _integrals(shapes, "stiffness", data, x, w)["K"][0]
     k = (k + k.T) / 2
     size = np.sqrt(np.abs(np.diag(k)))
     return without_noise(k, np.outer(size, size))
+
+
+def _integrals(shapes: BeamShapes, what: str, data: Array, x: Array, w: Array) -> dict[str, Array]:
+    """Integrals of the kernel of two shapes; `data` are inertia or stiffness (., m) of the
+    sections."""
+    total: dict[str, Array] = {}
+    for some in slices(len(x), shapes.n**2):
+        inputs = _inputs(shapes, x[some])
+        inputs[what] = data[:, None, None, some]
+        for name, values in beam_kernels.evaluate("moments", inputs).items():
+            part = values @ w[some]
+            total[name] = total[name] + part if name in total else part
+    return total
 
 
 def _inputs(shapes: BeamShapes, x: Array) -> dict[str, Array]:
@@ -59,12 +69,8 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     mass = float(rigid["mass"][0] @ w)
     first = rigid["first"] @ w
     second = _symmetric(rigid["second"] @ w)
-    inputs = _inputs(shapes, x)
-    inputs["inertia"] = density[:, None, None, :]
-    found = beam_kernels.evaluate("moments", inputs)
-    c = found["C"][:, :, 0] @ w
-    e = found["E"][:, :, :, 0] @ w
-    f = found["F"] @ w
+    found = _integrals(shapes, "inertia", density, x, w)
+    c, e, f = found["C"][:, :, 0], found["E"][:, :, :, 0], found["F"]
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
     g, moment = second_moments(shapes, density, x, w) if shapes.stiffening else _none(shapes.n)
@@ -84,9 +90,7 @@ def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tu
     """G (3, n, n) and X (3, 3, n, n) of the second-order field under a density (3, m) at the points
     and weights of a quadrature."""
     g, lever = _none(shapes.n)
-    largest = max(1, _BATCH // max(1, 9 * shapes.n**2))
-    for first in range(0, len(x) if shapes.n else 0, largest):
-        some = slice(first, first + largest)
+    for some in slices(len(x) if shapes.n else 0, 9 * shapes.n**2):
         found = beam_kernels.evaluate(
             "second_moments", _second_inputs(shapes, density[:, some], x[some])
         )

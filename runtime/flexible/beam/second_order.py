@@ -15,13 +15,11 @@ import numpy as np
 from ..modal_body import Array
 from . import kernels
 from .gauss import antiderivatives
+from .parts import slices
 
 if TYPE_CHECKING:
     from .beam_shapes import BeamShapes
     from .frames import Frame
-
-#: Numbers of one batch of pairs of shapes at points, about 8 MB an array.
-_BATCH = 2**20
 
 
 class SecondOrder:
@@ -63,9 +61,7 @@ class SecondOrder:
         )
         values = _Values(shapes, places)
         found = np.empty((len(x), 6, n, n))
-        rows = max(1, _BATCH // max(1, 3 * len(places) * n))
-        for first in range(0, n, rows):
-            some = slice(first, first + rows)
+        for some in slices(n, 3 * len(places) * n):
             turning, drawing, lever = values.rates(some)
             turned, drawn, carried = (
                 np.tensordot(weights, rate, axes=(1, 0))

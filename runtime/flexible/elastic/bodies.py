@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from ..modal_body import ModalBody, ModalPort
 from .checks import checked
 from .craig_bampton import Reduction, reduce
 from .matrices import from_arrays, load_matrices, save_matrices
-from .mesh import Material, box_mesh, mesh_model, read_mesh
+from .mesh import Material, box_mesh, mesh_model, read_mesh, refuse_large
 from .model import ElasticModel
 from .moments import moments
 from .ports import Port, port, refuse_shared
@@ -120,10 +121,16 @@ def model_of(elastic: Elastic) -> ElasticModel:
         mesh = read_mesh(Path(elastic.mesh), where, elastic.scale or 1.0)
     else:
         assert elastic.box is not None
+        refuse_large(prod(elastic.box.divisions), True, elastic.order or 2, where)
         mesh = box_mesh(elastic.box.size, elastic.box.divisions, elastic.box.corner)
     assert elastic.young is not None and elastic.density is not None
     material = Material(elastic.young, elastic.poisson or 0.0, elastic.density)
-    return checked(mesh_model(mesh, material, elastic.order or 2, where))
+
+    def look(outline: ElasticModel) -> None:
+        for name, end in elastic.ends.items():
+            port(outline, name, end, False)
+
+    return checked(mesh_model(mesh, material, elastic.order or 2, where, look))
 
 
 def _holder(name: str, scene: Scene) -> Hinge | None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +21,11 @@ Array = NDArray[np.float64]
 _MATRICES = ("mass", "stiffness", "scalar_mass")
 _PARTS = ("data", "indices", "indptr")
 _KEYS = (*_MATRICES, *(f"{m}_{p}" for m in _MATRICES for p in _PARTS), "nodes", "order")
+#: What numpy and the archive below it raise for files that are damaged or of another kind.
+_UNREADABLE = (
+    OSError, ValueError, TypeError, AttributeError, KeyError, EOFError, MemoryError,
+    NotImplementedError, BadZipFile, zlib.error,
+)  # fmt: skip
 _ORDERS = ("node", "component")
 
 
@@ -82,11 +89,11 @@ def _arrays(path: Path, where: str) -> dict[str, Any]:
     way_out = "write it with mstmm.runtime.flexible.elastic.save_matrices"
     refuse_special(path, where)
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             return {key: file[key] for key in file.files}
     except FileNotFoundError:
         raise SceneError(f"{where}: there is no file {path}; {way_out}") from None
-    except (OSError, ValueError, AttributeError, EOFError) as error:
+    except _UNREADABLE as error:
         raise SceneError(
             f"{where}: {path} is no file of arrays (.npz): {error}; {way_out}"
         ) from None
@@ -101,8 +108,6 @@ def _needed(arrays: dict[str, Any], key: str, where: str) -> Any:
 
 def _matrix(arrays: dict[str, Any], key: str, where: str) -> Any:
     """A dense array, a sparse one of its three parts, or None for a scalar mass left out."""
-    from scipy import sparse
-
     parts = [arrays.get(f"{key}_{part}") for part in _PARTS]
     if all(part is None for part in parts):
         return arrays.get(key) if key == "scalar_mass" else _needed(arrays, key, where)
@@ -111,12 +116,35 @@ def _matrix(arrays: dict[str, Any], key: str, where: str) -> Any:
             f"{where}: a sparse {key} needs {', '.join(f'{key}_{p}' for p in _PARTS)}, found one "
             "missing"
         )
-    data, indices, indptr = parts
-    size = len(np.atleast_1d(np.asarray(indptr))) - 1
+    return _sparse(key, *(np.asarray(part) for part in parts), where=where)
+
+
+def _sparse(key: str, data: Array, indices: Array, indptr: Array, *, where: str) -> Any:
+    """A square matrix in row form; its parts are checked here, because SciPy's compiled loops
+    read and write wherever they point."""
+    from scipy import sparse
+
+    size = len(indptr) - 1 if indptr.ndim == 1 else -1
+    wrong = (
+        "indptr: expected whole numbers, one more than rows" if size < 0 or not _whole(indptr)
+        else "indices: expected whole numbers, one per entry of data"
+        if not _whole(indices) or indices.ndim != 1 or indices.shape != data.shape
+        else f"indptr: expected numbers that rise from 0 to {len(indices)}, the entries there are"
+        if indptr[0] != 0 or indptr[-1] != len(indices) or (np.diff(indptr) < 0).any()
+        else f"indices: expected columns from 0 to {size - 1}"
+        if len(indices) and not 0 <= int(indices.min()) <= int(indices.max()) < size
+        else ""
+    )  # fmt: skip
+    if wrong:
+        raise SceneError(f"{where}: {key} is no sparse matrix in row form: {key}_{wrong}")
     try:
         return sparse.csr_array((data, indices, indptr), shape=(size, size))
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise SceneError(f"{where}: {key} is no sparse matrix in row form: {error}") from None
+
+
+def _whole(numbers: Array) -> bool:
+    return bool(np.issubdtype(numbers.dtype, np.integer))
 
 
 def from_arrays(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
 #: Points of integration that are taken together.
 _TOGETHER = 20_000
+#: Entries of all elements' stiffness matrices: 3 GB, and some minutes.
+MOST_ENTRIES = 120_000_000
 
 LOCKING = (
     "elements of degree 1 are too stiff in bending (by 30 % in frequency with two layers); "
@@ -81,8 +83,12 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     try:
         with redirect_stdout(StringIO()):  # it prints empty lines
             read = meshio.read(path)
-    except (meshio.ReadError, OSError, ValueError, SystemExit) as error:
-        raise SceneError(f"{where}: {path.name} is no mesh that meshio reads: {error}") from None
+    except (Exception, SystemExit) as error:  # dozens of formats, each fails in its own way
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise SceneError(
+            f"{where}: {path.name} is no mesh that meshio reads: {why:.300}; write it again"
+        ) from None
+    _refuse_lost_nodes(read, path, where)
     kinds = sorted({block.type for block in read.cells if block.dim == 3})
     if len(kinds) != 1 or kinds[0] not in SOLIDS:
         raise SceneError(
@@ -98,24 +104,61 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     return mesh.scaled(scale) if scale != 1.0 else mesh
 
 
+def _refuse_lost_nodes(read: Any, path: Path, where: str) -> None:
+    """Cells must name nodes that are there: what works with them would read past their end."""
+    for block in read.cells:
+        data = np.asarray(block.data)
+        odd = data.dtype == object or (
+            data.size and not 0 <= data.min() <= data.max() < len(read.points)
+        )
+        if odd:
+            raise SceneError(
+                f"{where}: {path.name}: expected cells of nodes 0 to {len(read.points) - 1}, found "
+                f"a {block.type} with a node that the mesh does not have; write the mesh again"
+            )
+    if not np.isfinite(read.points).all():
+        raise SceneError(f"{where}: {path.name}: expected nodes at finite places, found nan or inf")
+
+
 def _curved(skfem: Any, mesh: Any) -> bool:
     """Cells with nodes between their corners."""
     return isinstance(mesh, (skfem.MeshTet2, skfem.MeshHex2))
 
 
-def mesh_model(mesh: Any, material: Material, order: int, where: str) -> ElasticModel:
+def refuse_large(elements: int, hexahedra: bool, order: int, where: str) -> None:
+    """SceneError for meshes whose matrices would take minutes and many gigabytes to assemble."""
+    entries = {(False, 1): 12, (False, 2): 30, (True, 1): 24, (True, 2): 81}[hexahedra, order] ** 2
+    most = MOST_ENTRIES // entries
+    if elements > most:
+        raise SceneError(
+            f"{where}: expected {most} {'hexahedra' if hexahedra else 'tetrahedra'} of degree "
+            f"{order} or fewer, found {elements}; take fewer divisions or a coarser mesh, or name "
+            "the matrices of a reduced model in `matrices`"
+        )
+
+
+def mesh_model(
+    mesh: Any,
+    material: Material,
+    order: int,
+    where: str,
+    look: Callable[[ElasticModel], None] = lambda outline: None,
+) -> ElasticModel:
     """Matrices of a mesh of solid elements with displacements of degree `order` (1 or 2).
 
-    Raises SceneError for elements without volume, and for degree 1 on cells of degree 2, where
-    rotations of the body would strain it.
+    `look` sees nodes and sets, in a model with empty matrices, before anything long is begun.
+    Raises SceneError for elements without volume, for more of them than can be assembled, and for
+    degree 1 on cells of degree 2, where rotations of the body would strain it.
     """
     skfem = _library("an elastic mesh")
     if order == 1 and _curved(skfem, mesh):
         raise SceneError(
             f"{where}: order: expected 2 on cells of degree 2, found 1; leave order out"
         )
+    refuse_large(mesh.nelements, isinstance(mesh, skfem.MeshHex), order, where)
     element = _element(skfem, mesh, order)
-    vector = _basis(skfem, mesh, element, order, where)
+    look(_outline(skfem, mesh, element, where))
+    vector = _basis(skfem, mesh, skfem.ElementVector(element), order, where)
     scalar = vector.with_element(element)
     _refuse_inverted(scalar, where)
     density = material.density
@@ -133,6 +176,16 @@ def mesh_model(mesh: Any, material: Material, order: int, where: str) -> Elastic
     )
 
 
+def _outline(skfem: Any, mesh: Any, element: Any, where: str) -> ElasticModel:
+    """Nodes and sets alone."""
+    from scipy import sparse
+
+    scalar = _basis(skfem, mesh, element, 1, where)
+    nodes = np.ascontiguousarray(scalar.doflocs.T)
+    empty = sparse.csr_array((3 * len(nodes), 3 * len(nodes)))
+    return ElasticModel(where, empty, empty, nodes, sets=_sets(mesh, scalar))
+
+
 def _element(skfem: Any, mesh: Any, order: int) -> Any:
     hexahedra = isinstance(mesh, skfem.MeshHex)
     if order == 1:
@@ -142,7 +195,7 @@ def _element(skfem: Any, mesh: Any, order: int) -> Any:
 
 def _basis(skfem: Any, mesh: Any, element: Any, order: int, where: str) -> Any:
     try:
-        return skfem.Basis(mesh, skfem.ElementVector(element), intorder=2 * order)
+        return skfem.Basis(mesh, element, intorder=2 * order)
     except Exception as error:  # the library raises this very class for cells that are folded
         if "Jacobian" not in str(error):
             raise

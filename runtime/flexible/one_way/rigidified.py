@@ -193,7 +193,9 @@ def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
     from ..beam.beams import beam_body
     from ..elastic.bodies import modal_body
 
-    return beam_body(scene, body) if isinstance(body, Beam) else modal_body(body, scene)
+    if isinstance(body, Beam):  # its run has no mass points: the tree carries one rigid body
+        return beam_body(scene, body.model_copy(update={"quadrature": False}))
+    return modal_body(body, scene)
 
 
 def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:

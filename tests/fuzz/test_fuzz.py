@@ -1,0 +1,95 @@
+"""A bounded piece of the fuzzer, always the same mutants; and inputs that once broke something."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from .campaign import Campaign, smaller
+from .mutate import mutant, places
+from .seeds import Data, seeds
+from .trial import BAD, CRASH, GOOD, HANG, RAN, REFUSED, TRACEBACK, Outcome
+from .worker import Limits, Worker
+
+FOUND = sorted((Path(__file__).parent / "found").glob("*.json"))
+
+
+def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
+    campaign = Campaign(seed=9, limits=Limits(), engine="looped", keep=None)
+    campaign.run(first=43, count=40, jobs=2)
+    assert not campaign.failures, campaign.table()
+    assert campaign.outcomes[REFUSED] >= 10
+    assert campaign.outcomes[RAN] >= 5
+
+
+@pytest.fixture(scope="module")
+def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
+    one = Worker(Limits(), "looped", tmp_path_factory.mktemp("fuzz"), 0)
+    yield one
+    one.close()
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_what_once_broke(worker: Worker, path: Path) -> None:
+    worker.ask(json.loads(path.read_text("utf-8")))
+    outcome = worker.answer()
+    assert outcome.kind not in BAD, outcome
+
+
+@pytest.mark.parametrize("name", ["beams", "boxes"])
+def test_the_scenes_of_many_tables_are_lawful(worker: Worker, name: str) -> None:
+    worker.ask(seeds()[name], turn=0)
+    assert worker.answer().kind in GOOD[1:]
+
+
+def test_a_mutant_is_always_the_same_scene() -> None:
+    assert repr(mutant(3, 4)) == repr(mutant(3, 4))
+    assert repr(mutant(3, 4)) != repr(mutant(3, 5))
+
+
+# --- the fuzzer sees what it is made for ---------------------------------------------------------
+
+
+@pytest.fixture
+def told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Iterator[Callable[[str, Limits], Outcome]]:
+    """What a worker says of a lawful scene in an mstmm with a defect where scenes are compiled."""
+    workers = []
+
+    def tell(defect: str, limits: Limits) -> Outcome:
+        monkeypatch.setattr("mstmm.compile", lambda *_, **__: exec(defect), raising=False)
+        workers.append(Worker(limits, "looped", tmp_path, 0))
+        workers[-1].ask(seeds()["simple_pendulum"])
+        return workers[-1].answer()
+
+    yield tell
+    for worker in workers:
+        worker.close()
+
+
+DEFECTS = {
+    "1 / 0": (TRACEBACK, "ZeroDivisionError", Limits()),
+    "import os; os.abort()": (CRASH, "SIGABRT", Limits()),
+    "while True: pass": (HANG, "compile", Limits(cpu=0.2)),
+    "import time; time.sleep(1000)": (HANG, "waits", Limits(wall=0.2)),
+    "[0] * 10**10": (TRACEBACK, "MemoryError", Limits()),
+}
+
+
+@pytest.mark.parametrize("defect", DEFECTS)
+def test_a_defect_is_told(told: Callable[[str, Limits], Outcome], defect: str) -> None:
+    kind, detail, limits = DEFECTS[defect]
+    outcome = told(defect, limits)
+    assert outcome.kind == kind and detail in outcome.detail
+
+
+def test_a_failing_scene_is_made_small() -> None:
+    def fails_with_inertia(data: Data) -> Outcome:
+        return Outcome(TRACEBACK, "x") if "'inertia'" in str(data) else Outcome(RAN)
+
+    small = smaller(seeds()["simple_pendulum"], fails_with_inertia, TRACEBACK, "x", 100)
+    assert [place[-1] for place in places(small)] == ["body", 0, "inertia"]
