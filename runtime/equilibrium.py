@@ -56,8 +56,8 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Equilibri
             "start, q = ..."
         ) from None
     result = _with_drives(model, found, t).view(Equilibrium)
-    left = problem.needed(found)
-    result.residuals = {model.layout.u_name(j): float(x) for j, x in zip(free, left, strict=True)}
+    efforts = dict(zip(free, problem.needed(found).tolist(), strict=True))
+    result.residuals = {model.layout.u_name(j): effort for j, effort in efforts.items()}
     return result
 
 

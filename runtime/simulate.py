@@ -354,7 +354,26 @@ def _message(system: SceneSystem, run: Run) -> str:
         )
     message = run.message(system.components(), system.event_names)
     work = failure is not None and failure.component == system.engine.nq + system.engine.nu
-    return message + (busiest(system, run.t, run.y) if work else "")
+    message += busiest(system, run.t, run.y) if work else ""
+    small = failure is not None and failure.status is Status.STEP_TOO_SMALL
+    return message + (_indefinite(system, run.y) if small else "")
+
+
+def _indefinite(system: SceneSystem, y: Array) -> str:
+    """Which mass matrices were lost, in words: the reason of many a step that is too small."""
+    packed = system.engine.packed
+    if not packed.flexible:
+        return ""
+    from .flexible.definiteness import indefinite_bodies
+
+    lost = indefinite_bodies(packed, y[: system.engine.nq])
+    names = ", ".join(f'"{name}"' for name in lost[:3]) + (", ..." if len(lost) > 3 else "")
+    return (
+        f"; the mass matrix of flexible body {names} is not positive definite at its deflection: "
+        'leave frame = "auto" and quadrature = "auto", or split the body'
+        if lost
+        else ""
+    )
 
 
 def busiest(system: SceneSystem, t: float, y: Array) -> str:

@@ -79,16 +79,17 @@ def test_far_bending_under_a_force_that_follows_the_end() -> None:
 
 def test_a_stiff_direction_does_not_end_the_search_in_a_soft_one() -> None:
     """Axial shapes are ten million times stiffer than bending."""
-    stiff = {"axial_stiffness": 1e7, "modes": {"y": 3, "axial": 2}}
-    model = welded(4, 2.0, **stiff)
+    model = welded(4, 2.0, axial_stiffness=1e7, modes={"y": 3, "axial": 2})
     q = model.equilibrium()
     assert np.abs(model.accelerations(q, np.zeros(model.nu))).max() < 1e-6
     assert np.abs(tip(model, q, "p3.tip") - elastica(2.0)).max() < 2e-3
 
 
 def test_a_soft_twist_beside_stiff_tension_is_determined() -> None:
-    beam = {"torsional_stiffness": 1.0, "polar_inertia_per_length": 0.01, "axial_stiffness": 1e10}
-    model = welded(1, 0.1, modes={"y": 2, "twist": 2, "axial": 2}, frame="tangent", **beam)
+    model = welded(
+        1, 0.1, modes={"y": 2, "twist": 2, "axial": 2}, frame="tangent", axial_stiffness=1e10,
+        torsional_stiffness=1.0, polar_inertia_per_length=0.01,
+    )  # fmt: skip
     q = model.equilibrium()
     assert tip(model, q, "p0.tip")[1] == pytest.approx(0.1 / 3, rel=1e-2)
 

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from mstmm.scene_rules import GROUND, split
 
+from ..definiteness import stays_definite
 from ..modal_body import ModalBody, ModalPort
+from ..support import Supports
 from .checks import checked
 from .craig_bampton import Reduction, reduce
 from .matrices import from_arrays, load_matrices, save_matrices
@@ -62,7 +64,17 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     holder = _holder(elastic.name, scene)
     held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
     used = frozenset(_used(elastic.name, scene) | {held})
-    return _made(_Source(elastic), held, used, *_frame(elastic, holder, held))
+    source, (frame, why) = _Source(elastic), _frame(elastic, holder, held)
+    body = _made(source, held, used, frame, why)
+    if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
+        return body
+    why = "mean, because the mass matrix stays definite there"
+    return _made(source, held, used, "mean", why)
+
+
+def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
+    turns = np.stack([one.theta for one in body.ports.values()])
+    return stays_definite(body, body.ports[held], Supports(scene).of(body.name), turns)
 
 
 class _Source:
