@@ -218,7 +218,8 @@ def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
         q, u = start[: engine.nq], start[engine.nq : engine.nq + engine.nu]
         at = np.array([settings.t_start])
         seen = engine.observe(at, q[None], u[None], system.memory[None], parts=("sums",))
-        energy = float(np.abs(seen.sums[0, :3]).sum()) or 1.0
+        energy = float(np.abs(seen.sums[0, :3]).sum())
+        energy = energy if energy > 0 and np.isfinite(energy) else 1.0
         found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
     return found
 

@@ -21,6 +21,9 @@ InverseDynamics = Callable[[Array, Array, Array], Array]
 
 _ACCURACY = 1e-10
 
+#: Rotation of a section, rad, that the kernels refuse.
+_LARGEST_TURN = 1.5
+
 
 def settle(
     needed: InverseDynamics,
@@ -49,7 +52,7 @@ def settle(
     sizes = np.concatenate([modal_sizes(body) for body in bodies.values()])
     problem = Rest(lambda q: needed(q, u, rest)[at_u], moved, sizes)
     try:
-        return at_rest(problem, q, _ACCURACY)
+        found = at_rest(problem, q, _ACCURACY)
     except (Unsettled, Undetermined) as failure:
         names = ", ".join(f'"{name}"' for name in bodies)
         found = "are at the edge of" if isinstance(failure, Undetermined) else "may be beyond"
@@ -57,3 +60,17 @@ def settle(
             f"no static shape of {names} found under the loads at t = 0; they {found} buckling; "
             "start undeformed or give eta"
         ) from None
+    for name, body in bodies.items():
+        _refuse_turned(body, found[slots[name].q_slice])
+    return found
+
+
+def _refuse_turned(body: ModalBody, eta: Array) -> None:
+    """NumericalFailure for a shape in which an end turns further than the model knows."""
+    turned = max(float(np.linalg.norm(port.theta @ eta)) for port in body.ports.values())
+    if turned > _LARGEST_TURN:
+        raise NumericalFailure(
+            f'the static shape of "{body.name}" under the loads at t = 0 turns an end by '
+            f"{turned:.2g} rad against its frame, far beyond small deflections; check the "
+            "stiffness, split the body into several that are welded together, or start undeformed"
+        )
