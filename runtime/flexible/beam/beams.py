@@ -10,6 +10,7 @@ import numpy as np
 from mstmm.errors import SceneError
 from mstmm.scene_parts import Load
 
+from ..computable import computed
 from ..definiteness import stays_definite
 from ..modal_body import Array, MassPoint, ModalBody
 from ..support import Support, Supports
@@ -43,7 +44,9 @@ class BeamBodies:
         support = self._supports.of(beam.name)
         key = repr((beam.model_copy(update={"name": ""}), held, support, sorted(idle)))
         if key not in self._known:
-            self._known[key] = _made(beam, data, held, support, idle)
+            self._known[key] = computed(
+                f'beam "{beam.name}"', lambda: _made(beam, data, held, support, idle)
+            )
         core = self._known[key]
         assert core.shapes is not None
         spans = {

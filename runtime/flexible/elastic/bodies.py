@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mstmm.scene_rules import GROUND, split
 
+from ..computable import computed
 from ..definiteness import stays_definite
 from ..modal_body import ModalBody, ModalPort
 from ..support import Supports
@@ -97,6 +98,10 @@ class _Source:
 @lru_cache(maxsize=KEPT)
 def _made(source: _Source, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
     elastic = source.elastic
+    return computed(f'elastic "{elastic.name}"', lambda: _reduced(elastic, held, used, frame, why))
+
+
+def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
     model = model_of(elastic)
     ports = []
     for name, end in elastic.ends.items():

@@ -129,7 +129,10 @@ def _gamma(
         return None
     forces = {port: load[some] for port, load in flexible.end_forces(name).items()}
     from_loads = e.stiffness_from_loads(motion, flexible.gravity, forces, second)
-    return e.load_ratios(motion.body.K, from_loads)
+    try:
+        return e.load_ratios(motion.body.K, from_loads)
+    except np.linalg.LinAlgError:  # loads beyond what numbers hold
+        return None
 
 
 def _tail(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
