@@ -31,6 +31,8 @@ _ROUNDING = 1e-9
 _AGREES = 1e-3
 #: Smallest mass, moment and stiffness of a beam, and the inverse of the largest.
 _TINY = 1e-100
+#: Largest ratio between two pieces of a beam in mass or stiffness per length.
+_CONTRAST = 1e12
 
 #: Key of the section -> what it is, with its unit.
 _MEANING = {
@@ -180,19 +182,44 @@ def _polar(beam: Beam) -> Iterator[Problem]:
 
 
 def _sizes(beam: Beam) -> Iterator[Problem]:
-    """Can the moments and stiffnesses of the beam be written as numbers at all?"""
+    """Can the moments, stiffnesses and frequencies of the beam be written as numbers at all?"""
     if any(piece.mass_per_length is None for piece in beam.sections):
         return
     square, cube = beam.length * beam.length, beam.length * beam.length * beam.length
     sizes = [cube, beam.mass, beam.mass * square]
     for piece in beam.sections:
-        sizes += [stiffness / (cube or 1) for stiffness in piece.bending_stiffness or ()]
+        stiffness = [EI / (cube or 1) for EI in piece.bending_stiffness or ()]
+        stiffness += [EA / beam.length for EA in (piece.axial_stiffness,) if EA is not None]
+        sizes += [*stiffness, *(k / (beam.mass or 1) for k in stiffness)]
+        turning = piece.polar_inertia_per_length
+        for twist in (piece.torsional_stiffness,) if turning else ():
+            sizes += [] if twist is None else [twist, twist / (turning or 1) / (square or 1)]
     if not all(_TINY < size < 1 / _TINY for size in sizes):
         yield (
             ("length",),
             f"a beam of {beam.length:g} m and {beam.mass:g} kg has mass and stiffness beyond what "
             "numbers hold; check the units (m, kg/m, N m^2)",
         )
+        return
+    yield from _contrast(beam)
+
+
+def _contrast(beam: Beam) -> Iterator[Problem]:
+    """Are the pieces so unlike that the shapes of the one drown in the rounding of the other?"""
+    for key in _MEANING:
+        given = [getattr(piece, key) for piece in beam.sections]
+        rows = [one if isinstance(one, tuple) else (one,) for one in given if one is not None]
+        for column in zip(*rows, strict=True):
+            least, most = min(column), max(column)
+            if least > 0 and most > _CONTRAST * least:
+                i = next(i for i, row in enumerate(rows) if least in row)
+                yield (
+                    _at(beam, i, key),
+                    f"expected {1 / _CONTRAST:g} of the largest one, {most:g}, or more, found "
+                    f"{least:g}: the shapes of such a beam cannot be told apart; model the light "
+                    "part as a beam of its own",
+                )
+                return
 
 
 def _shapes(beam: Beam) -> Iterator[Problem]:

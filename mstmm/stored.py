@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import astuple
 
-from .ir import from_json, to_json
+from .ir import KernelIR, from_json, to_json
 from .spec import ElementSpec, Param
 
 
@@ -40,3 +40,10 @@ def element_from_json(text: str) -> ElementSpec:
         sources=tuple(data["sources"]),
         **groups,
     )
+
+
+def kernel_from_json(text: str, name: str) -> KernelIR:
+    """One kernel of a stored element, without making the others.  KeyError if it has none of this
+    name, ValueError as above."""
+    stored = {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
+    return from_json(json.dumps(stored[name]))

@@ -74,7 +74,10 @@ def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
         )
         if seen.failures:
             continue
-        ratios = pivots.ratios(model._engine.workspace_array(), run.memory[k])
+        try:
+            ratios = pivots.ratios(model._engine.workspace_array(), run.memory[k])
+        except np.linalg.LinAlgError:  # numbers that overflow in products, or underflow
+            continue
         place = int(ratios.argmax())
         if ratios[place] > worst.ratio:
             hinge = model._engine.hinge_name(place)

@@ -28,7 +28,9 @@ def message_of(system: SceneSystem, run: Run) -> str:
         return f"{text}; last good state at t = {run.t:.9g} s"
     message = run.message(system.components(), system.event_names, cause)
     work = failure is not None and failure.component == system.engine.nq + system.engine.nu
-    return message + (busiest(system, run.t, run.y) if work else "")
+    message += busiest(system, run.t, run.y) if work else ""
+    small = failure is not None and failure.status is Status.STEP_TOO_SMALL
+    return message + (_indefinite(system, run.y) if small else "")
 
 
 def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at: float) -> str:
@@ -38,6 +40,23 @@ def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at:
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
     return culprit_ahead(engine, t, q, u, system.memory, failed_at)
+
+
+def _indefinite(system: SceneSystem, y: Array) -> str:
+    """Which mass matrices were lost, in words: the reason of many a step that is too small."""
+    packed = system.engine.packed
+    if not packed.flexible:
+        return ""
+    from .flexible.definiteness import indefinite_bodies
+
+    lost = indefinite_bodies(packed, y[: system.engine.nq])
+    names = ", ".join(f'"{name}"' for name in lost[:3]) + (", ..." if len(lost) > 3 else "")
+    return (
+        f"; the mass matrix of flexible body {names} is not positive definite at its deflection: "
+        'leave frame = "auto" and quadrature = "auto", or split the body'
+        if lost
+        else ""
+    )
 
 
 def busiest(system: SceneSystem, t: float, y: Array) -> str:

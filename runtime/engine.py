@@ -147,6 +147,14 @@ class Engine:
             raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
+    def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:
+        """qdot (nq,) of one state: kinematics alone, so that no inertia has to be positive."""
+        self.inverse_dynamics(t, q, u, np.zeros(self.nu), memory)
+        model = self.packed.model
+        first = int(model.scratch) + self.nq + self.nu + int(model.n_values)
+        first += 3 * int(model.n_drives) + int(model.tape_slots)
+        return self.workspace_array()[first : first + self.nq].copy()
+
     def probes(self, probes: Sequence[Probe]) -> Any:
         """`mstmm_probe[]`."""
         records = self.ffi.new("mstmm_probe[]", max(1, len(probes)))

@@ -1,69 +1,67 @@
-"""Static equilibrium by Newton on the efforts that rest needs."""
+"""Static equilibrium of a model: no effort needed at rest in the free coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.errors import NumericalFailure
+from mstmm.hinge_types import HINGE_TYPES
 
 from .layout import refuse_dense
+from .rest import Rest, Undetermined, Unsettled, at_rest
+from .sizes import speed_sizes
 
 if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
-Needed = Callable[[Array], Array]
 
-_STEP = 1e-6  # of the difference quotients, rad or m
-_LONGEST = 0.5  # step, rad or m
-_SOFT = 1e-6  # part of the largest stiffness below which a direction counts as slack
-_MAX_ITERATIONS = 100
+#: Coordinates that a message lists.
+_LISTED = 3
 
 
-def moved(model: Model, q: Array, increment: Array) -> Array:
-    """q after a small motion `increment` (nu) along the speeds; quaternions stay unit."""
-    engine = model._engine
-    rates, _ = engine.accelerations(0.0, q[None].copy(), increment[None].copy(), model._memory(1))
-    result = q + rates[0]
-    for first in model.layout.quaternions:
-        unit = result[first : first + 4]
-        result[first : first + 4] = unit / np.linalg.norm(unit)
-    return np.asarray(result)
+class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
+    """q (nq,) of an equilibrium, an array like any other.
+
+    `residuals` are the efforts in N or N*m (of modal coordinates N, or N*m for twist) still missing
+    there, by the names of the free speeds; arrays computed from this one have none.
+    """
+
+    residuals: dict[str, float]
+
+    def __array_finalize__(self, source: object) -> None:
+        self.residuals = {}
 
 
-def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Array:
+def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
     refuse_dense(model.nu, "the stiffness matrix")
-    still = np.zeros(model.nu)
-    free = _free_speeds(model)
-
-    def needed(at: Array) -> Array:
-        return np.asarray(model.inverse_dynamics(at, still, still, t)[free])
-
-    q = q.copy()
-    scale = 1.0
-    residual = needed(q)
-    for _ in range(_MAX_ITERATIONS):
-        size = float(np.abs(residual).max(initial=0.0))
-        slope = _slope(model, q, needed, free)
-        scale = max(scale, float(np.abs(slope).max(initial=0.0)))
-        if size <= tolerance * scale:
-            _refuse_undetermined(model, slope, free)
-            return q
-        step = np.zeros(model.nu)
-        step[free] = _step(slope, residual)
-        q, residual = _followed(model, q, step, needed, free)
-    raise NumericalFailure(
-        f"no equilibrium found near the start: after {_MAX_ITERATIONS} steps an effort of "
-        f"{size:.3g} (N or N*m) is left; give another start, q = ..."
-    )
+    free = free_speeds(model)
+    problem = _problem(model, t, free)
+    try:
+        found = at_rest(problem, q, tolerance)
+    except Undetermined as failure:
+        names = ", ".join(model.layout.u_name(int(free[k])) for k in failure.places)
+        raise NumericalFailure(
+            f"the equilibrium is undetermined along {names}: nothing pushes these coordinates "
+            "back; fix them, drive them or add a stiffness"
+        ) from None
+    except Unsettled as failure:
+        left = _largest(model, free, failure.residual, problem.sizes)
+        raise NumericalFailure(
+            f"no equilibrium found near the start ({failure}); efforts left: {left}; give another "
+            "start, q = ..."
+        ) from None
+    result = _with_drives(model, found, t).view(Equilibrium)
+    efforts = dict(zip(free, problem.needed(found).tolist(), strict=True))
+    result.residuals = {model.layout.u_name(j): effort for j, effort in efforts.items()}
+    return result
 
 
-def _free_speeds(model: Model) -> list[int]:
+def free_speeds(model: Model) -> list[int]:
     """Speeds that no drive prescribes."""
     free = []
     for number, hinge in enumerate(model._engine.packed.scene.hinges):
@@ -76,64 +74,53 @@ def _free_speeds(model: Model) -> list[int]:
     return free
 
 
-def _slope(model: Model, q: Array, needed: Needed, free: list[int]) -> Array:
-    columns = []
-    for j in free:
-        increment = np.zeros(model.nu)
-        increment[j] = _STEP
-        ahead, behind = moved(model, q, increment), moved(model, q, -increment)
-        columns.append((needed(ahead) - needed(behind)) / (2 * _STEP))
-    return np.array(columns).reshape(len(free), len(free)).T
+def _problem(model: Model, t: float, free: list[int]) -> Rest:
+    engine, still = model._engine, np.zeros(model.nu)
+    memory, quaternions = engine.start_memory(), model.layout.quaternions
+    straight = _straight_places(model, free)
+
+    def needed(q: Array) -> Array:
+        return np.asarray(engine.inverse_dynamics(t, q, still, still, memory)[free])
+
+    def moved(q: Array, increment: Array) -> Array:
+        if straight is not None:
+            result = q.copy()
+            result[straight] += increment
+            return result
+        speeds = np.zeros(model.nu)
+        speeds[free] = increment
+        result = q + engine.rates(t, q, speeds, memory)
+        for first in quaternions:
+            unit = result[first : first + 4]
+            result[first : first + 4] = unit / np.linalg.norm(unit)
+        return np.asarray(result)
+
+    return Rest(needed, moved, speed_sizes(model)[free])
 
 
-def _step(slope: Array, residual: Array) -> Array:
-    """Newton's step where the stiffness is positive definite; else one that runs downhill too.
-
-    Along directions in which the stiffness is negative or vanishes, Newton would run uphill or far
-    away; the step goes with the forces there, so that unstable equilibria are left behind (for
-    forces without potential this is only a heuristic).
-    """
-    values, directions = np.linalg.eigh((slope + slope.T) / 2)
-    largest = float(np.abs(values).max(initial=1e-300))
-    if values.min(initial=np.inf) > _SOFT * largest:
-        return np.asarray(np.linalg.solve(slope, -residual))
-    softened = np.maximum(np.abs(values), _SOFT * largest)
-    return np.asarray(-directions @ ((directions.T @ residual) / softened))
+def _straight_places(model: Model, free: list[int]) -> NDArray[np.int64] | None:
+    """Places in q whose rates are the free speeds; None where a hinge has others."""
+    places = np.zeros(model.nu, dtype=np.int64)
+    for slots in model.layout.hinges.values():
+        kind = HINGE_TYPES.get(slots.type)
+        if slots.nu and (kind is None or kind.quaternion is not None):
+            return None
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    for slots in model.layout.modal.values():
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    return np.asarray(places[free])
 
 
-def _followed(
-    model: Model, q: Array, step: Array, needed: Needed, free: list[int]
-) -> tuple[Array, Array]:
-    """q after the step, at most _LONGEST long, halved until it falls or does not climb again.
+def _with_drives(model: Model, q: Array, t: float) -> Array:
+    """q with driven coordinates where their drives have them."""
+    from .simulate import SceneSystem
 
-    Where forces have a potential, `needed` is its gradient: the step has not passed the bottom by
-    much as long as the gradient along it has not turned around to more than half its size.
-    """
-    step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
-    before = needed(q)
-    size, along = float(np.abs(before).max(initial=0.0)), abs(float(before @ step[free]))
-    for _ in range(20):
-        trial = moved(model, q, step)
-        residual = needed(trial)
-        falls = float(np.abs(residual).max(initial=0.0)) < size
-        if falls or float(residual @ step[free]) <= along / 2:
-            break
-        step, along = step / 2, along / 2
-    return trial, residual
+    return SceneSystem(model._engine).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
-def _refuse_undetermined(model: Model, slope: Array, free: list[int]) -> None:
-    if not free:
-        return
-    _, singular, directions = np.linalg.svd(slope)
-    scale = max(float(singular[0]), 1e-300)
-    loose = [directions[i] for i, s in enumerate(singular) if s < 1e-7 * scale or singular[0] == 0]
-    if not loose:
-        return
-    share = np.abs(np.array(loose)).max(axis=0)
-    names = [model.layout.u_name(int(free[j])) for j in np.nonzero(share > 0.1)[0]]
-    raise NumericalFailure(
-        "the equilibrium is undetermined along "
-        + ", ".join(names)
-        + ": nothing pushes these coordinates back; fix them, drive them or add a stiffness"
-    )
+def _largest(model: Model, free: list[int], residual: Array, sizes: Array) -> str:
+    """The largest efforts by name, counted by their work over a motion of order one."""
+    order = np.argsort(-np.abs(residual * sizes))[:_LISTED]
+    listed = [f"{residual[k]:.3g} along {model.layout.u_name(int(free[k]))}" for k in order]
+    more = len(residual) - len(listed)
+    return ", ".join(listed) + " (N or N*m)" + (f" and {more} smaller" if more > 0 else "")

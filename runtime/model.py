@@ -24,6 +24,7 @@ from .start import start_values
 
 if TYPE_CHECKING:
     from .derivatives import Derivatives, Differentiation
+    from .equilibrium import Equilibrium
     from .flexible.modal_body import ModalBody
     from .result import Result
     from .simulate_batch import BatchResult
@@ -109,7 +110,7 @@ class Model:
         engine, memory = self._engine, self._engine.start_memory()
         return settle(
             lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
-            q, u, [self.layout.modal[name] for name in names],
+            q, u, {name: self.flexible[name] for name in names}, self.layout.modal,
         )  # fmt: skip
 
     def refuse_undetermined_start(self) -> None:
@@ -188,11 +189,15 @@ class Model:
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
-    ) -> Array:
+    ) -> Equilibrium:
         """q (nq,) at which every acceleration vanishes at rest, by Newton from `q` (or the start).
 
-        Raises NumericalFailure naming the coordinates that nothing determines, or if Newton finds
-        no equilibrium near the start.
+        `tolerance` is how far coordinates may be off: rad, or parts of the length of what they
+        move.  The array found has `residuals`, the efforts still missing by the names of speeds.
+        Where Newton's method fails, what is missing at the start is applied in parts.
+
+        Raises NumericalFailure naming the coordinates that nothing determines, or, with the efforts
+        that are left, if there is no equilibrium near the start.
         """
         from .equilibrium import equilibrium
 

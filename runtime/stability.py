@@ -89,7 +89,7 @@ def check_step(
     try:
         value, vector = fastest(engine, settings.t_start, y[:n].copy(), memory)
         shares = _shares(engine, settings.t_start, y, memory, vector[engine.nq :])
-    except NumericalFailure:  # the run itself will say what is wrong
+    except (NumericalFailure, np.linalg.LinAlgError):  # the run itself will say what is wrong
         return None
     value = complex(min(value.real, 0.0), value.imag)
     rate = abs(value)
@@ -155,7 +155,7 @@ def _rates(engine: Engine, t: float, states: Array, memory: Array) -> Array:
 
 def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Array]:
     """The same for large states, from products of the Jacobian with vectors."""
-    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
     n, rest = len(y), _rates(engine, t, y[None], memory)[0]
 
@@ -173,6 +173,8 @@ def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex,
         )
     except ArpackNoConvergence as error:
         values, vectors = error.eigenvalues, error.eigenvectors
+    except ArpackError:  # a motion without any rate: nothing that a step could be too long for
+        return 0j, start
     if not len(values):
         return 0j, start
     return complex(values[0]), np.asarray(vectors[:, 0])

@@ -41,6 +41,14 @@ def moments_of(body: Moments) -> dict[str, Array]:
     return found
 
 
+def section_inputs(port: ModalPort) -> dict[str, Array]:
+    """Inputs r, phi, theta, g_x .. h_z of the kernel "section" of ("sweep", "modal")."""
+    second = [f"{kind}_{axis}" for kind in "gh" for axis in "xyz"]
+    return {"r": port.position, "phi": port.phi, "theta": port.theta} | dict(
+        zip(second, port.second_order, strict=True)
+    )
+
+
 M = TypeVar("M", bound=Moments)
 
 

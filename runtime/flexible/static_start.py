@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,47 +10,67 @@ from numpy.typing import NDArray
 from mstmm.errors import NumericalFailure
 
 from ..layout import HingeSlots
+from ..rest import Rest, Undetermined, Unsettled, at_rest
+from ..sizes import modal_sizes
+from .modal_body import ModalBody
 
 Array = NDArray[np.float64]
 
 #: (q, u, udot) -> efforts (nu,) that these accelerations need.
 InverseDynamics = Callable[[Array, Array, Array], Array]
 
-_ITERATIONS, _STEP, _ACCURACY = 50, 1e-6, 1e-12
+_ACCURACY = 1e-10
+
+#: Rotation of a section, rad, that the kernels refuse.
+_LARGEST_TURN = 1.5
 
 
-def settle(needed: InverseDynamics, q: Array, u: Array, bodies: Iterable[HingeSlots]) -> Array:
+def settle(
+    needed: InverseDynamics,
+    q: Array,
+    u: Array,
+    bodies: Mapping[str, ModalBody],
+    slots: Mapping[str, HingeSlots],
+) -> Array:
     """q with the modal coordinates of `bodies` at rest: no modal speed, no modal acceleration.
 
     Hinges stay at their places and keep their speeds without acceleration (a spinning blade starts
-    stretched out); so the shape is that of bodies whose hinges are held.  Newton on the modal
-    efforts with a differenced tangent.  Raises NumericalFailure if there is no such shape nearby.
+    stretched out); so the shape is that of bodies whose hinges are held.  Raises NumericalFailure
+    if there is no such shape nearby.
     """
-    slots = list(bodies)
-    at_q = np.concatenate([np.arange(s.q, s.q + s.nq) for s in slots])
-    at_u = np.concatenate([np.arange(s.u, s.u + s.nu) for s in slots])
-    q, u, rest = q.copy(), u.copy(), np.zeros(len(u))
+    own = [slots[name] for name in bodies]
+    at_q = np.concatenate([np.arange(s.q, s.q + s.nq) for s in own])
+    at_u = np.concatenate([np.arange(s.u, s.u + s.nu) for s in own])
+    u, rest = u.copy(), np.zeros(len(u))
     u[at_u] = 0.0
 
-    def residual(eta: Array) -> Array:
-        q[at_q] = eta
-        return needed(q, u, rest)[at_u]
+    def moved(q: Array, increment: Array) -> Array:
+        result = q.copy()
+        result[at_q] += increment
+        return result
 
-    eta = q[at_q].copy()
-    for _ in range(_ITERATIONS):
-        here = residual(eta)
-        scale = _STEP * max(1e-3, float(np.abs(eta).max()))
-        columns = [
-            (residual(eta + scale * unit) - residual(eta - scale * unit)) / (2 * scale)
-            for unit in np.eye(len(eta))
-        ]
-        step = np.linalg.solve(np.array(columns).T, -here)
-        eta = eta + step
-        if float(np.abs(step).max()) <= _ACCURACY * max(1e-3, float(np.abs(eta).max())):
-            residual(eta)
-            return q
-    names = ", ".join(f'"{s.name}"' for s in slots)
-    raise NumericalFailure(
-        f"no static shape of {names} found under the loads at t = 0; they may be beyond buckling; "
-        "start undeformed or give eta"
-    )
+    sizes = np.concatenate([modal_sizes(body) for body in bodies.values()])
+    problem = Rest(lambda q: needed(q, u, rest)[at_u], moved, sizes)
+    try:
+        found = at_rest(problem, q, _ACCURACY)
+    except (Unsettled, Undetermined) as failure:
+        names = ", ".join(f'"{name}"' for name in bodies)
+        where = "are at the edge of" if isinstance(failure, Undetermined) else "may be beyond"
+        raise NumericalFailure(
+            f"no static shape of {names} found under the loads at t = 0; they {where} buckling; "
+            "start undeformed or give eta"
+        ) from None
+    for name, body in bodies.items():
+        _refuse_turned(body, found[slots[name].q_slice])
+    return found
+
+
+def _refuse_turned(body: ModalBody, eta: Array) -> None:
+    """NumericalFailure for a shape in which an end turns further than the model knows."""
+    turned = max(float(np.linalg.norm(port.theta @ eta)) for port in body.ports.values())
+    if turned > _LARGEST_TURN:
+        raise NumericalFailure(
+            f'the static shape of "{body.name}" under the loads at t = 0 turns an end by '
+            f"{turned:.2g} rad against its frame, far beyond small deflections; check the "
+            "stiffness, split the body into several that are welded together, or start undeformed"
+        )

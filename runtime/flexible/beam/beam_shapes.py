@@ -68,7 +68,7 @@ class BeamShapes:
         places = sorted({*data.breaks, *inner})
         smallest = 1e-12 * data.length
         self.pieces = tuple(
-            b for a, b in zip((-1.0, *places), places, strict=False) if b - a > smallest
+            b for a, b in zip((-data.length, *places), places, strict=False) if b - a > smallest
         )  #: every place between which all shapes and sections are smooth
         self.density = max((mode.shape.density for mode in modes), default=0.0)
         self.second_order = SecondOrder(self, frames)

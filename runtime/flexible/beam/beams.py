@@ -10,10 +10,13 @@ import numpy as np
 from mstmm.errors import SceneError
 from mstmm.scene_parts import Load
 
+from ..computable import computed
+from ..definiteness import stays_definite
 from ..modal_body import Array, MassPoint, ModalBody
+from ..support import Support, Supports
 from .bases import shapes_of
 from .beam_shapes import DIRECTIONS, BeamShapes, Mode
-from .choices import BENDING, Choice, choices, wants_quadrature, warnings
+from .choices import BENDING, Choice, choices, in_the_mean, may_change_frame, warnings
 from .data import BeamData, beam_data
 from .frames import in_frame
 from .holding import Holding, Surroundings, holding
@@ -29,7 +32,7 @@ class BeamBodies:
     """Beams of one scene; equal ones that are held alike are worked out once."""
 
     def __init__(self, scene: Scene) -> None:
-        self._around = Surroundings(scene)
+        self._around, self._supports = Surroundings(scene), Supports(scene)
         self._plane = Planar(scene) if any(beam.modes is None for beam in scene.beam) else None
         self._known: dict[str, ModalBody] = {}
 
@@ -38,9 +41,12 @@ class BeamBodies:
         data = beam_data(beam)
         held = holding(self._around, beam, data)
         idle = self._idle(beam)
-        key = repr((beam.model_copy(update={"name": ""}), held, sorted(idle)))
+        support = self._supports.of(beam.name)
+        key = repr((beam.model_copy(update={"name": ""}), held, support, sorted(idle)))
         if key not in self._known:
-            self._known[key] = _made(beam, data, held, idle)
+            self._known[key] = computed(
+                f'beam "{beam.name}"', lambda: _made(beam, data, held, support, idle)
+            )
         core = self._known[key]
         assert core.shapes is not None
         spans = {
@@ -71,8 +77,33 @@ def _span(load: Load, length: float) -> tuple[float, float]:
     return start, min(end, length)
 
 
-def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> ModalBody:
+def _made(
+    beam: Beam, data: BeamData, held: Holding, support: Support, idle: frozenset[str]
+) -> ModalBody:
     chosen = choices(beam, data, held, idle)
+    body = _of_choices(beam, data, held, chosen, idle)
+    definite = bool(beam.quadrature) or _stays_definite(body, held, support)
+    if not definite and may_change_frame(beam, chosen):
+        body = _of_choices(beam, data, held, in_the_mean(chosen), idle)
+        definite = _stays_definite(body, held, support)
+    if beam.quadrature or (beam.quadrature is None and not definite):
+        assert body.shapes is not None
+        points = mass_points(body.shapes)
+        said = f"the mass sits in {len(points)} points (quadrature)"
+        return replace(body, points=points, notes=(*body.notes, said))
+    return body
+
+
+def _stays_definite(body: ModalBody, held: Holding, support: Support) -> bool:
+    shapes = body.shapes
+    assert shapes is not None
+    places = np.linspace(0.0, shapes.length, 2 * body.n + 3)
+    return stays_definite(body, body.ports[held.name], support, shapes.at(places).theta)
+
+
+def _of_choices(
+    beam: Beam, data: BeamData, held: Holding, chosen: tuple[Choice, ...], idle: frozenset[str]
+) -> ModalBody:
     modes: list[Mode] = []
     notes = [f"{d}: none, because the scene stays in a plane" for d in BENDING if d in idle]
     for choice in chosen:
@@ -88,10 +119,6 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
     shapes_all = BeamShapes(
         data, tuple(modes), beam.stiffening, {c.direction: c.frame for c in chosen}
     )
-    points: tuple[MassPoint, ...] = ()
-    if wants_quadrature(beam, held, chosen):
-        points = mass_points(shapes_all)
-        notes.append(f"the mass sits in {len(points)} points (quadrature)")
     body_moments = mass_moments(shapes_all)
     k = stiffness(shapes_all)
     mass = np.einsum("aakl->kl", body_moments.F)
@@ -104,7 +131,6 @@ def _made(beam: Beam, data: BeamData, held: Holding, idle: frozenset[str]) -> Mo
         K=k,
         D=damping(mass, k, beam.damping.ratio, beam.damping.stiffness, _blocks(modes), beam.name),
         ports={name: shapes_all.section(x, turn) for name, (x, turn) in data.ends.items()},
-        points=points,
         drag=drag_moments(shapes_all),
         eta=eta,
         etad=etad,

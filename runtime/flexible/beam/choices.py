@@ -17,13 +17,15 @@ their first frequency is below three times the highest of bending: beyond, they 
 once and cost only small steps.  A scene that stays in a plane (`planar`) gets the shapes of that
 plane alone.
 
-Quadrature: stiffened beams with a tangent frame at a section that is free to turn and two shapes or
-more in that direction; the moments of second order would lose their definite mass matrix.
+Where the mass matrix of a stiffened beam would not stay definite over the slopes that the model is
+made for (`definiteness`), the same shapes are taken in the mean frame, in which the shapes carry no
+momentum and leave the inertia where it is.  A frame that is asked for is kept, and the mass goes
+into points instead (quadrature).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,17 +78,15 @@ def choices(
     return tuple(made)
 
 
-def wants_quadrature(beam: Beam, held: Holding, chosen: tuple[Choice, ...]) -> bool:
-    """The mass in points: as asked for, or by the rule above."""
-    if beam.quadrature is not None:
-        return beam.quadrature
-    return beam.stiffening and any(
-        c.direction in held.turns
-        and c.direction not in held.heavy_rotor
-        and c.frame == Frame("tangent", held.x)
-        and c.count >= 2
-        for c in chosen
-    )
+def may_change_frame(beam: Beam, chosen: tuple[Choice, ...]) -> bool:
+    """Whether no frame was asked for, and there is another one to take."""
+    return beam.frame_kind == "auto" and any(c.frame.kind != "mean" for c in chosen)
+
+
+def in_the_mean(chosen: tuple[Choice, ...]) -> tuple[Choice, ...]:
+    """The same shapes, all counted from the mean of the mass."""
+    why = "the mass matrix stays definite there"
+    return tuple(replace(c, frame=Frame("mean"), why=why if c.why else "") for c in chosen)
 
 
 def warnings(chosen: tuple[Choice, ...]) -> tuple[str, ...]:

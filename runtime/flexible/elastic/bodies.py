@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 
 from mstmm.scene_rules import GROUND, split
 
+from ..computable import computed
+from ..definiteness import stays_definite
 from ..modal_body import ModalBody, ModalPort
+from ..support import Supports
 from .checks import checked
 from .craig_bampton import Reduction, reduce
 from .matrices import from_arrays, load_matrices, save_matrices
@@ -63,7 +66,17 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     holder = _holder(elastic.name, scene)
     held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
     used = frozenset(_used(elastic.name, scene) | {held})
-    return _made(_Source(elastic), held, used, *_frame(elastic, holder, held))
+    source, (frame, why) = _Source(elastic), _frame(elastic, holder, held)
+    body = _made(source, held, used, frame, why)
+    if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
+        return body
+    why = "mean, because the mass matrix stays definite there"
+    return _made(source, held, used, "mean", why)
+
+
+def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
+    turns = np.stack([one.theta for one in body.ports.values()])
+    return stays_definite(body, body.ports[held], Supports(scene).of(body.name), turns)
 
 
 class _Source:
@@ -86,6 +99,10 @@ class _Source:
 @lru_cache(maxsize=KEPT)
 def _made(source: _Source, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
     elastic = source.elastic
+    return computed(f'elastic "{elastic.name}"', lambda: _reduced(elastic, held, used, frame, why))
+
+
+def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
     model = model_of(elastic)
     ports = []
     for name, end in elastic.ends.items():

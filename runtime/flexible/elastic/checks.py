@@ -16,6 +16,8 @@ SYMMETRIC = 1e-9
 RIGID = 1e-6
 #: Negative eigenvalues below this part of the diagonal are rounding.
 DEFINITE = 1e-9
+#: Smallest entry of a matrix, square of a frequency and length, and the inverse of the largest.
+_TINY = 1e-60
 _MOTIONS = ("translation along x", "translation along y", "translation along z",
             "rotation about x", "rotation about y", "rotation about z")  # fmt: skip
 
@@ -35,6 +37,7 @@ def checked(model: ElasticModel) -> ElasticModel:
         if model.scalar_mass is None
         else _symmetric(model, "scalar_mass", model.scalar_mass),
     )
+    _sizes(model)
     _one_piece(model)
     _definite(model, "mass", model.mass, "kg")
     _equal_masses(model)
@@ -42,6 +45,18 @@ def checked(model: ElasticModel) -> ElasticModel:
     _definite(model, "stiffness", model.stiffness, "N/m")
     _scalar_mass(model)
     return model
+
+
+def _sizes(model: ElasticModel) -> None:
+    """Can products of the matrices and the squares of the frequencies be written as numbers?"""
+    mass, stiffness = float(abs(model.mass).max()), float(abs(model.stiffness).max())
+    sizes = (mass, stiffness, stiffness / mass, model.size)
+    if not all(_TINY < size < 1 / _TINY for size in sizes):
+        raise model.refuse(
+            f"expected masses and stiffnesses of a real body, found up to {mass:.3g} kg and "
+            f"{stiffness:.3g} N/m over {model.size:.3g} m, beyond what can be computed with; check "
+            "the units (m, kg/m^3, N/m^2)"
+        )
 
 
 def _symmetric(model: ElasticModel, key: str, matrix: Any) -> Any:

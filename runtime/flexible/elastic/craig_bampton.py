@@ -151,7 +151,7 @@ def _dense(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
 
 
 def _sparse(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
-    from scipy.sparse.linalg import LinearOperator, eigsh
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     size, solve = len(clamped.free), clamped.inverse
     stiffness = clamped.sections.stiffness.tocsc()[clamped.free][:, clamped.free]
@@ -161,9 +161,15 @@ def _sparse(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
 
     operator = LinearOperator((size, size), matvec=inverse, dtype=np.float64)
     start = inverse(np.cos(np.arange(size)))  # one start for all runs, so that runs agree
-    squares, found = eigsh(
-        stiffness, k=modes, M=mass, sigma=0.0, OPinv=operator, v0=start, which="LM"
-    )
+    try:
+        squares, found = eigsh(
+            stiffness, k=modes, M=mass, sigma=0.0, OPinv=operator, v0=start, which="LM"
+        )
+    except ArpackError as failure:
+        raise clamped.sections.model.refuse(
+            f"modes: the {modes} lowest modes with the ends held were not found ({failure}); take "
+            "fewer modes, and look for parts without mass or far softer than the rest"
+        ) from None
     order = np.argsort(squares)
     return squares[order], found[:, order]
 

@@ -150,7 +150,10 @@ def _gamma(
         for port, (force, moment) in flexible.end_loads(name).items()
     }
     from_loads = e.stiffness_from_loads(motion, flexible.gravity, loads, second)
-    return e.load_ratios(motion.body.K, from_loads)
+    try:
+        return e.load_ratios(motion.body.K, from_loads)
+    except np.linalg.LinAlgError:  # loads beyond what numbers hold
+        return None
 
 
 def _tail(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:

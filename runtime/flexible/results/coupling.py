@@ -43,13 +43,21 @@ def couplings(flexible: FlexibleBodies) -> dict[str, Array]:
         if not own:
             continue
         modes = list(range(*_bounds(model.layout.modal[name].u_slice)))
-        kept, size = [*own, *modes], len(own)
-        block = inertia[np.ix_(kept, kept)]
-        if others:
-            away = np.linalg.solve(inertia[np.ix_(others, others)], inertia[np.ix_(others, kept)])
-            block = block - inertia[np.ix_(kept, others)] @ away
-        found[name] = coupling(block[:size, size:], block[:size, :size], np.diag(block)[size:])
+        try:
+            found[name] = _coupling_of(inertia, own, modes, others)
+        except np.linalg.LinAlgError:  # inertia that a hinge does not have: not known
+            continue
     return found
+
+
+def _coupling_of(inertia: Array, own: list[int], modes: list[int], others: list[int]) -> Array:
+    """chi of modes from the mass matrix, by speeds of the hinge, the modes and hinges beyond."""
+    kept, size = [*own, *modes], len(own)
+    block = inertia[np.ix_(kept, kept)]
+    if others:
+        away = np.linalg.solve(inertia[np.ix_(others, others)], inertia[np.ix_(others, kept)])
+        block = block - inertia[np.ix_(kept, others)] @ away
+    return coupling(block[:size, size:], block[:size, :size], np.diag(block)[size:])
 
 
 def _bounds(places: slice) -> tuple[int, int]:

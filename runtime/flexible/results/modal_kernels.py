@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.ir import KernelIR
-from mstmm.stored import element_from_json
+from mstmm.stored import kernel_from_json
 
 from ...vectorized import evaluate
 from ..records import moments_of
@@ -28,7 +28,7 @@ _BATCH = 2**22
 def kernel(name: str) -> KernelIR:
     """A kernel of the element "modal" by its name."""
     text = files("mstmm.generated").joinpath("sweep_modal.json").read_text(encoding="utf-8")
-    return next(k for k in element_from_json(text).kernels if k.name == name)
+    return kernel_from_json(text, name)
 
 
 def momentum(motion: Motion) -> tuple[Array, Array, Array]:

@@ -132,11 +132,18 @@ def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 
 
 def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
-    """Values of the shapes at x (m,), kept for the next who asks for the same places."""
+    """Values of the shapes at x (m,), kept for the next who asks for the same places, if they are
+    not too many."""
+    if len(places) * shapes.n**2 > _MOST_KEPT:
+        return shapes.at(places)
     return _kept(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
 
 
-@lru_cache(maxsize=64)
+#: Products of two shapes at sections that are kept.
+_MOST_KEPT = 2**20
+
+
+@lru_cache(maxsize=16)
 def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
     return shapes.at(np.frombuffer(places))
 

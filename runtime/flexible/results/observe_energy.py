@@ -44,8 +44,12 @@ def strain_energy(motion: Motion) -> Array:
 
 
 def frequencies(body: ModalBody) -> Array:
-    """(n,) rad/s, ascending: of the modes while the floating frame stands still."""
-    lower = np.linalg.cholesky(modal_mass(body))
-    half = np.linalg.solve(lower, body.K)
-    squares = np.linalg.eigvalsh(np.linalg.solve(lower, half.T))
+    """(n,) rad/s, ascending: of the modes while the floating frame stands still; zeros where they
+    have no mass that is told from rounding."""
+    try:
+        lower = np.linalg.cholesky(modal_mass(body))
+        half = np.linalg.solve(lower, body.K)
+        squares = np.linalg.eigvalsh(np.linalg.solve(lower, half.T))
+    except np.linalg.LinAlgError:
+        squares = np.zeros(body.n)
     return np.sqrt(np.maximum(squares, 0.0))

@@ -112,7 +112,7 @@ class _Sums:
         half = np.diff(edges) / 2
         x = (edges[:-1, None] + half[:, None] * (1 + nodes)).ravel()
         self.weights = (half[:, None] * weights).ravel()
-        place, force, moment = _densities(motion, x, gravity)
+        place, force, moment = _in_portions(motion, x, gravity)
         for line in lines:
             share = ((x > line.first) & (x < line.last)) / max(line.last - line.first, 1e-300)
             force = force + motion.inward(line.force)[:, None] * share[:, None]
@@ -154,6 +154,18 @@ def _places(motion: Motion, x: Array) -> Array:
     at_rest = np.zeros((len(x), 3))
     at_rest[:, 0] = x
     return at_rest + deflection(motion, x)
+
+
+#: Products of two shapes at sections that are held at once.
+_PRODUCTS = 2**19
+
+
+def _in_portions(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
+    """The densities below at x (m,), some sections at a time where there are many shapes."""
+    count = max(1, _PRODUCTS // max(1, motion.shapes.n**2))
+    parts = [_densities(motion, x[k : k + count], gravity) for k in range(0, len(x), count)]
+    place, force, moment = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+    return place, force, moment
 
 
 def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:

@@ -1,0 +1,170 @@
+"""Does the mass matrix of a stiffened body stay positive definite as far as its model goes?
+
+Cut off after the second order, M(eta) of `derive.flexible.modal` is definite only for deflections
+that are not too large: where the shapes can take up nearly all inertia, terms of eta soon exceed
+what is left.  Here it is formed, by the generated kernels, for many deflections whose sections turn
+by as much as the model is made for, as what moves the held end sees it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sizes import modal_sizes
+from ..vectorized import evaluate
+from .records import moments_of, section_inputs
+from .results.modal_kernels import kernel
+from .support import ANY, Support, Supports
+
+if TYPE_CHECKING:
+    from ..pack import Packed
+    from .modal_body import ModalBody, ModalPort
+
+Array = NDArray[np.float64]
+
+#: Largest rotation of a section against the frame for which a model is made, rad, and the margin
+#: over it: deflections are drawn, and the worst is not among them.
+SLOPE, MARGIN = 0.3, 1.25
+
+#: Deflections drawn besides the shapes themselves and what forces on the ends bring.
+_DRAWN = 48
+#: What turns no section goes as far as this part of what it would at a rotation of 1 rad.
+_STRETCH = 0.1
+#: Inertia below this part of the largest is none: a straight beam about its own axis.
+_NONE = 1e-13
+
+
+def stays_definite(body: ModalBody, held: ModalPort, support: Support, turns: Array) -> bool:
+    """Whether every deflection drawn leaves a positive inertia to every motion.
+
+    `turns` (places, 3, n) are the rotations of sections per mode, rad.  What hangs on the other
+    ends only adds inertia and is left out.
+    """
+    if not np.any(body.G) and not np.any(body.X):
+        return True  # M is the exact integral of squares
+    if not held.moves and not support.speeds:
+        return True  # what is left is the constant matrix of the modes
+    return is_definite_at(body, held, support, _deflections(body, turns))
+
+
+def is_definite_at(body: ModalBody, held: ModalPort, support: Support, eta: Array) -> bool:
+    """Whether deflections (N, n) leave a positive inertia to every motion that has one without."""
+    seen = np.concatenate([np.zeros((1, body.n)), eta])
+    mass = _mass(body, seen)
+    for way in (support, ANY):
+        scaled = _scaled(_on_its_support(mass, held, way, seen))
+        if _is_definite(scaled[:1]):
+            return _is_definite(scaled[1:])
+    return True  # what a straight body lacks is not lost by bending
+
+
+def _scaled(matrices: Array) -> Array:
+    """The matrices by the roots of the first one's diagonal, without motions that it leaves free of
+    inertia."""
+    own = np.diagonal(matrices[0])
+    kept = np.flatnonzero(own > _NONE * own.max(initial=0.0))
+    scale = np.sqrt(own[kept])
+    return np.asarray(matrices[:, kept[:, None], kept] / np.outer(scale, scale))
+
+
+def _is_definite(matrices: Array) -> bool:
+    try:
+        np.linalg.cholesky(matrices)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+# --- deflections ----------------------------------------------------------------------------------
+
+
+def _deflections(body: ModalBody, turns: Array) -> Array:
+    """(N, n) deflections whose largest rotation is SLOPE with its margin."""
+    straight = ~turns.any(axis=(0, 1))
+    sizes = modal_sizes(body) * np.where(straight, _STRETCH, 1.0)
+    random = np.random.default_rng(0).normal(size=(_DRAWN, body.n))
+    softest = np.sqrt(np.diag(body.K)) * sizes
+    loads = [body.C, *(np.concatenate([p.phi, p.theta]) for p in body.ports.values())]
+    bent = np.linalg.lstsq(body.K, np.concatenate(loads).T, rcond=None)[0].T
+    rows = [sizes * np.eye(body.n), bent, sizes * random, sizes * random / softest]
+    directions = np.concatenate(rows)
+    directions = directions[np.abs(directions).max(axis=1) > 0]
+    largest = np.linalg.norm(np.einsum("man,kn->kma", turns, directions), axis=2).max(axis=1)
+    moved = np.abs(directions / sizes)[:, straight].max(axis=1, initial=0.0)
+    return np.asarray(directions * (SLOPE * MARGIN / np.maximum(largest, moved))[:, None])
+
+
+# --- mass matrix ----------------------------------------------------------------------------------
+
+
+def _mass(body: ModalBody, eta: Array) -> Array:
+    """(N, 6 + n, 6 + n): M(eta) of [v; w; etad], frame axes."""
+    n, zero = body.n, np.zeros(3)
+    given = {**moments_of(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
+    found = evaluate(kernel("momentum"), given, n)
+    whole = np.zeros((len(eta), 6 + n, 6 + n))
+    rows, columns = np.triu_indices(6)
+    whole[:, rows, columns] = whole[:, columns, rows] = found["S"]
+    whole[:, :6, 6:] = found["S_rf"]
+    whole[:, 6:, :6] = np.swapaxes(found["S_rf"], 1, 2)
+    whole[:, 6:, 6:] = body.Mff
+    return whole
+
+
+def _on_its_support(mass: Array, held: ModalPort, support: Support, eta: Array) -> Array:
+    """(N, m + n, m + n): the same for the speeds of the support and the modes."""
+    n, m = eta.shape[1], support.speeds
+    carried = np.zeros((len(eta), 6 + n, m + n))
+    carried[:, 6:, m:] = np.eye(n)
+    carried[:, :6, :m] = support.motion
+    if held.moves:
+        ride, own = _frame_motion(held, eta)
+        carried[:, :6, :m] = ride @ support.motion
+        carried[:, :6, m:] = own
+    else:
+        back = held.rotation.T
+        carried[:, :6, :m] = _shifted(back, -back @ held.position) @ support.motion
+    whole = np.swapaxes(carried, 1, 2) @ mass @ carried
+    whole[:, :m, :m] += support.inertia
+    return np.asarray(whole)
+
+
+def _frame_motion(held: ModalPort, eta: Array) -> tuple[Array, Array]:
+    """Twist of the frame by that of the held end (N, 6, 6) and by the modal speeds (N, 6, n)."""
+    given = section_inputs(held)
+    section = evaluate(kernel("section"), {**given, "eta": eta, "etad": 0 * eta}, eta.shape[1])
+    passed = {name: section[name] for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
+    inward = evaluate(kernel("inward"), {**passed, "R_end": held.rotation})
+    return _shifted(inward["R"], inward["d"]), inward["H6"] @ section["Phi"]
+
+
+def _shifted(turn: Array, shift: Array) -> Array:
+    """(..., 6, 6): twist of an outboard point, its axes, from that of the inboard one; `turn`
+    outboard axes to inboard axes, `shift` from the inboard point, inboard axes."""
+    back = np.swapaxes(turn, -1, -2)
+    moved = np.zeros((*turn.shape[:-2], 6, 6))
+    moved[..., :3, :3] = moved[..., 3:, 3:] = back
+    x, y, z = (shift[..., k] for k in range(3))
+    o = np.zeros_like(x)
+    cross = np.stack([o, z, -y, -z, o, x, y, -x, o], axis=-1).reshape(*x.shape, 3, 3)
+    moved[..., :3, 3:] = back @ cross
+    return moved
+
+
+# --- a run that stopped ---------------------------------------------------------------------------
+
+
+def indefinite_bodies(packed: Packed, q: Array) -> list[str]:
+    """Names of the flexible bodies whose mass matrix is not positive definite at q (nq,)."""
+    expanded, supports = packed.expanded, Supports(packed.described)
+    return [
+        name
+        for name, body in packed.flexible.items()
+        if expanded is not None and not body.points and not is_definite_at(
+            body, body.ports[expanded.held[name]], supports.of(name),
+            q[packed.layout.modal[name].q_slice][None],
+        )
+    ]  # fmt: skip

@@ -1,0 +1,250 @@
+"""The way to rest: coordinates at which no effort is needed, by Newton's method and load steps.
+
+Efforts of different kinds stand side by side (N beside N*m, an axial shape beside a twist), so
+nothing is compared across coordinates: every stiffness is judged beside those of its own coordinate
+and every step beside the size of its coordinate, a motion that changes the shape of things.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.errors import NumericalFailure
+
+Array = NDArray[np.float64]
+
+_LONGEST = 0.5  # step, in sizes of the coordinates
+_SOFT = 1e-8  # scaled stiffness below which a direction counts as slack
+_MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 100, 20
+#: Forces without potential have no downhill to follow: a stiffness so far from symmetric, and the
+#: iterations that are then enough to see whether Newton's method goes there by itself.
+_SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
+_HALVINGS = 40
+#: Steps of the difference quotients, in sizes: where a stiffness is no rounding both agree.
+_COARSE, _FINE = 1e-4, 1e-5
+#: First part of the load that is tried where the whole is too much, and the smallest.
+_FIRST_PART, _LEAST_PART = 0.25, 2.0**-10
+
+
+class Unsettled(NumericalFailure):
+    """No rest found; `residual` (n,) is what was left."""
+
+    def __init__(self, message: str, residual: Array) -> None:
+        super().__init__(message)
+        self.residual = residual
+
+
+class Undetermined(NumericalFailure):
+    """Rest that nothing holds in some directions; `places` are the coordinates they move."""
+
+    def __init__(self, places: Sequence[int]) -> None:
+        super().__init__("")
+        self.places = tuple(places)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is to come to rest, n coordinates of it.
+
+    Attributes:
+        needed: q -> efforts (n,) that rest needs in the coordinates, N, N*m.
+        moved: q and a small motion (n,) -> q after it.
+        sizes: (n,) motions of order one: 1 rad, the length of a body; m or rad.
+    """
+
+    needed: Callable[[Array], Array]
+    moved: Callable[[Array, Array], Array]
+    sizes: Array
+
+    def efforts(self, q: Array) -> Array:
+        """Efforts times sizes, J.  NumericalFailure where they are not finite."""
+        with np.errstate(all="ignore"):
+            found = self.needed(q) * self.sizes
+        if not np.isfinite(found).all():
+            raise NumericalFailure("the efforts of this state are not finite")
+        return found
+
+    def after(self, q: Array, step: Array) -> Array:
+        """q after a motion given in sizes."""
+        return self.moved(q, step * self.sizes)
+
+    def slope(self, q: Array, size: float = _COARSE) -> Array:
+        """(n, n) stiffness in J, by central differences."""
+        columns = [
+            (self.efforts(self.after(q, unit)) - self.efforts(self.after(q, -unit))) / (2 * size)
+            for unit in size * np.eye(len(self.sizes))
+        ]
+        return np.array(columns).reshape(len(columns), len(columns)).T
+
+
+def at_rest(problem: Rest, q: Array, tolerance: float) -> Array:
+    """q at rest, coordinates within `tolerance` times their sizes, or within rounding.
+
+    Newton's method at once, else with the load in parts: what is missing at the start is given as
+    an effort from outside and taken away bit by bit.  Raises Unsettled, and Undetermined where
+    nothing pushes a motion back.
+    """
+    try:
+        found = _newton(problem, q, tolerance, _MAX_ITERATIONS, _downhill)
+    except Unsettled as failure:
+        try:
+            found = _in_parts(problem, q, tolerance)
+        except NumericalFailure:
+            raise failure from None
+    _refuse_undetermined(problem, found)
+    return found
+
+
+def _in_parts(problem: Rest, q: Array, tolerance: float) -> Array:
+    missing = problem.needed(q)
+    done, part = 0.0, _FIRST_PART
+    while done < 1.0:
+        goal = min(1.0, done + part)
+        loaded = Rest(_less(problem.needed, (1 - goal) * missing), problem.moved, problem.sizes)
+        try:
+            q = _newton(loaded, q, tolerance, _ITERATIONS_OF_A_PART, _along_the_path)
+        except NumericalFailure:
+            part /= 2
+            if part < _LEAST_PART:
+                raise
+            continue
+        done, part = goal, 1.5 * part
+    return q
+
+
+def _less(needed: Callable[[Array], Array], given: Array) -> Callable[[Array], Array]:
+    return lambda q: needed(q) - given
+
+
+# --- Newton's method ------------------------------------------------------------------------------
+
+
+#: (slope, residual, scale) -> step; all (n,) in sizes, or (n, n).
+Stepping = Callable[[Array, Array, Array], Array]
+
+
+def _newton(
+    problem: Rest, q: Array, tolerance: float, iterations: int, stepping: Stepping
+) -> Array:
+    residual = problem.efforts(q)
+    for k in range(iterations):
+        try:
+            slope = problem.slope(q)
+        except NumericalFailure as failure:
+            raise Unsettled(str(failure), residual / problem.sizes) from None
+        scale = _scale(slope, residual)
+        if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_skew(slope, scale):
+            iterations = k
+            break
+        step = stepping(slope, residual, scale)
+        length = float(np.abs(step).max(initial=0.0))
+        if length <= tolerance:
+            return problem.after(q, step)
+        q, residual, falls = _followed(problem, q, residual, step, scale)
+        if not falls and length < _COARSE and _is_rounding(problem, q, residual):
+            return q
+    raise Unsettled(f"no rest after {iterations} steps", residual / problem.sizes)
+
+
+def _is_skew(slope: Array, scale: Array) -> bool:
+    skew = np.abs(slope - slope.T) / np.sqrt(np.outer(scale, scale))
+    return float(skew.max(initial=0.0)) > _SKEW
+
+
+def _scale(slope: Array, residual: Array) -> Array:
+    """(n,) the stiffness of each coordinate as it shows: K_ii, or K_ij^2 / K_jj, or the effort."""
+    own = np.maximum(np.abs(np.diag(slope)), 1e-300)
+    coupled = np.max(((slope + slope.T) / 2) ** 2 / own, axis=1, initial=0.0)
+    return np.maximum.reduce([own, coupled, np.abs(residual)])
+
+
+def _downhill(slope: Array, residual: Array, scale: Array) -> Array:
+    """Newton's step where the stiffness is positive definite; else one that runs downhill too.
+
+    Along directions in which the stiffness is negative or vanishes, Newton would run uphill or far
+    away; the step goes with the forces there, so that unstable equilibria are left behind (for
+    forces without potential this is only a heuristic).
+    """
+    root = np.sqrt(scale)
+    scaled, force = slope / np.outer(root, root), residual / root
+    values, directions = np.linalg.eigh((scaled + scaled.T) / 2)
+    if values.min(initial=np.inf) > _SOFT:
+        return np.asarray(np.linalg.solve(scaled, -force) / root)
+    softened = np.maximum(np.abs(values), _SOFT)
+    return np.asarray(-directions @ ((directions.T @ force) / softened) / root)
+
+
+def _along_the_path(slope: Array, residual: Array, scale: Array) -> Array:
+    """Newton's step as it is: what was at rest under a little less load is close by."""
+    root = np.sqrt(scale)
+    try:
+        return np.asarray(np.linalg.solve(slope / np.outer(root, root), -residual / root) / root)
+    except np.linalg.LinAlgError:
+        raise NumericalFailure("the stiffness is singular") from None
+
+
+def _followed(
+    problem: Rest, q: Array, residual: Array, step: Array, scale: Array
+) -> tuple[Array, Array, bool]:
+    """q after the step, at most _LONGEST long, what is left there, and whether it is less.
+
+    The step is halved until there is a state at its end and the efforts fall or do not climb again:
+    where forces have a potential, `needed` is its gradient, and the step has not passed the bottom
+    by much as long as the gradient along it has not turned around to more than half its size.
+    """
+    step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
+    before, along = _size(residual, scale), abs(float(residual @ step))
+    reached: tuple[Array, Array] | None = None
+    for _ in range(_HALVINGS):
+        try:
+            trial = problem.after(q, step)
+            left = problem.efforts(trial)
+        except NumericalFailure:
+            step, along = step / 2, along / 2
+            continue
+        reached = trial, left
+        falls = _size(left, scale) < before
+        if falls or float(left @ step) <= along / 2:
+            return trial, left, falls
+        step, along = step / 2, along / 2
+    if reached is None:
+        raise Unsettled("no step leads to another state", residual / problem.sizes)
+    return *reached, False
+
+
+def _size(residual: Array, scale: Array) -> float:
+    return float(np.linalg.norm(residual / np.sqrt(scale)))
+
+
+# --- rounding -------------------------------------------------------------------------------------
+
+
+def _noise(problem: Rest, q: Array) -> tuple[Array, Array]:
+    """The stiffness (n, n) in J, and how far two difference quotients of it lie apart."""
+    coarse, fine = problem.slope(q, _COARSE), problem.slope(q, _FINE)
+    return coarse, np.abs(coarse - fine)
+
+
+def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
+    """Whether the efforts left are what rounding leaves of larger ones that cancel."""
+    _, noise = _noise(problem, q)
+    return bool((np.abs(residual) <= 10 * _FINE * noise.max(axis=1, initial=0.0)).all())
+
+
+def _refuse_undetermined(problem: Rest, q: Array) -> None:
+    """Undetermined for directions whose stiffness is rounding beside that of their coordinates."""
+    slope, noise = _noise(problem, q)
+    scale = np.maximum(_scale(slope, np.zeros(len(slope))), np.diag(noise))
+    root = np.sqrt(scale)
+    both = (slope + slope.T) / 2
+    values, directions = np.linalg.eigh(both / np.outer(root, root))
+    spread = np.abs(directions) / root[:, None]
+    unsure = np.einsum("ik,ij,jk->k", spread, noise, spread)
+    loose = np.abs(values) <= 4 * unsure + 1e-13
+    if loose.any():
+        share = spread[:, loose].max(axis=1) * root
+        raise Undetermined([int(j) for j in np.nonzero(share > 0.1)[0]])
