@@ -12,6 +12,9 @@ from mstmm.errors import SceneError
 
 from .arrays import numbers, real, whole
 
+#: Absolute tolerances below this are this: squares of errors against them must not overflow.
+_LEAST = 1e-100
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -57,15 +60,13 @@ def checked(settings: Settings) -> Settings:
         raise SceneError(f"t_end = {t_end:g}: expected a time in s, not before t_start")
     if not isinstance(settings.method, str):
         raise SceneError(f"method = {settings.method!r}: expected a name such as dop853")
-    rtol = real("rtol", settings.rtol, "a relative tolerance, 0 or more")
-    if rtol < 0:
-        raise SceneError(f"rtol = {rtol:g}: expected a relative tolerance, 0 or more")
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
     return replace(
         settings,
-        t_start=t_start, t_end=t_end, rtol=rtol,
-        atol=_above_zero("atol", settings.atol, "an absolute tolerance above zero"),
+        t_start=t_start, t_end=t_end,
+        rtol=_above_zero("rtol", settings.rtol, "a relative tolerance above zero"),
+        atol=max(_LEAST, _above_zero("atol", settings.atol, "an absolute tolerance above zero")),
         step=None if settings.step is None
         else _above_zero("step", settings.step, "a time above zero, in s"),
         max_step=0.0 if longest == np.inf or longest == 0

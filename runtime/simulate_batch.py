@@ -89,7 +89,7 @@ def simulate_batch(
         np.full((n, len(times), model.nq + model.nu), np.nan),
         np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64),
     )  # fmt: skip
-    ours = np.array([library is not None and m.fusion.lanes is library for m in models])
+    ours = np.array([library is not None and m.fusion.lanes is library for m in models], bool)
     if library is not None and ours.any():
         _side_by_side(model, library, models, settings, q, u, np.flatnonzero(ours), rows, count)
     alone = np.flatnonzero(~ours)

@@ -111,6 +111,7 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "no rtol": ({"rtol": np.nan}, "rtol = nan"),
     "endless rtol": ({"rtol": np.inf}, "rtol = inf"),
     "negative rtol": ({"rtol": -1e-9}, "rtol = -1e-09"),
+    "rtol zero": ({"rtol": 0}, "rtol = 0: expected a relative tolerance above zero"),
     "text as rtol": ({"rtol": "1e-9"}, "rtol = '1e-9'"),
     "no atol": ({"atol": np.nan}, "atol = nan"),
     "atol zero": ({"atol": 0}, "atol = 0: expected an absolute tolerance above zero"),
@@ -132,6 +133,19 @@ def test_settings_are_refused_by_name_for_every_integrator(
     changes, message = SETTINGS[case]
     with pytest.raises(mstmm.SceneError, match=re.escape(message)):
         model.simulate(1.0, **({"method": method} | changes))
+
+
+@pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
+def test_the_smallest_tolerance_is_certified_like_any_other(
+    model: mstmm.Model, method: str
+) -> None:
+    run = model.simulate(0.1, method=method, rtol=1e-6, atol=5e-324, certify=True)
+    assert run.success and run.certificate.error is not None
+
+
+def test_a_batch_of_none(model: mstmm.Model) -> None:
+    batch = model.simulate_batch((np.zeros((0, 2)), U), t_end=0.1)
+    assert batch.q.shape == (0, 1, 2) and batch.success.shape == (0,)
 
 
 def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
