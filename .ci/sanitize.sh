@@ -25,3 +25,7 @@ cd "$scratch/checkout"
 # libstdc++ as well: extensions of other packages throw C++ exceptions
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
     tests/generated tests/runtime tests/integrators tests/flexible/test_engines.py
+
+echo "--- changed scenes, sanitized"
+LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m tests.fuzz \
+    --count 40 --seed 9 --first 43 --memory 0 --cpu 120 --keep "$scratch/found"
