@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flexible.reference import lateral
+from flexible.reference.kirchhoff import Load, Rod, solve
 
 import mstmm
 
@@ -108,3 +109,54 @@ def test_a_load_past_the_critical_one_is_said_to_buckle() -> None:
         assert found.gamma is not None
         assert -found.gamma[0] == pytest.approx(share, rel=1e-3)
         assert any("buckling" in text for text in run.certificate.warnings) == (share > 1)
+
+
+#: A 4:1 section, loaded at 45 degrees to its principal axes.
+SKEW = {"bending_stiffness": [1.0, 16.0], "torsional_stiffness": 1.2960598193}
+
+
+def bent_tip(parts: int, load: float, **beam: Any) -> tuple[Any, list[str]]:
+    """Displacement (3,) of the tip at rest under dead forces along y and z, and what is said."""
+    force = [0, load / np.sqrt(2), load / np.sqrt(2)]
+    model = mstmm.compile(cantilever(parts, {"force": force}, **SKEW, **beam), engine="looped")
+    at_rest = (model.equilibrium(), np.zeros(model.layout.nu))
+    run = model.simulate(t_end=1e-6, step=1e-6, method="rk4", initial=at_rest)
+    return run.position(f"b{parts - 1}.tip")[0] - [1, 0, 0], list(run.certificate.warnings)
+
+
+def exact_tip(load: float) -> Any:
+    rod = Rod((1.0, 16.0), 1.2960598193, length=1.0)
+    return solve(rod, Load(force=(0, load / np.sqrt(2), load / np.sqrt(2)))).tip
+
+
+@pytest.mark.parametrize("parts", [1, 2, 4])
+def test_bending_askew_twists_as_an_exact_rod(parts: int) -> None:
+    """Slopes to .18: what is left is of third order in the slope of a part."""
+    found, _ = bent_tip(parts, 0.5, modes={"y": 3, "z": 3, "twist": 3})
+    bound = 0.022 / parts**3
+    assert np.abs(found / exact_tip(0.5) - 1).max() < bound
+
+
+def test_far_bending_askew_converges_and_one_beam_is_warned_about() -> None:
+    exact = exact_tip(1.0)
+    modes = {"y": 2, "z": 2, "twist": 2}
+    one, said = bent_tip(1, 1.0, modes=modes)
+    assert any("split the body" in text for text in said)
+    assert 0.01 < np.abs(one / exact - 1).max() < 0.12
+    errors = [np.abs(bent_tip(parts, 1.0, modes=modes)[0] / exact - 1).max() for parts in (2, 4)]
+    assert errors[0] < 0.015
+    assert errors[1] < errors[0] / 6
+
+
+def test_far_past_buckling_the_tip_swings_sideways() -> None:
+    """Twice Prandtl's load with a thousandth of it sideways: the straight beam does not stay, and
+    the run ends by name where a beam in one frame has no more meaning."""
+    push = {"force": [0, "-2*4.0126*min(5*t, 1)", 0.008]}
+    model = mstmm.compile(
+        cantilever(1, push, bending_stiffness=[1.0, 1e4], modes={"y": 1, "z": 3, "twist": 3}),
+        engine="looped",
+    )
+    run = model.simulate(t_end=2.0, rtol=1e-6)
+    assert np.abs(run.position("b0.tip")[:, 2]).max() > 0.2
+    assert any("buckling" in text for text in run.certificate.warnings)
+    assert not run.success and "welded" in run.message
