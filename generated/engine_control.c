@@ -11,7 +11,10 @@ static const double SAME = 1e-9;      /* of a step: a grid point so near to a br
 static const double STRETCH = 1.01;   /* a step may be this much longer to end at a stop */
 static const double HOPELESS = 1e-24; /* of the run: smallest step where t is near 0 */
 static const double NEAR_LIMIT = 0.9; /* of the stability limit: the step goes no further */
+static const double GAP = 0x1p-39;    /* of the time or the run: two breaks that are one */
+static const double NO_END = 1e10;    /* steps of a run that have no end in sight */
 enum { MANY_STEPS = 50, LARGE_PART = 10, MOST_REJECTIONS = 200 };
+enum { SOME_STEPS = 1 << 17, SOON = 1 << 12 }; /* between looks at how the run gets on */
 
 static double next_stop(const mstmm_run *run, int *is_break) {
   const int64_t i = run->count.break_index;
@@ -19,7 +22,7 @@ static double next_stop(const mstmm_run *run, int *is_break) {
   return *is_break ? run->breaks[i] : run->t_end;
 }
 
-static double smallest_step(const mstmm_run *run) {
+double mstmm_smallest_step(const mstmm_run *run) {
   const double rounding = 10.0 * (nextafter(run->real.t, INFINITY) - run->real.t);
   return fmax(run->min_step, fmax(rounding, HOPELESS * (run->t_end - run->t_start)));
 }
@@ -35,11 +38,24 @@ static void aim_fixed(mstmm_run *run, double stop, int is_break) {
   run->count.cut_short = run->real.t_new - run->real.t < (1.0 - 4.0 * SAME) * h;
 }
 
-static void aim_adaptive(mstmm_run *run, double stop, int is_break) {
-  double h = fmax(run->real.h_next, smallest_step(run));
+/* h, or the longest step that max_step and the bounds allow: one that ends before a shorter bound
+ * begins, or is no longer than it. */
+static double allowed(mstmm_run *run, double h) {
+  int64_t *i = &run->count.bound_index;
+  const double t = run->real.t;
   if (run->max_step > 0.0) h = fmin(h, run->max_step);
-  const int allowed = run->max_step == 0.0 || stop - run->real.t <= run->max_step;
-  const int reaches = allowed && run->real.t + STRETCH * h >= stop;
+  if (!run->n_bounds) return h;
+  while (*i + 1 < run->n_bounds && run->bound_starts[*i + 1] <= t) (*i)++;
+  h = fmin(h, run->bounds[*i]);
+  for (int64_t j = *i + 1; j < run->n_bounds && run->bound_starts[j] < t + h; j++)
+    h = fmin(h, fmax(run->bounds[j], run->bound_starts[j] - t));
+  return h;
+}
+
+static void aim_adaptive(mstmm_run *run, double stop, int is_break) {
+  const double wanted = fmax(run->real.h_next, mstmm_smallest_step(run));
+  const double most = allowed(run, STRETCH * wanted), h = fmin(wanted, most);
+  const int reaches = run->real.t + most >= stop;
   run->real.t_new = reaches ? stop : run->real.t + h;
   run->count.lands_on_break = reaches && is_break;
   run->count.cut_short = reaches && stop - run->real.t < h;
@@ -67,7 +83,7 @@ int mstmm_reject(mstmm_run *run, int failed, double error) {
   run->count.rejected++;
   run->count.rejected_last++;
   run->real.h_next = run->real.h * fmin(factor, 0.95);
-  const int small = run->real.h_next < smallest_step(run);
+  const int small = run->real.h_next < mstmm_smallest_step(run);
   const int enough = run->count.rejected_last > MOST_REJECTIONS;
   return run->fixed_step > 0.0 || small || enough ? (int)run->count.fail_status : 0;
 }
@@ -99,8 +115,30 @@ int mstmm_aim(mstmm_run *run) {
     aim_fixed(run, stop, is_break);
   else
     aim_adaptive(run, stop, is_break);
+  if (run->real.h_cut > 0.0 && run->real.t + run->real.h_cut < run->real.t_new) {
+    run->real.t_new = run->real.t + run->real.h_cut;
+    run->count.lands_on_break = run->count.lands_on_grid = 0;
+    run->count.cut_short = 1;
+  }
   run->real.h = run->real.t_new - run->real.t;
   return run->real.h > 0.0 ? 0 : mstmm_note(run, MSTMM_STEP_TOO_SMALL, 0, -1, run->real.t);
+}
+
+int mstmm_in_gap(const mstmm_run *run) {
+  const double size = fmax(fabs(run->real.t), run->t_end - run->t_start);
+  return run->count.at_break && run->count.lands_on_break && run->real.h <= GAP * size;
+}
+
+int mstmm_too_many(mstmm_run *run) {
+  const int64_t steps = run->count.steps;
+  if (run->max_steps && steps >= run->max_steps)
+    return mstmm_note(run, MSTMM_TOO_MANY_STEPS, 0, -1, run->real.t);
+  const int64_t some = run->count.chatter < 0 ? SOME_STEPS : SOON;
+  if (run->max_steps || run->fixed_step > 0.0 || steps % some) return 0;
+  const double gone = run->real.t - run->real.pace_time, left = run->t_end - run->real.t;
+  run->real.pace_time = run->real.t;
+  if (!steps || gone == 0.0 || left / gone * (double)some < NO_END) return 0;
+  return mstmm_note(run, MSTMM_TOO_MANY_STEPS, 1, -1, run->real.t);
 }
 
 double mstmm_interval(const mstmm_run *run) {
@@ -123,17 +161,17 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
   if (work->tableau->n_errors) *error = mstmm_error_norm(work, absolute);
   if (isnan(*error) || isinf(*error))
     return mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_worst_component(work), run->real.t_new);
+  if (mstmm_in_gap(run)) *error = 0.0;
   if (run->fixed_step == 0.0 && *error >= 1.0) return 0;
-  return mstmm_output_inside(run) || work->system->n_events ? mstmm_build_dense(work) : 0;
+  return mstmm_output_inside(run) || mstmm_n_watched(work->system) ? mstmm_build_dense(work) : 0;
 }
 
 int mstmm_try_step(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int fixed = run->fixed_step > 0.0;
   double error, absolute;
-  if (run->max_steps && run->count.steps >= run->max_steps)
-    return mstmm_note(run, MSTMM_TOO_MANY_STEPS, 0, -1, run->real.t);
-  int status = mstmm_first_stage(work);
+  int status = mstmm_too_many(run);
+  if (!status) status = mstmm_first_stage(work);
   if (status) return status;
   if (!fixed && run->real.h_next == 0.0)
     run->real.h_next = run->first_step > 0.0 ? run->first_step
@@ -150,6 +188,7 @@ int mstmm_try_step(const mstmm_work *work) {
   mstmm_count_step(run, error, absolute);
   watch_stability(work);
   run->real.t_scan = run->real.t;
-  run->count.phase = PHASE_SCAN;
+  run->count.phase = work->system->n_switches ? PHASE_SWITCH : PHASE_SCAN;
+  run->real.t_switch = INFINITY;
   return 0;
 }

@@ -12,7 +12,9 @@
 
 #include "engine_step.h"
 
-enum { MOST_FIRES_HERE = 100 };
+static const double AT_ONCE = 0x1p-42; /* of the time or the run: hardly any time */
+static const double JUST_BEFORE = 1.0 - 0x1p-10, WELL_BEFORE = 0.9; /* of the way to a switch */
+enum { MOST_FIRES_HERE = 100, MOST_CROSSINGS_HERE = 50 };
 
 /* ---- samples ---- */
 
@@ -174,6 +176,27 @@ static int phase_sample(const mstmm_work *work) {
 
 /* ---- inside the accepted trial step ---- */
 
+static int hardly_any_time(const mstmm_run *run, double t) {
+  return t <= AT_ONCE * fmax(fabs(run->real.t), run->t_end - run->t_start);
+}
+
+/* A step with a switch in it is no use: stages behind the switch spoil its result, and its dense
+ * output even where they do not enter the result; all of them may have missed a window that begins
+ * there and soon ends.  It is made again, to end just before the switch, until the rest is so short
+ * that it does not matter. */
+static int phase_switch(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  const int status = mstmm_find_switch(work);
+  const double way = run->real.t_switch - run->real.t;
+  run->count.phase = PHASE_SCAN;
+  if (status || !(way > 0.0 && way < INFINITY) || hardly_any_time(run, way)) return status;
+  run->real.h_cut = (run->real.h_cut > 0.0 ? WELL_BEFORE : JUST_BEFORE) * way;
+  run->count.steps--;
+  run->count.rejected++;
+  run->count.phase = PHASE_STEP;
+  return 0;
+}
+
 static int phase_scan(const mstmm_work *work) {
   const int status = mstmm_scan(work);
   work->run->count.phase = PHASE_OUTPUT;
@@ -192,7 +215,9 @@ static int phase_output(const mstmm_work *work) {
     run->n_samples++;
     (*i)++;
   }
-  run->count.phase = event ? PHASE_FIRE : PHASE_ACCEPT;
+  run->count.phase = !event                                   ? PHASE_ACCEPT
+                     : run->count.event < run->system->n_events ? PHASE_FIRE
+                                                              : PHASE_CROSS;
   return 0;
 }
 
@@ -218,6 +243,7 @@ static void move_to(const mstmm_work *work, double t, const double *y) {
   mstmm_run *run = work->run;
   memcpy(work->y, y, (size_t)work->system->n_state * sizeof *y);
   run->real.t = t;
+  run->real.h_cut = 0.0;
   run->count.sampled = 0;
   run->count.restarted = 0;
   if (t == run->real.t_new && run->count.lands_on_grid) run->count.grid_index++;
@@ -246,6 +272,36 @@ static int phase_fire(const mstmm_work *work) {
   return 0;
 }
 
+/* A switch that crosses again and again in hardly any time holds the motion where it is: it is
+ * no longer watched, and the run goes on at the pace that the error allows. */
+static void note_crossing(const mstmm_work *work, int i) {
+  mstmm_run *run = work->run;
+  const double t = run->real.t, since = t - work->last_fire[i];
+  work->last_fire[i] = t;
+  run->count.crossings++;
+  run->count.crossings_here = hardly_any_time(run, since) ? run->count.crossings_here + 1 : 0;
+  if (run->count.crossings_here < MOST_CROSSINGS_HERE) return;
+  run->count.crossings_here = 0;
+  run->count.chatter = i - run->system->n_events;
+  run->real.chatter_time = t;
+  work->truth[i] = UNWATCHED;
+}
+
+static int phase_cross(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  const int i = (int)run->count.event;
+  mstmm_dense(work, run->real.t_stop, work->y_event);
+  const int status = accept(work, run->real.t_stop, work->y_event);
+  if (status < 0) return status;
+  move_to(work, run->real.t_stop, work->y_event);
+  run->count.event = -1;
+  run->count.restarted = 1;
+  run->count.first_stage_valid = 0;
+  note_crossing(work, i);
+  run->count.phase = PHASE_SAMPLE;
+  return 0;
+}
+
 static int phase_accept(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int64_t row = work->row;
@@ -267,9 +323,11 @@ static int make_phase(const mstmm_work *work) {
     case PHASE_HERE: return phase_here(work);
     case PHASE_SAMPLE: return phase_sample(work);
     case PHASE_STEP: return mstmm_try_step(work);
+    case PHASE_SWITCH: return phase_switch(work);
     case PHASE_SCAN: return phase_scan(work);
     case PHASE_OUTPUT: return phase_output(work);
     case PHASE_FIRE: return phase_fire(work);
+    case PHASE_CROSS: return phase_cross(work);
     case PHASE_ACCEPT: return phase_accept(work);
     default: return (int)work->run->count.status;
   }

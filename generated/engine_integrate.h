@@ -23,6 +23,9 @@ typedef struct mstmm_system {
   int n_events;
   /* Event i is true when g[i] >= 0; nonzero = failure code */
   int (*events)(void *context, double t, const double *y, double *g);
+  /* Behind the events: n_switches margins, each zero where the right-hand side has a kink or jumps.
+   * Steps end where one changes its sign, either way; nothing is fired. */
+  int n_switches;
   /* Called with the accepted state at the located time.  MSTMM_FIRE_*; < 0 = failure code */
   int (*fire)(void *context, int event, double t, double *y);
   int n_memory;
@@ -77,7 +80,7 @@ enum {
   MSTMM_ACCEPT_FAILED = -4,
   MSTMM_EVENT_FAILED = -5, /* `code`, or 0 with `event` when that value was not a number */
   MSTMM_FIRE_FAILED = -6,
-  MSTMM_TOO_MANY_STEPS = -7,
+  MSTMM_TOO_MANY_STEPS = -7, /* max_steps; with `code` 1 there is none, but no end in sight */
   MSTMM_EVENT_CHATTER = -8, /* `event` fires without end at one time */
   MSTMM_BAD_ARGUMENT = -9   /* `code` says which, see mstmm_run_start */
 };
@@ -96,17 +99,25 @@ typedef struct mstmm_run_real {
   double sum_scaled_error; /* the same in units of the tolerance */
   double stiffness;        /* last estimate of h |lambda| */
   double largest_stiffness;
+  double t_switch;     /* the first switch in the trial step, INFINITY: none */
+  double h_cut;        /* > 0: the step is to be no longer, so that it ends before a switch */
+  double pace_time;    /* t so many steps ago: how fast the run gets on */
+  double chatter_time; /* since then switch `chatter` is not watched */
 } mstmm_run_real;
 
 typedef struct mstmm_run_count {
   int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense, lanes; /* compared on restoring */
+  int64_t n_switches;
   int64_t phase, status;
   int64_t fail_status, code, component, event;
-  int64_t break_index, output_index, grid_index;
+  int64_t break_index, output_index, grid_index, bound_index;
   int64_t at_break;      /* t is a break: the first stage looks to its right */
   int64_t lands_on_break, lands_on_grid, cut_short; /* of the trial step */
   int64_t first_stage_valid, restarted, sampled, rejected_last;
   int64_t fires_here; /* events fired without time passing */
+  int64_t crossings, crossings_here; /* of switches; those of one without time passing */
+  int64_t next_switch; /* the one at t_switch, counted behind the events */
+  int64_t chatter; /* the last switch that crossed without end, -1: none */
   int64_t steps, rejected, evaluations, events_fired;
   /* how many steps were about as long as stability allows, and whether that is a good part */
   int64_t stability_limited_steps, stability_limited;
@@ -121,10 +132,13 @@ typedef struct mstmm_run {
   double rtol;
   const double *atol; /* n_error; may be NULL with fixed steps */
   double first_step, min_step, max_step; /* 0: chosen */
-  int64_t max_steps;                     /* 0: no limit */
+  int64_t max_steps; /* 0: as many as it takes, if the end is in sight */
   int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
   int64_t n_breaks;
   const double *breaks; /* strictly increasing */
+  int64_t n_bounds; /* adaptive steps: none from bound_starts[i] on is longer than bounds[i] */
+  const double *bound_starts; /* strictly increasing, the first at or before t_start */
+  const double *bounds;
   int64_t n_outputs;    /* < 0: a sample at every accepted step */
   const double *outputs; /* strictly increasing, within [t_start, t_end] */
   double *workspace;     /* mstmm_workspace_size doubles */

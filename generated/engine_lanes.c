@@ -16,7 +16,7 @@ static int64_t row_of(const mstmm_system *system) {
 }
 
 int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tableau) {
-  const int sound = system->lanes > 0 && system->n_state > 0 && !system->n_events &&
+  const int sound = system->lanes > 0 && system->n_state > 0 && !mstmm_n_watched(system) &&
                     !system->n_memory && mstmm_workspace_size(system, tableau) > 0;
   const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
   return sound ? rows * row_of(system) + system->n_state + WIDE : 0;
@@ -85,7 +85,7 @@ static int take_up(const mstmm_cut_group *c, int lane) {
   *run = many->problem;
   memset(&run->real, 0, sizeof run->real);
   memset(&run->count, 0, sizeof run->count);
-  run->count.component = -1;
+  run->count.component = run->count.chatter = -1;
   run->real.t = run->t_start;
   run->real.smallest_step = INFINITY;
   mstmm_pass_breaks(run);
@@ -195,8 +195,9 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
     run->real.h = 0.0;
     if (group->trajectory[lane] < 0) continue;
     if (!group->retries[lane]) run->count.rejected_last = 0;
-    if (run->max_steps && run->count.steps >= run->max_steps) {
-      finish(c, lane, mstmm_note(run, MSTMM_TOO_MANY_STEPS, 0, -1, run->real.t));
+    const int too_many = group->retries[lane] ? 0 : mstmm_too_many(run);
+    if (too_many) {
+      finish(c, lane, too_many);
       continue;
     }
     a->failed[lane] = mstmm_aim(run);
@@ -216,7 +217,8 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
 /* Is the error of an active lane small enough? */
 static int good(const mstmm_cut_group *c, const mstmm_attempt *a, int lane) {
   return a->active[lane] && !a->failed[lane] &&
-         (c->group->runs[lane].fixed_step > 0.0 || a->error[lane] < 1.0);
+         (c->group->runs[lane].fixed_step > 0.0 || a->error[lane] < 1.0 ||
+          mstmm_in_gap(&c->group->runs[lane]));
 }
 
 /* Samples between the ends of an accepted step. */

@@ -32,13 +32,14 @@ static double *aligned(double *workspace) {
 static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
   const mstmm_system *system = work->system;
   const mstmm_tableau *tableau = work->tableau;
-  const int64_t ne = system->n_events, row = (system->n_state + WIDE - 1) / WIDE * WIDE;
+  const int64_t ne = mstmm_n_watched(system), row = (system->n_state + WIDE - 1) / WIDE * WIDE;
   const int64_t lanes = tableau->n_nodes ? WIDE * row : 0;
   cutting at = {.base = base, .used = 0};
   work->row = row;
   work->y = take(&at, row);
   work->truth = take(&at, ne);
   work->last_fire = take(&at, ne);
+  work->side = take(&at, ne);
   work->k = take(&at, row);
   *kept = at.used;
   take(&at, (tableau->n_stages + tableau->n_extra) * row);
@@ -68,8 +69,9 @@ void mstmm_work_cut(mstmm_run *run, mstmm_work *work) {
 static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tableau) {
   const int lanes = system->lanes;
   return system->n_state >= 0 && system->n_error >= 0 && system->n_error <= system->n_state &&
-         system->n_events >= 0 && system->n_memory >= 0 && system->rhs &&
-         (!system->n_events || (system->events && system->fire)) &&
+         system->n_events >= 0 && system->n_switches >= 0 && system->n_memory >= 0 &&
+         system->rhs && (!system->n_events || system->fire) &&
+         (!mstmm_n_watched(system) || system->events) &&
          (!system->n_memory || system->memory) &&
          (lanes == 0 || ((lanes == 2 || lanes == 4 || lanes == WIDE) && system->rhs_lanes)) &&
          tableau->n_stages >= 1 && tableau->n_extra >= 0 && tableau->n_dense >= 1 &&
@@ -111,6 +113,9 @@ static int bad_argument(const mstmm_run *run) {
   for (int i = 0; run->atol && i < system->n_error; i++)
     if (!(run->atol[i] > 0.0)) return 3;
   if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks)) return 4;
+  if (run->n_bounds < 0 || !increasing(run->n_bounds, run->bound_starts)) return 4;
+  for (int64_t i = 0; i < run->n_bounds; i++)
+    if (!(run->bounds[i] > 0.0)) return 4;
   if (!increasing(run->n_outputs, run->outputs)) return 5;
   if (run->n_outputs > 0 &&
       (run->outputs[0] < run->t_start || run->outputs[run->n_outputs - 1] > run->t_end))
@@ -125,6 +130,7 @@ static void clear(mstmm_run *run) {
   memset(&run->count, 0, sizeof run->count);
   run->count.n_state = run->system->n_state;
   run->count.n_events = run->system->n_events;
+  run->count.n_switches = run->system->n_switches;
   run->count.n_memory = run->system->n_memory;
   run->count.n_stages = run->tableau->n_stages;
   run->count.n_extra = run->tableau->n_extra;
@@ -132,6 +138,7 @@ static void clear(mstmm_run *run) {
   run->count.lanes = run->system->lanes;
   run->count.component = -1;
   run->count.event = -1;
+  run->count.chatter = -1;
   run->real.t = run->t_start;
   run->real.smallest_step = INFINITY;
 }
@@ -154,7 +161,8 @@ int mstmm_run_start(mstmm_run *run, const double *y0) {
   clear_workspace(run);
   mstmm_work_cut(run, &work);
   memcpy(work.y, y0, (size_t)run->system->n_state * sizeof *y0);
-  for (int i = 0; i < run->system->n_events; i++) {
+  for (int i = 0; i < mstmm_n_watched(run->system); i++) {
+    work.side[i] = 1.0;
     work.truth[i] = UNTRUE;
     work.last_fire[i] = NAN;
   }
@@ -208,10 +216,12 @@ void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers) {
 static int belongs(const mstmm_run *run, const mstmm_run_count *saved) {
   const mstmm_run_count *c = &run->count;
   return saved->n_state == c->n_state && saved->n_events == c->n_events &&
-         saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
+         saved->n_switches == c->n_switches && saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
          saved->n_extra == c->n_extra && saved->n_dense == c->n_dense && saved->lanes == c->lanes &&
          saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
-         saved->event < c->n_events && saved->break_index >= 0 &&
+         saved->event < c->n_events + c->n_switches && saved->break_index >= 0 &&
+         saved->next_switch >= 0 && saved->next_switch <= c->n_events + c->n_switches &&
+         saved->bound_index >= 0 && saved->bound_index <= run->n_bounds &&
          saved->break_index <= run->n_breaks && saved->output_index >= 0 &&
          saved->output_index <= (run->n_outputs > 0 ? run->n_outputs : 0);
 }

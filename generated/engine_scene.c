@@ -290,6 +290,7 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
     system->rhs = scene_rhs;
     system->accept = needs_settling(run) ? scene_accept : NULL;
     system->n_events = run->n_events;
+    system->n_switches = run->n_switches;
     system->events = scene_events;
     system->fire = scene_fire;
     system->n_memory = model->n_memory;

@@ -57,6 +57,7 @@ typedef struct {
     const int *quaternions; /* first coordinate of each */
     int n_events;
     const mstmm_event_action *events;
+    int n_switches; /* their margins stand behind the events' values */
     const mstmm_tape *event_tape; /* t, q, u, probe positions and velocities -> values */
     int n_probes;
     const mstmm_probe *probes;

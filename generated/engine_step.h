@@ -13,14 +13,16 @@ enum {
   PHASE_HERE,    /* fire what has become true at the current state */
   PHASE_SAMPLE,  /* sample the current state, finish, or go on */
   PHASE_STEP,    /* make the trial step until its error is small enough */
+  PHASE_SWITCH,  /* make it again if a switch is in it, to end just before */
   PHASE_SCAN,    /* look for the next event in it */
   PHASE_OUTPUT,  /* samples inside the step */
   PHASE_FIRE,    /* accept up to the event and fire it */
+  PHASE_CROSS,   /* accept up to where a switch crosses */
   PHASE_ACCEPT,  /* accept the whole step */
   PHASE_END      /* count.status is final */
 };
 
-/* What is known of an event, kept as a double among the others.  Doubtful: it has just fired, and
+/* What is known of an event or switch, kept as a double among the others.  Doubtful: it has just fired, and
  * reads false at the same time; only rounding perhaps, so that becoming true again counts for
  * nothing until time has passed or another event has fired. */
 #define UNWATCHED (-1.0)
@@ -38,13 +40,14 @@ typedef struct mstmm_work {
   int64_t row;
   double *y;                         /* row: the current good state */
   double *k;                         /* (s + 1 + n_extra) rows */
-  double *truth;                     /* n_events */
-  double *last_fire;                 /* n_events: time, or NaN */
+  double *truth;                     /* events and switches */
+  double *last_fire;                 /* the same: time, or NaN */
+  double *side;                      /* the same: 1, or -1 for a switch that starts above zero */
   double *y_new, *y_stage, *y_event; /* a row each */
   double *dense;                     /* n_dense rows */
   double *atol;                      /* a row: the tolerances, 0 where there are none */
   double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see engine_iterate.c */
-  double *g_before, *g_left, *g_right, *g_trial; /* n_events each */
+  double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
   double *memory;                                /* n_memory: saved while an event is tried */
 } mstmm_work;
 
@@ -101,6 +104,11 @@ double mstmm_initial_step(const mstmm_work *work, double interval);
  * Reject: a shorter step after an error above 1 or a failure already noted; 0, or the status with
  * which the run ends.  Propose: the next step, after a step with this error.  */
 int mstmm_aim(mstmm_run *run);
+/* Between two breaks that are one but for rounding no error is asked for. */
+int mstmm_in_gap(const mstmm_run *run);
+/* Have there been too many steps, or is no end in sight?  0, or a failure. */
+int mstmm_too_many(mstmm_run *run);
+double mstmm_smallest_step(const mstmm_run *run);
 double mstmm_interval(const mstmm_run *run);
 int mstmm_output_inside(const mstmm_run *run);
 int mstmm_reject(mstmm_run *run, int failed, double error);
@@ -121,9 +129,16 @@ double mstmm_combined_error(double h, double high, double low, int64_t n, int bo
 /* Makes the next step, shorter and shorter until its error is small enough. */
 int mstmm_try_step(const mstmm_work *work);
 
-/* The event functions at (t, y); a value that is not a number is a failure. */
+MSTMM_INLINE int mstmm_n_watched(const mstmm_system *system) {
+  return system->n_events + system->n_switches;
+}
+/* The event functions at (t, y), a value that is not a number being a failure; and the margins of
+ * switches, negative on the side where the step began. */
 int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g);
-/* Looks for the first event in (t_scan, t_new]; sets t_stop and count.event (-1: none). */
+/* Looks for the first switch in (t, t_new]; sets t_switch (INFINITY: none) and next_switch. */
+int mstmm_find_switch(const mstmm_work *work);
+/* Looks for the first event in (t_scan, t_new] up to t_switch; sets t_stop and count.event (-1: none,
+ * n_events and up: the switch). */
 int mstmm_scan(const mstmm_work *work);
 
 #endif

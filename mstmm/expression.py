@@ -16,7 +16,10 @@ from .errors import ExpressionError
 from .expression_parser import FUNCTIONS, MAX_LENGTH, MEANING, Name, Parser, Term
 from .graph import Graph, Node
 
-__all__ = ["FUNCTIONS", "Expression", "Name", "number", "parse"]
+__all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
+
+#: Operations that change branch where their argument, or the difference of the two, is zero.
+SWITCHES = frozenset({"sign", "abs", "lt", "le", "gt", "ge", "min", "max"})
 
 _SYMBOLS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 _Line = tuple[Fraction, Fraction]
@@ -78,6 +81,11 @@ class Expression:
         # `text` was stripped before parsing, so that positions point into it.
         return Expression(self.text[term.start : term.end], names, self.terms, root)
 
+    @property
+    def needed(self) -> frozenset[int]:
+        """Numbers of the terms that the value depends on."""
+        return frozenset(self._needed(self.root))
+
     def _needed(self, root: int) -> set[int]:
         needed: set[int] = set()
         stack = [root]
@@ -94,12 +102,16 @@ class Expression:
 
         A comparison becomes 1 where it holds and 0 elsewhere.
         """
+        return self.nodes(graph, resolve)[self.root]
+
+    def nodes(self, graph: Graph, resolve: Callable[[Name], Node]) -> dict[int, Node]:
+        """The nodes of all terms that the value depends on, by their numbers."""
         nodes: dict[int, Node] = {}
         needed = self._needed(self.root)
         for number, term in enumerate(self.terms):
             if number in needed:
                 nodes[number] = _node(graph, term, [nodes[i] for i in term.args], resolve)
-        return nodes[self.root]
+        return nodes
 
     def evaluate(self, values: Callable[[Name], float]) -> float:
         """Value in double precision; nan or an infinity where the mathematics has none."""
@@ -119,17 +131,23 @@ class Expression:
     def time_breaks(self) -> tuple[float, ...]:
         """Times, ascending, at which the expression switches exactly: where a comparison, sign,
         abs, min or max of something linear in `t` alone changes side."""
+        times = (time for time in self.linear_switches().values() if time is not None)
+        return tuple(sorted(set(times)))
+
+    def linear_switches(self) -> dict[int, float | None]:
+        """Term -> the time at which it switches, for what compares straight lines in `t` alone;
+        None for one that never switches."""
         lines: list[_Line | None] = []
         needed = self._needed(self.root)
-        breaks: set[float] = set()
+        found: dict[int, float | None] = {}
         for number, term in enumerate(self.terms):
             args = [lines[i] for i in term.args]
             lines.append(_line(term, args))
-            if number in needed and term.constant is None:
-                switch = _switch(term.op, args)
-                if switch is not None:
-                    breaks.add(switch)
-        return tuple(sorted(breaks))
+            known = [line for line in args if line is not None]
+            switches = term.op in SWITCHES and term.constant is None and number in needed
+            if switches and len(known) == len(args):
+                found[number] = _switch(term.op, known)
+        return found
 
 
 def parse(text: str, where: str = "") -> Expression:
@@ -230,15 +248,12 @@ def _is_long(line: _Line) -> bool:
     return any(max(abs(x.numerator), x.denominator).bit_length() > 8000 for x in line)
 
 
-def _switch(op: str, args: list[_Line | None]) -> float | None:
+def _switch(op: str, lines: list[_Line]) -> float | None:
     """Time at which an operation on straight lines changes branch."""
-    lines = [line for line in args if line is not None]
-    if op in ("sign", "abs") and len(lines) == 1:
+    if op in ("sign", "abs"):
         slope, offset = lines[0]
-    elif op in ("lt", "le", "gt", "ge", "min", "max") and len(lines) == 2:
-        slope, offset = lines[0][0] - lines[1][0], lines[0][1] - lines[1][1]
     else:
-        return None
+        slope, offset = lines[0][0] - lines[1][0], lines[0][1] - lines[1][1]
     if slope == 0:
         return None
     try:

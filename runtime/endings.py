@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .culprit import culprit_ahead
 from .integrate import Run, Status
+from .run_notes import endless
 
 if TYPE_CHECKING:
     from .simulate import SceneSystem
@@ -27,6 +28,9 @@ def message_of(system: SceneSystem, run: Run) -> str:
         text = cause or system.engine.failure_text(system.run.failure, failure.time)
         return f"{text}; last good state at t = {run.t:.9g} s"
     message = run.message(system.components(), system.event_names, cause)
+    sticks = failure is not None and failure.status is Status.TOO_MANY_STEPS
+    if sticks and run.chatter is not None:
+        return f"{message}; {endless(system, run.chatter)}"
     work = failure is not None and failure.component == system.engine.nq + system.engine.nu
     message += busiest(system, run.t, run.y) if work else ""
     small = failure is not None and failure.status is Status.STEP_TOO_SMALL

@@ -42,6 +42,10 @@ ANGLE = 0.01
 #: The same for other coordinates, as part of their largest excursion.
 PART = 0.01
 
+#: Longest step of the second run in the longest one of the first: where both took long steps, the
+#: second one looks at other states and times.
+_ELSEWHERE = 0.37
+
 #: No tolerance is tightened below this.
 _TIGHTEST = 1e-14
 
@@ -114,12 +118,13 @@ def tighter(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, 
     rtol = min(settings.rtol * factor, _LOOSEST)
     size = max(_size(first.q - first.q[:1]), _size(first.u))
     atol = min(settings.atol * rtol / settings.rtol, max(_LOOSEST * size, _DUST))
-    longest = settings.max_step / 2
+    bounds = [settings.max_step / 2, _ELSEWHERE * (first.statistics.largest_step or 0.0)]
     if first.statistics.steps <= 2 * len(pieces):  # breaks and the end, not errors, set the steps
-        longest = min(longest or np.inf, _typical(pieces, pieces) / 2)
+        bounds.append(_typical(pieces, pieces) / 2)
+    longest = min((bound for bound in bounds if bound > 0.0), default=0.0)
     second = replace(
         settings, rtol=rtol, atol=atol, output_times=times, max_step=longest,
-        max_steps=3 * settings.max_steps,
+        max_steps=6 * settings.max_steps,
         first_step=0.3 * (first.statistics.smallest_step or 0.0),  # else both begin alike
     )  # fmt: skip
     return second, f"rtol {second.rtol:.0e}"

@@ -131,7 +131,8 @@ def second_run(
     model: Model, first: Trajectory, q: Array, u: Array, watch: Watch
 ) -> ErrorEstimate | None:
     """Error of `first` by a more accurate run; None, with a note, if that leads nowhere."""
-    settings, reference = tighter(first, model._engine.packed.breaks)
+    known = model._engine.packed.time_map(first.settings.t_start, first.settings.t_end)
+    settings, reference = tighter(first, known.breaks.tolist())
     watch.run = 1
     second, _ = first_run(model, settings, q, u, watch)
     if not second.success:

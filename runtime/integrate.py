@@ -30,7 +30,7 @@ _ARGUMENTS = {
     2: "the times: both finite, t_end not before t_start",
     3: "the tolerances or steps: absolute tolerances above zero, nothing negative, "
     "and a method with an error estimate unless the step is fixed",
-    4: "the breaks: finite and strictly increasing",
+    4: "the breaks and the starts of bounds: finite and strictly increasing",
     5: "the output times: finite, strictly increasing and within the run",
     6: "the sample buffer",
 }
@@ -106,6 +106,7 @@ class Statistics:
         stability_limited: True if at least fifty steps, and a tenth of all, were about as long as
             stability allows: an explicit method suits the system badly, or the fixed step is long.
         stability_limited_steps: how many steps were.
+        crossings: how often a step ended where an expression of the state switches.
     """
 
     steps: int
@@ -120,6 +121,7 @@ class Statistics:
     largest_stiffness_index: float
     stability_limited: bool
     stability_limited_steps: int
+    crossings: int = 0
 
 
 class Run:
@@ -137,8 +139,10 @@ class Run:
         output_times: strictly increasing times of samples; None for every accepted step.
         breaks: strictly increasing times at which the right-hand side is not smooth.  Steps end
             there; the right-hand side never sees a break itself but the number before or after.
+        bounds: (starts, longest): from each start on, the first at or before t_start, no adaptive
+            step is longer.
         first_step, min_step, max_step: seconds, 0 to let the loop choose.
-        max_steps: 0 for no limit.
+        max_steps: 0 for as many as it takes, if the end is in sight.
         capacity: rows of the sample buffer, at least 2.
 
     Raises:
@@ -160,6 +164,7 @@ class Run:
         step: float | None = None,
         output_times: ArrayLike | None = None,
         breaks: ArrayLike = (),
+        bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
         first_step: float = 0.0,
         min_step: float = 0.0,
         max_step: float = 0.0,
@@ -182,6 +187,9 @@ class Run:
         tolerances = np.broadcast_to(np.asarray(atol, dtype=np.float64), (system.n_error,))
         run.atol = self._doubles(tolerances)
         self._times(run, output_times, breaks)
+        starts, longest = (np.asarray(x, dtype=np.float64) for x in bounds)
+        run.n_bounds = len(starts)
+        run.bound_starts, run.bounds = self._doubles(starts), self._doubles(longest)
         self._buffer(run, capacity)
         size = lib.mstmm_workspace_size(system, run.tableau)
         run.workspace = self._doubles(np.zeros(max(size, 1)))
@@ -315,7 +323,14 @@ class Run:
             largest_stiffness_index=float(r.largest_stiffness),
             stability_limited=bool(c.stability_limited),
             stability_limited_steps=int(c.stability_limited_steps),
+            crossings=int(c.crossings),
         )
+
+    @property
+    def chatter(self) -> tuple[int, float] | None:
+        """(switch, time in s): the last one that switched without end and is not watched since."""
+        c = self._run.count
+        return (int(c.chatter), float(self._run.real.chatter_time)) if c.chatter >= 0 else None
 
     def message(
         self,
@@ -403,7 +418,11 @@ def failure_text(
         if fail.code
         else f"the condition of {event} is not a number {at}",
         Status.FIRE_FAILED: f"{event} failed {at} (code {fail.code})",
-        Status.TOO_MANY_STEPS: f"more steps than allowed {at}",
+        Status.TOO_MANY_STEPS: f"more steps than allowed {at}"
+        if not fail.code
+        else f"no end in sight {at}: at the pace of the last steps the run would take more than "
+        "1e10 of them; the motion sticks where the right-hand side jumps, or is too stiff for the "
+        "tolerance; max_steps, if given, is the only limit",
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",
     }

@@ -81,17 +81,17 @@ def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
     """Fills the run that all trajectories copy; returns what it points to."""
     engine, settings = lanes.engine, lanes.settings
     atol = np.full(lanes.width, float(settings.atol))
-    inside = [b for b in engine.packed.breaks if settings.t_start < b < settings.t_end]
-    breaks = np.array(inside, dtype=np.float64)
-    pointers = [engine.pointer(array) for array in (atol, breaks, times)]
+    known = engine.packed.time_map(settings.t_start, settings.t_end)
+    arrays = [np.array(x) for x in (atol, known.breaks, times, known.starts, known.longest)]
+    pointers = [engine.pointer(array) for array in arrays]
     run.tableau = c_tableau(engine.ffi, get(settings.method))
     run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
     run.fixed_step = settings.step or 0.0
     run.max_step, run.max_steps = settings.max_step, settings.max_steps
     run.first_step = settings.first_step
-    run.atol, run.breaks, run.outputs = pointers
-    run.n_breaks, run.n_outputs = len(breaks), len(times)
-    return [atol, breaks, times, *pointers]
+    run.atol, run.breaks, run.outputs, run.bound_starts, run.bounds = pointers
+    run.n_breaks, run.n_outputs, run.n_bounds = len(known.breaks), len(times), len(known.starts)
+    return [*arrays, *pointers]
 
 
 def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: list[Any]) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from mstmm.expression import Expression
@@ -14,6 +15,7 @@ from mstmm.tape import Tape, compile_tape
 from mstmm.topology import GROUND_INDEX, Topology, build
 
 from . import prebuilt, values
+from .acting import acting
 from .bodies import BodyRecords, Elements, Known, kernel_type, layout_of, user_parameters
 from .flexible.expansion import Expanded, expand
 from .flexible.modal_body import ModalBody
@@ -23,8 +25,13 @@ from .links import attach_runs
 from .placement import Placement
 from .product import attach
 from .records import Lookup, Records
+from .switches import Watched, watched
+from .time_map import TimeMap, time_map
 
 __all__ = ["Known", "Packed", "kernel_type", "pack", "releasable", "resize"]
+
+#: Spans of time whose maps are kept.
+_MAPS = 8
 
 
 @dataclass
@@ -43,12 +50,26 @@ class Packed:
     hinge_position: Mapping[str, int]
     releases: dict[str, int]
     n_memory: int
-    breaks: tuple[float, ...]
     warnings: list[str] = field(default_factory=list)
     #: kernels of the scene's expressions: "values", "drives", and "effort k" of spring k
     expressions: dict[str, KernelIR] = field(default_factory=dict)
     kept: list[Any] = field(default_factory=list)
     expanded: Expanded | None = None
+    _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
+
+    def time_map(self, start: float, end: float) -> TimeMap:
+        """Where the steps of a run from `start` to `end` (s) end, and how long they may be."""
+        span = (start, end)
+        if span not in self._time_maps:
+            if len(self._time_maps) >= _MAPS:
+                self._time_maps.clear()
+            self._time_maps[span] = time_map(acting(self.scene), start, end)
+        return self._time_maps[span]
+
+    @cached_property
+    def watched(self) -> Watched:
+        """Events, releases and switches as one tape."""
+        return watched(self.scene, self.layout)
 
     @property
     def described(self) -> Scene:
@@ -159,7 +180,7 @@ class _Packing:
         packed = Packed(
             scene, tree, self.layout, self.ffi, self.lib, model, records, bodies.placements,
             Lookup(scene.bodies, tree.place_of_body), Lookup(scene.hinges, tree.place_of_hinge),
-            self.releases, 0, (), kept=self.kept, expanded=self.expanded,
+            self.releases, 0, kept=self.kept, expanded=self.expanded,
         )  # fmt: skip
         packed.warnings += [w for body in packed.flexible.values() for w in body.warnings]
         self.kept.append(model)
@@ -174,7 +195,6 @@ class _Packing:
         self._tapes(packed)
         attach_runs(packed)
         self._sizes(packed)
-        packed.breaks = tuple(sorted(self._breaks()))
         return packed
 
     def reals(self, numbers: tuple[float, ...]) -> Any:
@@ -195,11 +215,9 @@ class _Packing:
             record.body, record.coordinate, record.speed = body, k, k
         packed.model.drives, packed.model.n_drives = records, len(driven)
         self.kept.append(records)
-        self._driven = [entry for _, _, entry in driven]
         if driven:
-            packed.model.drive_tape = self._expression(
-                packed, "drives", values.drive_kernel(self._driven)
-            )
+            kernel = values.drive_kernel([entry for _, _, entry in driven])
+            packed.model.drive_tape = self._expression(packed, "drives", kernel)
 
     def _driven_hinges(self) -> Iterator[tuple[int, HingeTable]]:
         """(place, table) of every hinge with a drive."""
@@ -262,7 +280,6 @@ class _Packing:
                     record.effort = self._expression(
                         packed, f"effort {index}", values.effort_kernel(law.effort, self.layout)
                     )
-                    self.values.breaks.update(law.effort.time_breaks())
             else:
                 given = user_parameters(element, spring.parameters, f'spring "{spring.name}"')
                 record.p = self.reals(given)
@@ -281,17 +298,6 @@ class _Packing:
         model, layout = packed.model, self.layout
         model.nq, model.nu, model.n_memory = layout.nq, layout.nu, packed.n_memory
         resize(packed, self.slots)  # tapes of events are laid out later and may need more
-
-    def _breaks(self) -> set[float]:
-        breaks = set(self.values.breaks)
-        for entry in self._driven:
-            breaks.update(entry.time_breaks())
-        for hinge in self.scene.hinge:
-            if hinge.release is not None:
-                breaks.update(hinge.release.time_breaks())
-        for event in self.scene.event:
-            breaks.update(event.when.time_breaks())
-        return breaks
 
 
 def resize(packed: Packed, slots: int) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 
 from mstmm.errors import SceneError
 
+from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
-from .integrate import Samples, Statistics, Status
+from .integrate import Failure, Samples, Statistics, Status, failure_text
 from .jacobian import Jacobian
+from .run_notes import endless, notes
 from .settings import Settings
 from .simulate import SceneSystem, Trajectory, interruptible, split, tolerances
 
@@ -39,6 +42,9 @@ _LOOKS = np.linspace(0.0, 1.0, 9)[1:]
 
 #: Steps in a row that do not move the time: the integrator has given up without saying so.
 _STUCK = 20
+
+#: Two breaks so near to each other, as part of the time or the run, are one.
+_GAP = 2.0**-39
 
 
 class _Ended(Exception):
@@ -84,14 +90,19 @@ class Equations:
         return self.ffi.from_buffer("double[]", array)
 
     def events(self, t: float, y: Array) -> Array:
-        values = np.empty(max(1, self.calls.n_events))
+        """Values of the events; negative where they are not true."""
+        return self.watched(t, y)[: self.calls.n_events]
+
+    def watched(self, t: float, y: Array) -> Array:
+        """Values of the events, and behind them the margins of switches."""
+        values = np.empty(self.calls.n_events + self.calls.n_switches)
         state = np.ascontiguousarray(y)
-        if self.calls.n_events and self.calls.events(
+        if len(values) and self.calls.events(
             self.calls.context, t, self._c(state), self._c(values)
         ):
             text = self.engine.failure_text(self.scene.run.failure, t)
             raise _Ended(Status.EVENT_FAILED, text)
-        return values[: self.calls.n_events]
+        return values
 
     def remember(self, t: float, y: Array) -> Array:
         """After a step: memory of turns brought up to date; the settled state."""
@@ -127,14 +138,19 @@ class _Loop:
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
         self.flag = [False]
-        self.truth = np.zeros(int(self.system.calls.n_events), dtype=bool)
+        calls = self.system.calls
+        self.n_events = int(calls.n_events)
+        self.truth = np.zeros(self.n_events, dtype=bool)
+        self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
+        self.sight = Sight(settings.t_start, settings.t_end)
+        self.known = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
 
     def run(self, q: Array, u: Array) -> Trajectory:
         scene, settings = self.system.scene, self.settings
         y = scene.start(settings.t_start, q, u)
         self.last, self.atol = y, tolerances(scene, settings, y)
-        inner = [b for b in self.system.engine.packed.breaks
-                 if settings.t_start < b < settings.t_end]  # fmt: skip
+        stops = np.union1d(self.known.breaks, self.known.starts).tolist()
+        inner = [b for b in stops if settings.t_start < b < settings.t_end]
         status: Status | None
         try:
             with interruptible() as self.flag:
@@ -146,13 +162,21 @@ class _Loop:
             status, message = ended.status, ended.message
         except KeyboardInterrupt:
             status, message = None, f"interrupted at t = {self.t:.9g} s"
-        return split(
+        found = split(
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
         )  # fmt: skip
+        return replace(found, notes=notes(scene, settings, self.crossings.chatter))
 
     def piece(self, y: Array, stop: float) -> Array:
-        """From self.t to the next break, with a new integrator after every event."""
+        """From self.t to the next break, with a new integrator after every event.
+
+        Between two breaks that are one but for rounding nothing changes.
+        """
+        span = self.settings.t_end - self.settings.t_start
+        if stop - self.t <= _GAP * max(abs(self.t), span):
+            self.t = stop
+            return y
         self.system.bounds = (np.nextafter(self.t, np.inf), np.nextafter(stop, -np.inf))
         while self.t < stop:
             if self.fire_here(y):
@@ -162,7 +186,10 @@ class _Loop:
         return y
 
     def stretch(self, y: Array, stop: float) -> Array:
-        """Steps of one integrator, up to `stop` or an event."""
+        """Steps of one integrator, up to `stop`, an event or a switch.
+
+        A step with a switch in it is made again, to end just before; see phase_switch in C.
+        """
         self.refuse_start(y)
         solver, stuck = self.solver(y, stop), 0
         while solver.status == "running":
@@ -170,12 +197,19 @@ class _Loop:
             text = self.step(solver)
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise self.failed(solver.y, text)
+            if not self.sight.has_end(float(solver.t)):
+                raise self.endless()
             stuck = stuck + 1 if solver.t == solver.t_old else 0
             if stuck > _STUCK:
                 raise self.failed(solver.y, "the steps have become too small")
             self.steps += 1
             self.sizes.append(solver.t - solver.t_old)
-            event = self.first_event(solver)
+            switch = self.first_switch(solver)
+            if switch is not None and not self.crossings.is_short(switch[1] - solver.t_old):
+                self.steps -= 1
+                self.sizes.pop()
+                return self.stretch(self.last, just_before(solver.t_old, switch[1]))
+            event = self.first_event(solver, switch)
             end = solver.t if event is None else event[1]
             dense = solver.dense_output()
             self.outputs_until(dense, end)
@@ -183,6 +217,7 @@ class _Loop:
             self.t, self.last = float(end), self.system.remember(end, y)
             self.tell(end)
             if event is not None:
+                self.crossed(event)
                 return np.array(self.last)
             if self.outputs is None:
                 self.sample(end, solver.y)
@@ -216,6 +251,20 @@ class _Loop:
             found, solver.status = str(error), "failed"
         return found
 
+    def endless(self) -> _Ended:
+        """At the pace of the last steps the run would never end."""
+        text = failure_text(Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1))
+        if self.crossings.chatter is not None:
+            text += f"; {endless(self.system.scene, self.crossings.chatter)}"
+        return _Ended(Status.TOO_MANY_STEPS, text)
+
+    def crossed(self, event: tuple[int, float]) -> None:
+        """The step ended where a switch crosses."""
+        if event[0] >= self.n_events:
+            self.crossings.note(event[0] - self.n_events, self.t)
+            if self.outputs is None:
+                self.sample(self.t, self.last)
+
     def solver(self, y: Array, stop: float) -> Any:
         import scipy.integrate
 
@@ -225,9 +274,16 @@ class _Loop:
         more = {"jac": self.system.jacobian} if name in _IMPLICIT else {}
         return kind(
             self.rates, self.t, y, stop, rtol=max(self.settings.rtol, 2.3e-14),
-            atol=self.atol, max_step=self.settings.max_step or np.inf,
+            atol=self.atol, max_step=self.longest_step(),
             first_step=min(first, stop - self.t) or None, **more,
         )  # fmt: skip
+
+    def longest_step(self) -> float:
+        """What max_step and the loads allow from self.t to the next stop."""
+        starts, longest = self.known.starts, self.known.longest
+        here = int(np.searchsorted(starts, self.t, side="right")) - 1
+        bound = float(longest[here]) if here >= 0 else np.inf
+        return min(self.settings.max_step or np.inf, bound)
 
     def rates(self, t: float, y: Array) -> Array:
         """Rates for a step of SciPy's, which a step of endless trials does not outlive."""
@@ -284,28 +340,73 @@ class _Loop:
             raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s")
         return True
 
-    def first_event(self, solver: Any) -> tuple[int, float] | None:
-        """(event, time) of the first one that becomes true in the step."""
-        if not len(self.truth):
+    def first_switch(self, solver: Any) -> tuple[int, float] | None:
+        """(number behind the events, time) of the first switch that crosses in the step."""
+        if not self.crossings.n:
             return None
-        dense, left = solver.dense_output(), solver.t_old
-        false = self.events(left, dense(left)) < 0
+        n, dense = self.n_events, solver.dense_output()
+        times = [float(solver.t_old)]
+        rows = [self.system.watched(times[0], dense(times[0]))[n:]]
         for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
+            margins = self.system.watched(right, dense(right))[n:]
+            ends = {i: (times[-1], right, margins[i])
+                    for i in self.crossings.changed(rows[-1], margins)}  # fmt: skip
+            times.append(float(right))
+            rows.append(np.where(margins == 0.0, rows[-1], margins))
+            ends |= self.dips(dense, times[-3:], rows[-3:])
+            if ends:
+                found = [(self.locate(dense, n + i, *ends[i]), n + i) for i in ends]
+                time, number = min(found)
+                return number, time
+        return None
+
+    def dips(
+        self, dense: Any, times: list[float], rows: list[Array]
+    ) -> dict[int, tuple[float, float, float]]:
+        """Switch -> (left, right, margin there) where one crosses and is back at the next look."""
+        found: dict[int, tuple[float, float, float]] = {}
+        n = self.n_events
+        for i in self.crossings.near(rows) if len(rows) == 3 else ():
+            side = float(np.sign(rows[1][i]))
+
+            def height(t: float, i: int = i, side: float = side) -> float:
+                return side * float(self.system.watched(t, dense(t))[n + i])
+
+            at = dip(height, list(times), [side * float(row[i]) for row in rows])
+            if at is not None:
+                left = times[1] if at > times[1] else times[0]
+                found[i] = (left, at, -side)
+        return found
+
+    def first_event(
+        self, solver: Any, switch: tuple[int, float] | None
+    ) -> tuple[int, float] | None:
+        """(event, time) of the first one that becomes true in the step, or the switch in it."""
+        if not len(self.truth):
+            return switch
+        dense, left = solver.dense_output(), solver.t_old
+        end = solver.t if switch is None else switch[1]
+        false = self.events(left, dense(left)) < 0
+        for right in solver.t_old + _LOOKS * (end - solver.t_old):
             values = self.events(right, dense(right))
             risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]
             if risen:
                 time, event = min((self.locate(dense, i, left, right), i) for i in risen)
                 return event, time
             left, false = right, values < 0
-        return None
+        return switch
 
-    def locate(self, dense: Any, event: int, left: float, right: float) -> float:
-        """The first number at which the event holds, by bisection."""
+    def locate(
+        self, dense: Any, number: int, left: float, right: float, behind: float = 0.0
+    ) -> float:
+        """The first number at which an event holds, or a switch has the sign of `behind`, by
+        bisection."""
         while True:
             middle = left + (right - left) / 2
             if not left < middle < right:
                 return right
-            if self.events(middle, dense(middle))[event] >= 0:
+            value = self.system.watched(middle, dense(middle))[number]
+            if value * behind > 0 or (not behind and value >= 0):
                 right = middle
             else:
                 left = middle
@@ -339,5 +440,5 @@ class _Loop:
         return Statistics(
             self.steps, 0, self.system.evaluations, self.fired,
             min(self.sizes, default=None), max(self.sizes, default=None),
-            None, None, 0.0, 0.0, False, 0,
+            None, None, 0.0, 0.0, False, 0, self.crossings.count,
         )  # fmt: skip

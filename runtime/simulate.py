@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.tape import Tape
 
 from . import values
 from .endings import message_of
@@ -21,8 +22,10 @@ from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
 from .layout import StateNames
 from .pack import resize
+from .run_notes import notes
 from .settings import Settings
 from .steppers import get
+from .switches import MOST
 
 Array = NDArray[np.float64]
 
@@ -101,7 +104,8 @@ class SceneSystem:
     ) -> None:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
-        conditions, actions, self.event_names = _conditions(engine)
+        actions, self.event_names = _actions(engine)
+        self.switches = packed.watched.switches
         self.memory = engine.start_memory()
         model = packed.model
         self.run = run = ffi.new("mstmm_scene_run *")
@@ -116,8 +120,8 @@ class SceneSystem:
         run.quaternions = ffi.from_buffer("int[]", first)
         run.n_quaternions = len(packed.layout.quaternions)
         self.kept += [model, first]
-        if conditions:
-            self._events(conditions, actions)
+        if packed.watched.tape is not None:
+            self._events(packed.watched.tape, packed.watched.ends, actions)
         self.workspace = np.zeros(int(model.workspace))
         run.workspace = engine.pointer(self.workspace)
         if compiled is not None:
@@ -134,9 +138,10 @@ class SceneSystem:
         lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)
         self.kept += [code, numbers, scratch, *pointers]
 
-    def _events(self, conditions: list[Any], actions: list[tuple[int, int]]) -> None:
+    def _events(
+        self, tape: Tape, ends: Sequence[tuple[str, str]], actions: list[tuple[int, int]]
+    ) -> None:
         engine, ffi, run = self.engine, self.engine.ffi, self.run
-        tape, ends = values.event_tape(conditions, engine.packed.layout)
         resize(engine.packed, tape.slots)
         run.event_tape = values.c_tape(ffi, tape, self.kept)
         probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
@@ -144,10 +149,11 @@ class SceneSystem:
         numbers = np.zeros(6 * len(probes) + int(engine.lib.MSTMM_PROBE_NUMBERS))
         run.probes, run.n_probes = records, len(probes)
         run.probe_values = engine.pointer(numbers)
-        table = ffi.new("mstmm_event_action[]", len(actions))
-        for record, (action, release) in zip(table, actions, strict=True):
+        table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
+        for record, (action, release) in zip(table, actions, strict=False):
             record.action, record.release = action, release
         run.events, run.n_events = table, len(actions)
+        run.n_switches = min(len(self.switches), MOST)
         self.kept += [records, numbers, table]
 
     @property
@@ -169,24 +175,21 @@ class SceneSystem:
         return StateNames(self.engine.packed.layout, self.with_power)
 
 
-def _conditions(engine: Engine) -> tuple[list[Any], list[tuple[int, int]], list[str]]:
-    """(condition, own hinge), (action, memory place) and name of every event and release."""
+def _actions(engine: Engine) -> tuple[list[tuple[int, int]], list[str]]:
+    """(action, memory place) and name of every event and release."""
     packed, lib = engine.packed, engine.lib
-    conditions: list[Any] = []
     actions: list[tuple[int, int]] = []
     names: list[str] = []
     for event in packed.scene.event:
-        conditions.append((event.when, None))
         stops = event.do == "stop"
         release = -1 if stops else packed.releases[str(event.hinge)]
         actions.append((lib.MSTMM_FIRE_STOP if stops else lib.MSTMM_FIRE_RESTART, release))
         names.append(f'event "{event.name}"')
     for hinge in packed.scene.hinge:
         if hinge.release is not None:
-            conditions.append((hinge.release, hinge))
             actions.append((lib.MSTMM_FIRE_RESTART, packed.releases[hinge.name]))
             names.append(f'release of hinge "{hinge.name}"')
-    return conditions, actions, names
+    return actions, names
 
 
 def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
@@ -197,12 +200,13 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
             f"method {settings.method!r} takes fixed steps: give step in s, or use dopri5, dop853"
         )
     start = system.start(settings.t_start, q, u)
-    breaks = [b for b in system.engine.packed.breaks if settings.t_start < b < settings.t_end]
+    known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau,
         t_start=settings.t_start, t_end=settings.t_end,
         y0=start, rtol=settings.rtol, atol=tolerances(system, settings, start),
-        step=settings.step, output_times=settings.output_times, breaks=breaks,
+        step=settings.step, output_times=settings.output_times, breaks=known.breaks,
+        bounds=(known.starts, known.longest),
         max_step=settings.max_step, max_steps=settings.max_steps, first_step=settings.first_step,
     )  # fmt: skip
 
@@ -287,10 +291,11 @@ def trajectory(
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
     message = _interrupted(run) if status is None else message_of(system, run)
-    return split(
+    found = split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
+    return replace(found, notes=notes(system, settings, run.chatter))
 
 
 def _interrupted(run: Run) -> str:

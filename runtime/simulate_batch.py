@@ -28,6 +28,7 @@ from .lanes_run import Lanes, run_lanes
 from .settings import Settings, checked
 from .simulate import Compiled, SceneSystem, advance, make_run, settled, trajectory
 from .steppers import get
+from .switches import has_switches
 
 if TYPE_CHECKING:
     from .fused import FusedLibrary
@@ -132,6 +133,8 @@ def _models(model: Model, parameters: Mapping[str, ArrayLike], n: int) -> list[M
 def _lanes(model: Model) -> FusedLibrary | None:
     """Code for several states side by side, where trajectories can be run on it."""
     packed = model._engine.packed
+    if has_switches(packed.scene):
+        return None
     if packed.n_memory or packed.scene.event or packed.releases or packed.model.n_drives:
         return None
     return model.fusion.ready_lanes(math.inf)

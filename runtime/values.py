@@ -26,13 +26,11 @@ class Values:
         self._graph = Graph()
         self._nodes: list[Node] = []
         self._places: dict[int, int] = {}
-        self.breaks: set[float] = set()
 
     def place(self, expression: Expression, own: Hinge | None = None) -> int:
         """Place of the expression's value; -1 for the constant zero."""
         if expression.is_zero:
             return -1
-        self.breaks.update(expression.time_breaks())
         node = expression.build(self._graph, resolver(self._graph, self.layout, own))
         if node.number not in self._places:
             self._places[node.number] = len(self._nodes)
@@ -112,11 +110,14 @@ def effort_kernel(effort: Expression, layout: Layout) -> KernelIR:
 
 
 def event_tape(
-    conditions: Sequence[tuple[Expression, Hinge | None]], layout: Layout
-) -> tuple[Tape, list[tuple[str, str]]]:
-    """t, q, u, positions -> g per condition, g >= 0 where it holds; and the ends it reads."""
-    graph = Graph()
-    probes: dict[tuple[str, str], int] = {}
+    conditions: Sequence[tuple[Expression, Hinge | None]],
+    layout: Layout,
+    graph: Graph,
+    probes: dict[tuple[str, str], int],
+    margins: Sequence[Node],
+) -> Tape:
+    """t, q, u, positions of the ends in `probes` -> g per condition, g >= 0 where it holds, and
+    behind them the margins."""
     nodes = []
     for condition, own in conditions:
         comparison = condition.comparison
@@ -126,7 +127,7 @@ def event_tape(
         difference = left.build(graph, resolve) - right.build(graph, resolve)
         nodes.append(difference if sign in (">", ">=") else -difference)
     inputs = [*state_ports(layout), Port("points", (6 * len(probes),))]
-    return compile_tape(_kernel(graph, "events", inputs, nodes)), list(probes)
+    return compile_tape(_kernel(graph, "events", inputs, [*nodes, *margins]))
 
 
 def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:

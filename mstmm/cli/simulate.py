@@ -56,6 +56,7 @@ class Plan:
     engine: str = "auto"
     flexibility: str | None = None
     accuracy: float | None = None
+    max_step: float = 0.0
 
     @property
     def checkpoint(self) -> Path:
@@ -81,6 +82,11 @@ def simulate(
     atol: Annotated[
         float, typer.Option("--atol", metavar="X", parser=not_negative, help="Absolute tolerance.")
     ] = 1e-12,
+    max_step: Annotated[
+        float | None,
+        typer.Option("--max-step", metavar="S", parser=positive, help="Longest step of a method "
+                     "that chooses its steps, s: no narrow part of a force is passed over."),
+    ] = None,
     times: Annotated[
         Times | None,
         typer.Option(
@@ -143,6 +149,7 @@ def simulate(
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
+        max_step or 0.0,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -254,7 +261,7 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     return model.simulate(
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
-        progress=progress, resume=plan.resume,
+        max_step=plan.max_step, progress=progress, resume=plan.resume,
         checkpoint=None if plan.method.startswith("scipy-") else str(plan.checkpoint),
     )  # fmt: skip
 

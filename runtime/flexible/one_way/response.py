@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-7
 FIRST_CELLS, MOST_CELLS = 32, 4096
 
+#: Two edges so near to each other, as part of the run, are one.
+_APART = 1e-9
+
 
 @dataclass(frozen=True)
 class Response:
@@ -129,11 +132,15 @@ def rigidity(model: Model) -> Rigidified:
 
 
 def _times(model: Model, run: Trajectory) -> Array:
-    """Times of the start and the last sample, and those between at which loads may jump."""
+    """Times of the start and the last sample, and those between at which loads may jump
+    or become narrow."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
-    between = [t for t in (*model._engine.packed.breaks, *events) if first < t < last]
-    return np.unique([first, *between, last])
+    known = model._engine.packed.time_map(first, last)
+    between = [t for t in (*known.breaks, *known.starts, *events) if first < t < last]
+    times = np.unique([first, *between, last])
+    apart = np.diff(times) > _APART * (last - first)  # a time may lie between two breaks
+    return np.append(times[:-1][apart], last)
 
 
 def _sampled(model: Model, run: Trajectory, grid: Cells) -> Trajectory:

@@ -1,0 +1,73 @@
+"""Every expression of a scene that acts on its motion, and what it is to the user."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from mstmm.expression import Expression
+from mstmm.scene import Scene
+from mstmm.scene_members import Hinges
+from mstmm.scene_parts import Hinge, HingeTable, Spring
+
+
+@dataclass(frozen=True)
+class Acting:
+    """One expression.
+
+    `hinges` are the numbers of the hinges whose own q, u and parameters it names; `spring` is the
+    one whose length it reads.  Of a `drive` the second derivative acts; a `condition` (an event or
+    a release) acts by becoming true.
+    """
+
+    expression: Expression
+    what: str
+    hinges: Sequence[int] = ()
+    spring: Spring | None = None
+    drive: bool = False
+    condition: bool = False
+    constants: tuple[tuple[str, float], ...] = field(default=())
+
+
+def acting(scene: Scene) -> list[Acting]:
+    """All that are not constant, in the order of the file."""
+    return [one for one in _all(scene) if not one.expression.is_constant]
+
+
+def _all(scene: Scene) -> Iterator[Acting]:
+    for number, hinge in enumerate(scene.hinge):
+        yield from _of_hinge(hinge, f'hinge "{hinge.name}"', [number])
+    for chain, first in zip(scene.chain, scene.hinges.starts, strict=False):
+        period = min(len(chain.hinge), chain.count)
+        for k in range(period):
+            members = range(first + k, first + chain.count, period)
+            yield from _of_hinge(chain.hinge_of(k), f'the hinges of chain "{chain.name}"', members)
+    for load in scene.load:
+        for entry in (*load.force, *load.moment):
+            yield Acting(entry, f'load "{load.name}"')
+    for spring in scene.spring:
+        yield Acting(spring.law.effort, f'effort of spring "{spring.name}"', spring=spring)
+    for event in scene.event:
+        yield Acting(event.when, f'event "{event.name}"', condition=True)
+
+
+def _of_hinge(hinge: HingeTable, what: str, numbers: Sequence[int]) -> Iterator[Acting]:
+    constants = tuple(hinge.parameters.items())
+    for effort in dict.fromkeys(hinge.law.effort):
+        yield Acting(effort, f"effort of {what}", numbers, constants=constants)
+    for entry in hinge.drive or ():
+        if entry is not None:
+            yield Acting(entry, f"drive of {what}", drive=True, constants=constants)
+    release = hinge.release if isinstance(hinge, Hinge) else None
+    if release is not None:
+        yield Acting(release, f"release of {what}", numbers, condition=True, constants=constants)
+
+
+def owners(one: Acting, hinges: Hinges) -> Iterator[Hinge | None]:
+    """The hinges whose own names an expression means: every one where it reads their q and u, else
+    the first alone, for all."""
+    own = any(len(name.parts) == 1 and name.text != "t" for name in one.expression.names)
+    for number in one.hinges if own else one.hinges[:1]:
+        yield hinges[number]
+    if not one.hinges:
+        yield None

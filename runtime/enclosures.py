@@ -1,0 +1,198 @@
+"""Expressions of time over intervals of time: bounds of their terms and of the slopes of those."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.expression import Expression
+from mstmm.expression_parser import Term
+
+from . import intervals as iv
+from .intervals import EVERYTHING, Interval, point
+
+Array = NDArray[np.float64]
+
+_ONE, _NONE = point(1.0), point(0.0)
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Bounds of a value and of its derivative by t."""
+
+    value: Interval
+    slope: Interval
+
+    def __sub__(self, other: Enclosure) -> Enclosure:
+        return Enclosure(self.value - other.value, self.slope - other.slope)
+
+
+def of_time(expression: Expression, constants: Mapping[str, float]) -> tuple[list[int], list[int]]:
+    """(terms that depend on t and constants alone, those of them in which t occurs)."""
+    alone, moving = set[int](), set[int]()
+    for number in sorted(expression.needed):
+        term = expression.terms[number]
+        if term.constant is not None or _is_known(term, constants):
+            alone.add(number)
+        elif term.name is not None:
+            if _is_time(term):
+                alone.add(number)
+                moving.add(number)
+        elif all(i in alone for i in term.args):
+            alone.add(number)
+            if any(i in moving for i in term.args):
+                moving.add(number)
+    return sorted(alone), sorted(moving)
+
+
+def enclose(
+    terms: Sequence[Term], wanted: Sequence[int], constants: Mapping[str, float], t: Interval
+) -> dict[int, Enclosure]:
+    """Enclosures of `wanted` (arguments before their operations) over cells of time."""
+    known: dict[int, Enclosure] = {}
+    with np.errstate(all="ignore"):
+        for number in wanted:
+            term = terms[number]
+            if term.constant is not None:
+                exact = term.exact is not None and float(term.exact) == term.exact
+                x = np.asarray(term.constant)
+                value = point(x) if exact else Interval(np.nextafter(x, -np.inf),
+                                                        np.nextafter(x, np.inf))  # fmt: skip
+                known[number] = Enclosure(value, _NONE)
+            elif term.name is not None:
+                known[number] = (
+                    Enclosure(t, _ONE) if _is_time(term)
+                    else Enclosure(point(constants[term.name.text]), _NONE)
+                )  # fmt: skip
+            else:
+                exponent = terms[term.args[1]].constant if term.op == "pow" else None
+                known[number] = _apply(term.op, [known[i] for i in term.args], exponent)
+    return known
+
+
+def _is_time(term: Term) -> bool:
+    return term.name is not None and term.name.text == "t"
+
+
+def _is_known(term: Term, constants: Mapping[str, float]) -> bool:
+    return term.name is not None and term.name.text in constants
+
+
+# --- operations -----------------------------------------------------------------------------------
+
+
+def _apply(op: str, args: list[Enclosure], exponent: float | None) -> Enclosure:
+    values, slopes = [a.value for a in args], [a.slope for a in args]
+    if op == "pow":
+        return _power(args, exponent)
+    if op in _FUNCTIONS:
+        function, derivative = _FUNCTIONS[op]
+        value = function(values[0])
+        return Enclosure(value, derivative(values[0], value) * slopes[0])
+    if op in ("lt", "le", "gt", "ge"):
+        a, b = values if op in ("lt", "le") else values[::-1]
+        return Enclosure(iv.less(a, b, op in ("le", "ge")), EVERYTHING)
+    return _COMBINED[op](values, slopes)
+
+
+def _power(args: list[Enclosure], exponent: float | None) -> Enclosure:
+    """Powers with a whole exponent, and exp(b log a) for all others."""
+    base, other = args
+    if exponent is not None and exponent == int(exponent) and abs(exponent) < 2**31:
+        n = int(exponent)
+        slope = point(float(n)) * iv.whole_power(base.value, n - 1) if n else _NONE
+        return Enclosure(iv.whole_power(base.value, n), slope * base.slope)
+    logarithm = iv.log(base.value)
+    value = iv.rising(np.exp, other.value * logarithm)
+    rate = other.slope * logarithm + other.value * base.slope / base.value
+    return Enclosure(value, value * rate)
+
+
+def _multiplied(v: list[Interval], d: list[Interval]) -> Enclosure:
+    return Enclosure(v[0] * v[1], d[0] * v[1] + v[0] * d[1])
+
+
+def _divided(v: list[Interval], d: list[Interval]) -> Enclosure:
+    value = v[0] / v[1]
+    return Enclosure(value, (d[0] - value * d[1]) / v[1])
+
+
+def _sign(v: list[Interval], d: list[Interval]) -> Enclosure:
+    lo, hi = np.sign(v[0].lo), np.sign(v[0].hi)
+    flat = Interval(np.where(lo == hi, 0.0, -np.inf), np.where(lo == hi, 0.0, np.inf))
+    return Enclosure(Interval(lo, hi), flat)
+
+
+def _abs(v: list[Interval], d: list[Interval]) -> Enclosure:
+    side = Interval(np.where(v[0].lo > 0, 1.0, -1.0), np.where(v[0].hi < 0, -1.0, 1.0))
+    return Enclosure(iv.absolute(v[0]), side * d[0])
+
+
+def _extreme(v: list[Interval], d: list[Interval], largest: bool) -> Enclosure:
+    pick = np.maximum if largest else np.minimum
+    value = Interval(pick(v[0].lo, v[1].lo), pick(v[0].hi, v[1].hi))
+    first = iv.less(v[1], v[0], False) if largest else iv.less(v[0], v[1], False)
+    return Enclosure(value, first.where(d[0], d[1]))
+
+
+def _atan2(v: list[Interval], d: list[Interval]) -> Enclosure:
+    """Between the angles of the corners where the cell misses the branch cut and the origin."""
+    y, x = v
+    corners = [np.arctan2(b, a) for a in (x.lo, x.hi) for b in (y.lo, y.hi)]
+    cut = y.meets_zero & (x.lo <= 0)
+    lo, hi = np.minimum.reduce(corners), np.maximum.reduce(corners)
+    value = Interval(np.where(cut, -np.pi, lo - 1e-15), np.where(cut, np.pi, hi + 1e-15))
+    size = iv.whole_power(x, 2) + iv.whole_power(y, 2)
+    slope = (x * d[0] - y * d[1]) / size
+    return Enclosure(value, Interval(np.where(cut, -np.inf, slope.lo),
+                                     np.where(cut, np.inf, slope.hi)))  # fmt: skip
+
+
+def _where(v: list[Interval], d: list[Interval]) -> Enclosure:
+    """Where the condition is open the value may jump, and the slope be anything."""
+    open_ = v[0].meets_zero & (v[0].hi > 0)
+    slope = v[0].where(d[1], d[2])
+    jump = Interval(np.where(open_, -np.inf, slope.lo), np.where(open_, np.inf, slope.hi))
+    return Enclosure(v[0].where(v[1], v[2]), jump)
+
+
+_Slope = Callable[[Interval, Interval], Interval]
+
+#: Function of one argument -> its bounds, and those of its derivative from argument and value.
+_FUNCTIONS: dict[str, tuple[Callable[[Interval], Interval], _Slope]] = {
+    "sin": (iv.sin, lambda x, _: iv.cos(x)),
+    "cos": (iv.cos, lambda x, _: -iv.sin(x)),
+    "tan": (lambda x: iv.sin(x) / iv.cos(x), lambda x, _: _ONE / iv.whole_power(iv.cos(x), 2)),
+    "asin": (lambda x: iv.rising(np.arcsin, x.within(-1, 1)),
+             lambda x, _: _ONE / iv.sqrt(_ONE - iv.whole_power(x, 2))),
+    "acos": (lambda x: iv.falling(np.arccos, x.within(-1, 1)),
+             lambda x, _: -_ONE / iv.sqrt(_ONE - iv.whole_power(x, 2))),
+    "atan": (lambda x: iv.rising(np.arctan, x), lambda x, _: _ONE / (_ONE + iv.whole_power(x, 2))),
+    "sinh": (lambda x: iv.rising(np.sinh, x),
+             lambda x, _: iv.rising(np.cosh, iv.absolute(x)).within(1, np.inf)),
+    "cosh": (lambda x: iv.rising(np.cosh, iv.absolute(x)), lambda x, _: iv.rising(np.sinh, x)),
+    "tanh": (lambda x: iv.rising(np.tanh, x),
+             lambda _, v: (_ONE - iv.whole_power(v, 2)).within(0, 1)),
+    "exp": (lambda x: iv.rising(np.exp, x), lambda _, v: v),
+    "log": (iv.log, lambda x, _: _ONE / x.within(0, np.inf)),
+    "sqrt": (iv.sqrt, lambda _, v: point(0.5) / v),
+}  # fmt: skip
+
+_Combined = Callable[[list[Interval], list[Interval]], Enclosure]
+
+_COMBINED: dict[str, _Combined] = {
+    "neg": lambda v, d: Enclosure(-v[0], -d[0]),
+    "add": lambda v, d: Enclosure(v[0] + v[1], d[0] + d[1]),
+    "sub": lambda v, d: Enclosure(v[0] - v[1], d[0] - d[1]),
+    "mul": _multiplied,
+    "div": _divided,
+    "sign": _sign,
+    "abs": _abs,
+    "min": lambda v, d: _extreme(v, d, False),
+    "max": lambda v, d: _extreme(v, d, True),
+    "atan2": _atan2,
+    "where": _where,
+}

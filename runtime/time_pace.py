@@ -1,0 +1,123 @@
+"""How long a step may be so that it cannot pass over a narrow part of an expression of time.
+
+Cells of time are halved until every function in the expression changes over each of them by no
+more than a part of all its change over the run.  A pulse is then covered by cells as short as it
+is, and the time far from it by long ones; a step may be as long as a few of the cells it is in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .enclosures import Enclosure
+from .intervals import Interval
+
+Array = NDArray[np.float64]
+
+#: A function changes over a cell by no more than this part of its change over the run.
+PART = 0.25
+
+#: Cells, and radians of an even oscillation, that a step may span: a pulse is then wider than the
+#: widest gap between the stages of any method.
+CELLS, TURN = 8.0, 6.0
+
+#: An oscillation is even where its slowest turning is this part of its fastest.
+_EVEN = 0.5
+
+#: The smallest cell, the smallest around a pole, and the shortest bound, as part of the span.
+_SMALLEST, _POLE, _SHORTEST = 2.0**-40, 2.0**-6, 2.0**-37
+
+#: A change so small, or so small against the value, is rounding; a cell so long bounds nothing.
+_TINY, _FLAT, _LONG = 1e-290, 1e-9, 1 / 32
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A function in an expression, by the number of its term: its value, or the `slope` of that;
+    `argument` is what turns, for a sine or cosine."""
+
+    term: int
+    argument: int | None = None
+    slope: bool = False
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Longest steps (n,) in s from the times `starts` (n,) on; `complete` is False where there were
+    too many cells, which are then all as short as the last ones."""
+
+    starts: Array
+    longest: Array
+    complete: bool = True
+
+
+Terms = Callable[[Interval], dict[int, Enclosure]]
+
+
+def pace(
+    terms: Terms, watched: Sequence[Watched], start: float, end: float, most: int = 2**16
+) -> Pace:
+    """Bounds of the steps from start to end (s) that the watched functions ask for, from `most`
+    cells at most."""
+    a, b = np.array([start]), np.array([end])
+    lo, hi, even = _looked_at(terms, watched, a, b)
+    complete = True
+    while True:
+        coarse = _coarse(lo, hi, even, (b - a) / (end - start))
+        if not coarse.any():
+            break
+        if len(a) + coarse.sum() > most:
+            complete = False
+            break
+        middle = a[coarse] + (b[coarse] - a[coarse]) / 2
+        halves = np.concatenate([a[coarse], middle]), np.concatenate([middle, b[coarse]])
+        new = _looked_at(terms, watched, *halves)
+        a, b = np.concatenate([a[~coarse], halves[0]]), np.concatenate([b[~coarse], halves[1]])
+        lo, hi, even = (np.concatenate([old[:, ~coarse], part], axis=1)
+                        for old, part in zip((lo, hi, even), new, strict=True))  # fmt: skip
+    order = np.argsort(a)
+    longest = np.where(b - a <= _LONG * (end - start), CELLS * (b - a), np.inf)
+    longest = np.minimum(longest, even.min(axis=0, initial=np.inf))
+    longest = np.maximum(longest, _SHORTEST * (end - start))
+    return _joined(a[order], longest[order], complete)
+
+
+def _looked_at(
+    terms: Terms, watched: Sequence[Watched], a: Array, b: Array
+) -> tuple[Array, Array, Array]:
+    """(bounds below, above, longest step of an even oscillation), each (watched, cells)."""
+    known = terms(Interval(a, b))
+    lo, hi = np.empty((len(watched), len(a))), np.empty((len(watched), len(a)))
+    even = np.full((len(watched), len(a)), np.inf)
+    for row, one in enumerate(watched):
+        bounds = known[one.term].slope if one.slope else known[one.term].value
+        lo[row], hi[row] = bounds.lo, bounds.hi
+        if one.argument is not None:
+            slope = known[one.argument].slope
+            fastest = np.maximum(np.abs(slope.lo), np.abs(slope.hi))
+            is_even = np.minimum(np.abs(slope.lo), np.abs(slope.hi)) >= _EVEN * fastest
+            even[row] = np.where(is_even & slope.is_one_sided, TURN / fastest, np.inf)
+    return lo, hi, even
+
+
+def _coarse(lo: Array, hi: Array, even: Array, size: Array) -> NDArray[np.bool_]:
+    """(cells,) whether a cell is to be halved; `size` is its part of the span."""
+    finite = np.isfinite(lo) & np.isfinite(hi)
+    least = np.min(lo, axis=1, where=finite, initial=np.inf)[:, None]
+    most = np.max(hi, axis=1, where=finite, initial=-np.inf)[:, None]
+    change = most - least
+    flat = change <= np.maximum(_TINY, _FLAT * np.maximum(np.abs(most), np.abs(least)))
+    varies = finite & (hi - lo > PART * change) & ~flat & np.isinf(even) & (size > _SMALLEST)
+    beyond = ~finite & ~np.isnan(lo) & (size > _POLE)
+    return np.asarray((varies | beyond).any(axis=0))
+
+
+def _joined(starts: Array, longest: Array, complete: bool) -> Pace:
+    """Neighbours with bounds of the same octave share the smaller one."""
+    octave = np.floor(np.log2(longest, out=np.full(len(longest), np.inf), where=longest < np.inf))
+    first = np.append(True, octave[1:] != octave[:-1])
+    return Pace(starts[first], np.minimum.reduceat(longest, np.flatnonzero(first)), complete)
