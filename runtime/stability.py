@@ -97,10 +97,11 @@ def check_step(
         return None
     layout = engine.packed.layout
     hinge = max(layout.owners, key=lambda s: float(shares[s.u_slice].sum()))
+    with np.errstate(over="ignore", invalid="ignore"):  # a step may be too long beyond numbers
+        factor = float(abs(tableau.amplification(settings.step * value)))
     return StepCheck(
-        settings.step, rate, settings.step * rate,
-        float(abs(tableau.amplification(settings.step * value))), hinge.name,
-        _longest(tableau, value), "flexible body" if hinge.name in layout.modal else "hinge",
+        settings.step, rate, settings.step * rate, factor, hinge.name, _longest(tableau, value),
+        "flexible body" if hinge.name in layout.modal else "hinge",
     )  # fmt: skip
 
 
