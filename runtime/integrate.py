@@ -317,6 +317,12 @@ class Run:
             stability_limited_steps=int(c.stability_limited_steps),
         )
 
+    def fits(self, samples: Samples) -> bool:
+        """True if the rows of `samples` have the sizes of this run's."""
+        return samples.y.shape[1:] == (self._system.n_state,) and samples.memory.shape[1:] == (
+            self._system.n_memory,
+        )
+
     def message(
         self,
         components: Sequence[str] | None = None,

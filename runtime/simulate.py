@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,7 +26,10 @@ from .steppers import get
 
 Array = NDArray[np.float64]
 
-#: Seconds between looks at progress, Ctrl-C and checkpoints.
+#: Signals that ask a run to end with what it has.
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+
+#: Seconds between looks at progress, interrupts and checkpoints.
 SLICE = 0.1
 
 #: Bytes of samples at which a run stops and asks for output times.
@@ -242,7 +245,10 @@ def _energy(system: SceneSystem, t: float, y: Array) -> float:
 
 @contextmanager
 def interruptible() -> Iterator[list[bool]]:
-    """Ctrl-C sets the flag instead of raising, so that no sample is lost."""
+    """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
+
+    A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
+    """
     flag = [False]
     if threading.current_thread() is not threading.main_thread():
         yield flag
@@ -251,17 +257,19 @@ def interruptible() -> Iterator[list[bool]]:
     def note(*_: object) -> None:
         flag[0] = True
 
-    previous = signal.signal(signal.SIGINT, note)
-    try:
+    with ExitStack() as restored:
+        for which in INTERRUPTS:
+            previous = signal.getsignal(which)
+            if previous is not None and previous is not signal.SIG_IGN:
+                restored.callback(signal.signal, which, previous)
+                signal.signal(which, note)
         yield flag
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def advance(
     run: Run, observe: Callable[[Run], None] | None = None, steps: int = 0
 ) -> Status | None:
-    """Run to the end; None if Ctrl-C came first or the samples fill the memory they may take.
+    """Run to the end; None if an interrupt came first or the samples fill the memory they may take.
 
     `observe` is called between slices.  RUNNING when so many steps have been made in all.
     """
@@ -281,16 +289,21 @@ def trajectory(
     run: Run,
     settings: Settings,
     status: Status | None,
+    message: str,
     earlier: Samples | None = None,
 ) -> Trajectory:
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    message = _interrupted(run) if status is None else message_of(system, run)
     return split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
+
+
+def said(system: SceneSystem, run: Run, status: Status | None) -> str:
+    """How a run came back, as a sentence; None for interrupted."""
+    return _interrupted(run) if status is None else message_of(system, run)
 
 
 def _interrupted(run: Run) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -125,43 +123,3 @@ def test_ascii_terminal(folder: Path) -> None:
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0", "LC_ALL": "C"}
     done = program(folder, "show", "pin", env=environment)
     assert done.returncode == 0 and done.stderr == ""
-
-
-def interrupted(folder: Path, which: signal.Signals, *more: str) -> str:
-    """What a run says on stderr that is interrupted after a while; its result is a.csv.
-
-    A slow machine gets more time until the run has begun.
-    """
-    options = ["--t-end", "1e7", "--times", "1e3", "-o", "a.csv", *more]
-    err = ""
-    for seconds in (3.0, 6.0, 12.0, 24.0):
-        run = subprocess.Popen(
-            [*PROGRAM, "simulate", "pendulum.toml", *options],
-            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        try:
-            time.sleep(seconds)
-            run.send_signal(which)
-            out, err = run.communicate(timeout=60)
-        finally:
-            run.kill()
-        assert run.returncode in (130, -which), err
-        assert "Traceback" not in err + out
-        if run.returncode == 130 and (folder / "a.csv").exists():
-            break
-    return err
-
-
-def test_interrupted_run_keeps_its_result_and_goes_on(folder: Path) -> None:
-    assert "--resume" in interrupted(folder, signal.SIGINT)
-    first = (folder / "a.csv").read_text().splitlines()
-    interrupted(folder, signal.SIGTERM, "--resume")
-    second = (folder / "a.csv").read_text().splitlines()
-    assert 2 < len(first) < len(second)
-    assert second[: len(first)] == first
-
-
-def test_checkpoint_of_another_run_is_refused(folder: Path) -> None:
-    interrupted(folder, signal.SIGINT)
-    done = program(folder, "simulate", "pendulum.toml", "-o", "a.csv", "--resume")
-    assert done.returncode == 2 and "checkpoint" in done.stderr
