@@ -46,9 +46,9 @@ def mstmm(
 ) -> None:
     """Multibody dynamics by transfer matrices: from a hinge's symbols to a simulation."""
     if context.invoked_subcommand is None:
-        from .output import say
+        from .output import put
 
-        say(context.get_help())
+        put(context.get_help())
 
 
 app.command("demo")(demo)

@@ -209,7 +209,7 @@ def list_elements(
         if section.rows:
             console.print(output.table(section.title, section.columns, section.rows))
         else:
-            console.print(f"{section.title}: none")
+            console.print(f"{output.printable(section.title)}: none")
         console.print()
     if not parts:
         console.print("The equations of each: mstmm show NAME, such as mstmm show pin")

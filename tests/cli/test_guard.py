@@ -123,3 +123,19 @@ def test_ascii_terminal(folder: Path) -> None:
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0", "LC_ALL": "C"}
     done = program(folder, "show", "pin", env=environment)
     assert done.returncode == 0 and done.stderr == ""
+
+
+def test_nothing_in_a_name_reaches_the_terminal_raw(mstmm: Command, folder: Path) -> None:
+    name = "\x1b]0;own\x07\x1b[31mred\x9b.toml"
+    (folder / name).write_bytes((folder / "pendulum.toml").read_bytes())
+    (folder / "store").mkdir()
+    for command in (
+        ("simulate", name, "--t-end", "0.1", "-o", "\x1b[2J.csv", "--plot", "\x1b[2J.svg"),
+        ("check", name), ("check", "\x1bnone.toml"), ("simulate", "\x1bnone.toml"),
+        ("simulate", "--\x1boption"), ("show", "\x1bpin"), ("list", "\x1bpart"),
+        ("show", "pin", "--output", "\x1bpage.txt"), ("generate", "\x1bhinge.py"),
+    ):  # fmt: skip
+        done = mstmm(*command)
+        for text in (done.out, done.err):
+            assert all(c.isprintable() or c == "\n" for c in text), command
+    assert mstmm("simulate", name, "--t-end", "0.1").code == 0

@@ -80,6 +80,8 @@ class Laboratory:
             "every": every, "points": points, "arguments": ["simulate", *RUN, *more],
             "ignored": ignored, "after": after, "pace": pace,
         }  # fmt: skip
+        for name in ("out", "err"):
+            (self.root / name).write_text("")
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps(kill) + "\n")
         self.process.stdin.flush()

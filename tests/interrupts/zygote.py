@@ -26,6 +26,8 @@ from mstmm.runtime import execution, simulate
 #: Events of Python's audit that are steps of files, each told before it happens.
 STEPS = {"open", "os.rename", "os.remove", "os.truncate", "os.chmod", "fcntl.flock"}
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
 #: Where lines are counted.
 ROOMS = ("cli/simulate.py", "checkpoint.py", "execution.py", "files.py", "lock.py", "storage.py")
 
@@ -78,10 +80,11 @@ def child(kill: dict[str, Any], count: mmap.mmap) -> None:
     for number, name in ((1, "out"), (2, "err")):
         handle = os.open(Path(kill["streams"]) / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         os.dup2(handle, number)
-    for each in (signal.SIGINT, signal.SIGTERM):
+    for each in SIGNALS:
         signal.signal(each, signal.SIG_IGN if each in kill["ignored"] else signal.SIG_DFL)
     execution.CHECKPOINT_EVERY = simulate.SLICE = kill["pace"]
     interrupts.end_at_once()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)  # what comes too early waits until here
     countdown = Countdown(kill["signal"], kill["at"], kill["every"], count)
     getattr(countdown, f"on_{kill['points']}")()
     guard.leave(kill["arguments"])
@@ -93,6 +96,7 @@ def main() -> None:
     for line in sys.stdin:
         kill = json.loads(line)
         count[:8] = struct.pack("q", 0)
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         process = os.fork()
         if process == 0:
             try:

@@ -152,6 +152,45 @@ def test_a_file_that_is_no_checkpoint(tmp_path: Path, content: bytes) -> None:
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
 
 
+EDITS: dict[str, Callable[[Any], Any]] = {
+    "t": lambda t: t[::-1],
+    "y": lambda y: y[:, :1],
+    "memory": lambda memory: np.zeros((len(memory), 7)),
+    "event": lambda event: event[1:],
+    "real": lambda real: real[:-1],
+    "integer": lambda integer: np.where(np.arange(len(integer)) == 8, 999, integer),
+    "engine": lambda engine: np.zeros(3),
+    "message": lambda message: np.array(7),
+}
+
+
+@pytest.mark.parametrize("name", [*EDITS, "missing"])
+def test_a_checkpoint_that_was_edited(tmp_path: Path, name: str) -> None:
+    model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
+    model.simulate(1.0, checkpoint=path)
+    with np.load(path) as file:
+        data = {key: file[key] for key in file.files}
+    if name == "missing":
+        del data["integer"]
+    else:
+        data[name] = EDITS[name](data[name])
+    np.savez(path, **data)
+    with pytest.raises(mstmm.SceneError, match=r"damaged|another scene, method or version"):
+        model.simulate(1.0, checkpoint=path, resume=True)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.97])
+def test_a_checkpoint_that_was_cut_or_overwritten(tmp_path: Path, share: float) -> None:
+    model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
+    model.simulate(1.0, checkpoint=path)
+    whole = path.read_bytes()
+    place = int(share * len(whole))
+    for content in (whole[:place], whole[:place] + b"\0" * 40 + whole[place + 40 :]):
+        path.write_bytes(content)
+        with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
+            model.simulate(1.0, checkpoint=path, resume=True)
+
+
 def test_a_folder_that_is_not_there_is_noticed_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(mstmm.EnvironmentFailure, match="its folder cannot be written"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=tmp_path / "no" / "run.npz")
