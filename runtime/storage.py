@@ -7,8 +7,7 @@ import gc
 import shutil
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,14 +91,7 @@ def load(path: Path) -> Result:
         raise extra("io", "a NetCDF file", error) from None
     if not path.is_file():
         raise SceneError(f'result file "{path}": there is no such file')
-    try:
-        with (
-            _without_noise(),
-            xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file,
-        ):
-            data = file.load()
-    except Exception as error:  # whatever the libraries make of a file that is cut or overwritten
-        raise SceneError(f'result file "{path}": not a NetCDF file ({error})') from None
+    data = _read(xarray, path)
     if data.attrs.get("format") != "mstmm result" or "scene" not in data:
         raise SceneError(f'result file "{path}": not a result of mstmm')
     try:
@@ -121,18 +113,23 @@ def load(path: Path) -> Result:
 _NOT_OURS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
 
 
-@contextmanager
-def _without_noise() -> Iterator[None]:
-    """Objects of h5py that are given up half made complain, past every caller, as they go."""
+def _read(xarray: Any, path: Path) -> Any:
+    """All of a file.  SceneError for whatever the libraries make of one that is cut or overwritten.
+
+    Objects of theirs that are given up half made complain, past every caller, as they go: they go
+    here, unheard.
+    """
     previous, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
-        yield
-    except Exception as error:
-        error.__traceback__ = error.__context__ = error.__cause__ = None  # they hold those objects
-        gc.collect()
-        raise
+        try:
+            with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+                return file.load()
+        except Exception as error:
+            reason = str(error)
+        gc.collect()  # the exception, which held them, is gone
     finally:
         sys.unraisablehook = previous
+    raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
 
 
 def _fits(model: Model, run: Trajectory) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -102,12 +103,19 @@ def test_leftovers_go_with_their_writer_and_not_before(tmp_path: Path) -> None:
 def test_a_file_is_on_the_disk_before_it_takes_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import os
-
     steps = list[str]()
     fsync, replace = os.fsync, Path.replace
-    monkeypatch.setattr(os, "fsync", lambda handle: (steps.append("sync"), fsync(handle))[1])
-    monkeypatch.setattr(Path, "replace", lambda *x: (steps.append("name"), replace(*x))[1])
+
+    def noted_fsync(handle: int) -> None:
+        steps.append("sync")
+        fsync(handle)
+
+    def noted_replace(path: Path, target: Path) -> Path:
+        steps.append("name")
+        return replace(path, target)
+
+    monkeypatch.setattr(os, "fsync", noted_fsync)
+    monkeypatch.setattr(Path, "replace", noted_replace)
     with replacing(tmp_path / "a.csv") as file:
         file.write_text("whole")
     assert steps == ["sync", "name", "sync"]

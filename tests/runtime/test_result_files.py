@@ -174,7 +174,7 @@ def _as_text(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
     return lambda data: data.assign({name: (data[name].dims, data[name].values.astype(str))})
 
 
-CHANGES = {
+CHANGES: dict[str, Callable[[xarray.Dataset], xarray.Dataset]] = {
     **{f"no {name}": _dropped(name) for name in ("q", "u", "memory", "work", "event", "last_q")},
     **{f"text in {name}": _as_text(name) for name in ("q", "memory", "event", "error_q_0")},
     **{
