@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -31,6 +32,9 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 #: Seconds between looks at progress, interrupts and checkpoints.
 SLICE = 0.1
+
+#: Seconds in which an interrupted run has to come to an end.
+PATIENCE = 5.0
 
 #: Bytes of samples at which a run stops and asks for output times.
 LARGEST = 2**30
@@ -248,14 +252,18 @@ def interruptible() -> Iterator[list[bool]]:
     """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
 
     A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
+    Where nobody has looked at the flag for PATIENCE, the next signal is a KeyboardInterrupt.
     """
-    flag = [False]
+    flag, since = [False], [0.0]
     if threading.current_thread() is not threading.main_thread():
         yield flag
         return
 
     def note(*_: object) -> None:
-        flag[0] = True
+        if not flag[0]:
+            flag[0], since[0] = True, time.monotonic()
+        elif time.monotonic() - since[0] > PATIENCE:
+            raise KeyboardInterrupt
 
     with ExitStack() as restored:
         for which in INTERRUPTS:

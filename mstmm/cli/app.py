@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+
+from mstmm.errors import Interrupted
 
 from .cache import cache
 from .check import check
@@ -15,8 +18,20 @@ from .listing import list_elements
 from .show import show
 from .simulate import simulate
 
+
+class Commands(TyperGroup):
+    """The commands; an interrupt of one says so, where typer would leave without a word."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise Interrupted("interrupted") from None
+
+
 app = typer.Typer(
     name="mstmm",
+    cls=Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",

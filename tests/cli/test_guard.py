@@ -139,3 +139,16 @@ def test_nothing_in_a_name_reaches_the_terminal_raw(mstmm: Command, folder: Path
         for text in (done.out, done.err):
             assert all(c.isprintable() or c == "\n" for c in text), command
     assert mstmm("simulate", name, "--t-end", "0.1").code == 0
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_an_interrupted_command_says_so(
+    mstmm: Command, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mstmm.load_scene", interrupt, raising=False)
+    done = mstmm("simulate", "pendulum.toml", *options)
+    assert (done.code, done.err) == (130, "mstmm: interrupted\n")
+    assert not options or json.loads(done.out)["error"]["exit_code"] == 130

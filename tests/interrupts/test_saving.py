@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from cli.commands import Command
 
 from mstmm import errors
-from mstmm.runtime import execution, storage
+from mstmm.runtime import execution, simulate, storage
 from mstmm.runtime.files import replacing
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
@@ -127,3 +128,17 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
         replacing(tmp_path / "none" / "a.csv") as file,
     ):
         file.write_text("")
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
+    heard: None, monkeypatch: pytest.MonkeyPatch, which: signal.Signals
+) -> None:
+    with simulate.interruptible() as flag:
+        for _ in range(3):
+            signal.raise_signal(which)
+        assert flag == [True]
+        monkeypatch.setattr(simulate, "PATIENCE", -1.0)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(which)
+    assert signal.getsignal(which) is signal.default_int_handler
