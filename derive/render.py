@@ -6,8 +6,9 @@ specs alone: no time, path, version or order of a set.
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -56,8 +57,14 @@ def engine_sources(specs: Sequence[ElementSpec] = ()) -> dict[str, str]:
     }
 
 
-def manifest(specs: Sequence[ElementSpec]) -> str:
-    """`manifest.json`: ABI number, and names and hashes of elements and kernels."""
+def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
+    """`manifest.json`: ABI number, SHA-256 of all C text, names and hashes of elements and kernels.
+
+    A module that was compiled from other text is told by it (`runtime/prebuilt.py`).
+    """
+    text = hashlib.sha256()
+    for name in sorted(name for name in files if name.endswith((".c", ".h"))):
+        text.update(f"{name}\n{files[name]}".encode())
     elements = [
         {
             "kind": spec.kind,
@@ -67,7 +74,8 @@ def manifest(specs: Sequence[ElementSpec]) -> str:
         }
         for spec in specs
     ]
-    return json.dumps({"abi": abi.ABI, "elements": elements}, indent=1) + "\n"
+    found = {"abi": abi.ABI, "sources": text.hexdigest(), "elements": elements}
+    return json.dumps(found, indent=1) + "\n"
 
 
 def generated_files(specs: Iterable[ElementSpec], *, engine: bool = True) -> dict[str, str]:
@@ -85,8 +93,9 @@ def generated_files(specs: Iterable[ElementSpec], *, engine: bool = True) -> dic
         files[f"{stem}.c"] = element_source(spec)
         files[f"{stem}.json"] = element_to_json(spec)
     files["registry.c"] = registry_source(ordered)
-    files["manifest.json"] = manifest(ordered)
-    return files | (engine_sources(ordered) if engine else {})
+    files |= engine_sources(ordered) if engine else {}
+    files["manifest.json"] = manifest(ordered, files)
+    return files
 
 
 def write_generated(

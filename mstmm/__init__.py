@@ -10,6 +10,11 @@ Names are loaded when they are first used: importing mstmm loads neither numpy n
 
 from __future__ import annotations
 
+from . import interrupts
+
+if interrupts.is_the_program():  # first of all, for what follows takes a while
+    interrupts.end_at_once()
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

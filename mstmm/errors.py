@@ -46,3 +46,9 @@ class UndeterminedMotion(NumericalFailure):
     def __init__(self, message: str = "", place: int = -1) -> None:
         super().__init__(message)
         self.place = place
+
+
+class Interrupted(MstmmError):
+    """An interrupt (Ctrl-C, SIGTERM) after which there is more to say than that it came."""
+
+    exit_code = 130

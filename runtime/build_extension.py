@@ -10,6 +10,7 @@ What Python may call is written once, in the generated headers, between the mark
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -23,6 +24,9 @@ MODULE = "mstmm.generated._kernels"
 # of the IR) hold.  -fno-math-errno: sqrt is one instruction; no value changes.
 COMPILE_ARGS = ("-std=c17", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden")
 WARNING_ARGS = ("-Wall", "-Wextra", "-Wno-unused-parameter")
+
+#: The string in the module that tells the C text it was compiled from.
+BUILT_FROM = "mstmm_built_from"
 
 _BLOCK = re.compile(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", re.DOTALL)
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
@@ -55,6 +59,12 @@ def cdef(header: Path) -> str:
     return "\n".join(block.strip() for block in blocks)
 
 
+def built_from(folder: Path) -> str:
+    """SHA-256 of `folder`'s manifest, which names every text in it by its own; "" without one."""
+    manifest = folder / "manifest.json"
+    return hashlib.sha256(manifest.read_bytes()).hexdigest() if manifest.is_file() else ""
+
+
 def ffibuilder() -> FFI:
     """The extension module of the prebuilt kernels; called by setup.py, in the project's root."""
     sources = sorted(GENERATED.glob("*.c"))
@@ -63,9 +73,11 @@ def ffibuilder() -> FFI:
     found = headers(GENERATED)
     builder = FFI()
     builder.cdef("\n".join(cdef(header) for header in found))
+    builder.cdef(f"static char *const {BUILT_FROM};")
+    identity = f'static char *const {BUILT_FROM} = "{built_from(GENERATED)}";'
     builder.set_source(
         MODULE,
-        "\n".join(f'#include "{header.name}"' for header in found),
+        "\n".join([*(f'#include "{header.name}"' for header in found), identity]),
         sources=[source.as_posix() for source in sources],
         depends=[header.as_posix() for header in found],
         include_dirs=[GENERATED.as_posix()],

@@ -1,7 +1,8 @@
 """Where compiled libraries are kept, and why nobody else can put one there.
 
-What lies in this folder is loaded into the process.  So the folder belongs to the user who runs it
-and nobody else may write to it; anything else is refused, with the way out.
+What lies in this folder, or in the store of users' elements, is loaded into the process.  So the
+folder belongs to the user who runs it and nobody else may write to it; anything else is refused,
+with the way out.
 """
 
 from __future__ import annotations
@@ -57,18 +58,21 @@ def _status(place: Path) -> os.stat_result:
         return os.stat(place)
 
 
-def objection(place: Path, status: os.stat_result) -> str:
-    """Why a folder is no place for libraries; "" if it is one."""
+def objection(
+    place: Path, status: os.stat_result, what: str = "cache", way_out: str = _WAY_OUT,
+    owners: tuple[int, ...] = (),
+) -> str:  # fmt: skip
+    """Why a folder is no place for libraries; "" if it is one.  `owners` are trusted like us."""
     if not stat.S_ISDIR(status.st_mode):
-        return f"the cache {place} is not a folder; {_WAY_OUT}"
-    if status.st_uid != os.geteuid():
+        return f"the {what} {place} is not a folder; {way_out}"
+    if status.st_uid not in (os.geteuid(), *owners):
         return (
-            f"the cache folder {place} belongs to user {status.st_uid}, you are user "
-            f"{os.geteuid()}: what it holds could be anybody's; {_WAY_OUT}"
+            f"the {what} folder {place} belongs to user {status.st_uid}, you are user "
+            f"{os.geteuid()}: what it holds could be anybody's; {way_out}"
         )
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return (
-            f"others may write to the cache folder {place} (mode "
-            f"{stat.S_IMODE(status.st_mode):04o}); chmod 700 it after a look, or {_WAY_OUT}"
+            f"others may write to the {what} folder {place} (mode "
+            f"{stat.S_IMODE(status.st_mode):04o}); chmod 700 it after a look, or {way_out}"
         )
     return ""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -28,8 +30,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 State = Mapping[str, Any]
 
-_FORMAT = "mstmm checkpoint 2"
+_FORMAT = "mstmm checkpoint 3"
 _ROWS = ("t", "y", "memory", "event")
+
+#: Name, kind of numbers and axes of what a file holds.
+_STATE = (("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0))
+_SAMPLES = (("t", "f", 1), ("y", "f", 2), ("memory", "f", 2), ("event", "i", 1))
+
+#: What numpy raises for files that are cut, overwritten or no archives.
+UNREADABLE = (
+    OSError, ValueError, KeyError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
+    SyntaxError, RuntimeError, MemoryError, struct.error, OverflowError,
+)  # fmt: skip
 
 
 class Checkpoint:
@@ -62,12 +74,15 @@ class Checkpoint:
             np.savez(file, **arrays)
 
     def load(self) -> tuple[State, Samples]:
-        """State and samples.  SceneError if the file is no checkpoint, or one of another run."""
+        """State and samples.
+
+        SceneError if the file is no checkpoint, is damaged, or belongs to another run.
+        """
         refuse_special(self.path, "checkpoint")
         try:
             with self.path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 data = {name: file[name] for name in file.files}
-        except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        except UNREADABLE as error:
             raise SceneError(f'checkpoint "{self.path}" cannot be read: {error}') from None
         if str(data.get("format")) != _FORMAT:
             raise SceneError(f'checkpoint "{self.path}" is not one of this version of mstmm')
@@ -81,11 +96,30 @@ class Checkpoint:
                     f'checkpoint "{self.path}" belongs to another run: {word} changed since; '
                     "run without resume to start again"
                 )
-        samples = Samples(*(data[name] for name in _ROWS))
-        return {name: data[name] for name in ("real", "integer", "engine")}, samples
+        state = {name: self._taken(data, name, kind, ndim) for name, kind, ndim in _STATE}
+        rows = [self._taken(data, name, kind, ndim) for name, kind, ndim in _SAMPLES]
+        times = rows[0]
+        if len({len(row) for row in rows}) > 1 or not np.all(times[1:] >= times[:-1]):
+            raise self.damaged("samples that do not belong together")
+        return state, Samples(*rows)
+
+    def _taken(self, data: State, name: str, kind: str, ndim: int) -> Any:
+        """One array as it was written; SceneError if it is missing or of another kind."""
+        found = data.get(name)
+        if found is None or found.dtype.kind != kind or found.ndim != ndim:
+            what = "nothing" if found is None else f"{found.dtype} of shape {found.shape}"
+            raise self.damaged(f"{what} as {name}")
+        return found
+
+    def damaged(self, found: str) -> SceneError:
+        """The error for a file whose numbers nobody wrote this way."""
+        return SceneError(
+            f'checkpoint "{self.path}" is damaged: it holds {found}; '
+            "run without resume to start again"
+        )
 
     def remove(self) -> None:
-        """The run has ended by itself: nothing to continue."""
+        """The result is where it belongs: nothing to continue."""
         with suppress(OSError):  # a file that stays is refused or continued, never wrong
             self.path.unlink(missing_ok=True)
 

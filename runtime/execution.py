@@ -17,7 +17,15 @@ from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .integrate import Run, Samples, Status
 from .settings import Settings
-from .simulate import SceneSystem, Trajectory, advance, make_run, trajectory
+from .simulate import (
+    SceneSystem,
+    Trajectory,
+    advance,
+    interruptible,
+    make_run,
+    said,
+    trajectory,
+)
 from .stability import StepCheck, check_step
 from .steppers import get
 
@@ -61,14 +69,17 @@ class Watch:
         if time.monotonic() - self._saved > CHECKPOINT_EVERY:
             self.save(run, earlier)
 
-    def save(self, run: Run, earlier: Samples | None) -> None:
-        """A checkpoint now.  If it cannot be written the run goes on and a note says so."""
+    def save(self, run: Run, earlier: Samples | None, message: str = "") -> None:
+        """A checkpoint now, with how the run has ended if it has.
+
+        If it cannot be written the run goes on and a note says so.
+        """
         if self.checkpoint is not None and self.run == 0:
             try:
-                state = {**run.state(), "engine": np.array(self.engine)}
-                self.checkpoint.save(state, _joined(earlier, run.samples))
-            except MstmmError as error:
-                note = f"no checkpoint: {error}"
+                words = {"engine": np.array(self.engine), "message": np.array(message)}
+                self.checkpoint.save({**run.state(), **words}, _joined(earlier, run.samples))
+            except (MstmmError, MemoryError) as error:
+                note = f"no checkpoint: {error or 'there is not enough memory'}"
                 if note not in self.notes:
                     self.notes.append(note)
         self._saved = time.monotonic()
@@ -92,32 +103,50 @@ def first_run(
     system = SceneSystem(engine, compiled)
     start = system.start(settings.t_start, q, u)
     step = check_step(engine, get(settings.method), settings, start, system.memory)
-    run = make_run(system, settings, q, u)
-    if state is not None:
-        run.restore(state)
+    run, message = make_run(system, settings, q, u), ""
+    if state is not None and earlier is not None and watch.checkpoint is not None:
+        message = _restored(run, state, earlier, watch.checkpoint)
     look = 0 if compiled else compiled_run.look_after(model, settings)
-    if run.statistics.steps < look:
+    status: Status | None = run.status
+    if status is Status.RUNNING and run.statistics.steps < look:
         watch.engine = compiled_run.LOOPED
-        status = advance(run, lambda now: watch.look(now, earlier), look)
+        status, message = _advanced(system, run, watch, earlier, look)
         if status is Status.RUNNING:
             compiled = compiled_run.worth_compiling(model, settings, run)
         if compiled is not None:
             system, earlier = SceneSystem(engine, compiled), None
             run = make_run(system, settings, q, u)
-    else:
-        status = Status.RUNNING
     watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
     if status is Status.RUNNING:
-        status = advance(run, lambda now: watch.look(now, earlier))
-    if watch.checkpoint is not None:
-        if status is None:
-            watch.save(run, earlier)
-        else:
-            watch.checkpoint.remove()
-    found = trajectory(system, run, settings, status, earlier)
+        status, message = _advanced(system, run, watch, earlier)
+    found = trajectory(system, run, settings, status, message, earlier)
     if step is not None and status is not None and not found.success:
         found = replace(found, message=step.blamed(found.message))
     return found, step
+
+
+def _advanced(
+    system: SceneSystem, run: Run, watch: Watch, earlier: Samples | None, steps: int = 0
+) -> tuple[Status | None, str]:
+    """Advance a run and keep what it became: no interrupt comes between the two."""
+    with interruptible():
+        status = advance(run, lambda now: watch.look(now, earlier), steps)
+        message = said(system, run, status)
+        if status is not Status.RUNNING:
+            watch.save(run, earlier, "" if status is None else message)
+    return status, message
+
+
+def _restored(run: Run, state: State, earlier: Samples, checkpoint: Checkpoint) -> str:
+    """Put a run where its checkpoint was taken; returns how it had ended, "" if it had not."""
+    try:
+        run.restore(state)
+        ended = run.status is not Status.RUNNING
+    except ValueError:  # a status that does not exist
+        raise checkpoint.damaged("a state that no run can have") from None
+    if not run.fits(earlier):
+        raise checkpoint.damaged("samples of another size")
+    return str(state["message"]) if ended else ""
 
 
 def _continued(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | None]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from mstmm.errors import EnvironmentFailure, SceneError
+
+from .lock import held_by_nobody, locked
 
 
 def refuse_special(path: Path, where: str) -> None:
@@ -20,25 +22,62 @@ def refuse_special(path: Path, where: str) -> None:
         raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
 
 
-@contextmanager
+#: What is being written lies beside its place, PART, with a LOCK that ends with the writer.
+_MARK, _LOCK, _PART = ".mstmm-", ".lock", ".part"
+
+#: A sweeper holds a lock for less than this, s.
+_PATIENCE = 5.0
+
+
+@contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its name when the block ends well.
+    """A temporary file beside `path` that takes its name, safely on the disk, when the block ends
+    well.  What killed writers left in that folder is swept first.
 
     Raises EnvironmentFailure, with the old file untouched, if anything cannot be written.
     """
-    temporary: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(path.suffix, f".{path.stem}.", path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
+        sweep(path.parent)
+        with _aside(path.parent) as temporary:
+            yield temporary
+            _settle(temporary)
+            temporary.replace(path)
+            with contextlib.suppress(OSError):  # not every file system lets folders be synced
+                _settle(path.parent)
     except OSError as error:
         reason = error.strerror or str(error)
         raise EnvironmentFailure(f'"{path}" cannot be written: {reason}') from error
+
+
+@contextlib.contextmanager
+def _aside(folder: Path) -> Iterator[Path]:
+    """Name of a file to be written; the lock is made before that file and removed after it."""
+    lock = folder / f"{_MARK}{secrets.token_hex(8)}{_LOCK}"
+    part = lock.with_suffix(_PART)
+    try:
+        with locked(lock, _PATIENCE):
+            try:
+                yield part
+            finally:
+                part.unlink(missing_ok=True)
     finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
+        lock.unlink(missing_ok=True)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed writers left in a folder.  Never raises OSError."""
+    with contextlib.suppress(OSError):
+        for lock in [*folder.glob(f"{_MARK}*{_LOCK}")]:
+            with contextlib.suppress(OSError), held_by_nobody(lock) as abandoned:
+                if abandoned:
+                    lock.with_suffix(_PART).unlink(missing_ok=True)
+                    lock.unlink(missing_ok=True)
+
+
+def _settle(path: Path) -> None:
+    """Wait until a file or a folder is on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -332,6 +332,12 @@ class Run:
         c = self._run.count
         return (int(c.chatter), float(self._run.real.chatter_time)) if c.chatter >= 0 else None
 
+    def fits(self, samples: Samples) -> bool:
+        """True if the rows of `samples` have the sizes of this run's."""
+        return samples.y.shape[1:] == (self._system.n_state,) and samples.memory.shape[1:] == (
+            self._system.n_memory,
+        )
+
     def message(
         self,
         components: Sequence[str] | None = None,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,10 @@ from .engine import Engine
 from .fused import FusedLibrary
 from .integrate import Status
 from .settings import Settings
-from .simulate import SLICE, SceneSystem, interruptible
+from .simulate import SLICE, SceneSystem
 from .steppers import get
 from .tableau_in_c import c_tableau
+from .threads import on_threads
 
 Array = NDArray[np.float64]
 
@@ -58,23 +58,8 @@ def run_lanes(lanes: Lanes, start: Array) -> tuple[Array, Any]:
             if lib.mstmm_group_advance(group, SLICE) == Status.FINISHED:
                 return
 
-    with interruptible() as interrupted, ThreadPoolExecutor(len(groups)) as pool:
-        futures = [pool.submit(work, group) for group in groups]
-        while not all(future.done() for future in futures):
-            _wait(futures)
-            if interrupted[0]:
-                stop.set()
-        for future in futures:
-            future.result()
-    if interrupted[0]:
-        raise KeyboardInterrupt
+    on_threads(work, groups, len(groups), stop)
     return samples, outcomes
-
-
-def _wait(futures: list[Any]) -> None:
-    from concurrent.futures import wait
-
-    wait(futures, timeout=SLICE)
 
 
 def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:

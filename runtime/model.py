@@ -279,7 +279,8 @@ class Model:
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
             progress: called with (t, t_end) about every 0.1 s.
-            checkpoint: file that keeps the run when it is interrupted, and every 30 s.
+            checkpoint: file that keeps the run every 30 s, when it is interrupted, and when it has
+                ended, until the result is saved.
             resume: continue from that file, if it is there, bit for bit.
 
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.

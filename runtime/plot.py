@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mstmm.errors import SceneError
+from mstmm.printable import printable
 
 from .curves import curve
 from .dataset import extra
@@ -87,7 +88,7 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
         for part, group in zip(parts, groups, strict=True):
             _fill(part, group)
         if title:
-            figure.suptitle(title)
+            figure.suptitle(printable(title), parse_math=False)
         if path is not None:
             _write(figure, path)
     return figure

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from mstmm import abi
 from mstmm.errors import ElementError, EnvironmentFailure
 from mstmm.spec import Param
 from mstmm.tape import Tape
+
+from .build_extension import BUILT_FROM, built_from
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,22 @@ def module() -> tuple[Any, Any]:
             f"the compiled kernels cannot be loaded ({error}); install mstmm again: "
             "pip install -e . (a C compiler is needed)"
         ) from error
+    _refuse_stale(kernels)
     return kernels.ffi, kernels.lib
+
+
+def _refuse_stale(kernels: Any) -> None:
+    """The module must come from the C text beside it: after an update it may be an older one."""
+    try:
+        found = text(kernels.ffi, getattr(kernels.lib, BUILT_FROM))
+    except AttributeError:  # before modules told
+        found = ""
+    if found != built_from(Path(str(files("mstmm.generated")))):
+        raise EnvironmentFailure(
+            f"the compiled kernels {kernels.__file__} belong to another version of mstmm; build "
+            "them again: pip install -e . in the checkout, or pip install --force-reinstall mstmm "
+            "(a C compiler is needed)"
+        )
 
 
 def text(ffi: Any, pointer: Any) -> str:

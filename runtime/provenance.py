@@ -17,8 +17,10 @@ import mstmm
 
 from .error_estimate import ErrorEstimate
 from .integrate import Statistics, Status
+from .second_opinion import METHODS
 from .settings import Settings
 from .simulate import Trajectory
+from .steppers import get
 
 if TYPE_CHECKING:
     from .model import Model
@@ -145,26 +147,56 @@ def error(data: Any) -> ErrorEstimate | None:
     return ErrorEstimate(data["error_t"].values, values["q"], values["u"], **rest)
 
 
+def _floats(data: Any, name: str) -> Array:
+    """A variable as numbers; TypeError if it holds anything else."""
+    values = data[name].values
+    if values.dtype.kind not in "fiu":
+        raise TypeError(f"{name} holds {values.dtype}, not numbers")
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def _number(value: Any) -> Any:
+    """The same, if it is a number, a truth value or None."""
+    if value is not None and not isinstance(value, (int, float)):
+        raise TypeError(f"{value!r} stands where a number was")
+    return value
+
+
+def _settings(found: dict[str, Any]) -> Settings:
+    """Settings of values that are of the kind that settings have."""
+    for name, value in found.items():
+        if name not in ("method", "output_times"):
+            _number(value)
+    method = found["method"]
+    if method not in METHODS:
+        get(method)
+    return Settings(**found)
+
+
 def trajectory(data: Any) -> Trajectory:
-    """The states of a saved Dataset."""
+    """The states of a saved Dataset.
+
+    Raises KeyError, ValueError or TypeError where it was changed; sizes are the caller's affair.
+    """
     a = data.attrs
-    times = tuple(data["output_times"].values.tolist()) if "output_times" in data else None
-    settings = Settings(**(json.loads(a["settings"]) | {"output_times": times}))
+    times = tuple(_floats(data, "output_times").tolist()) if "output_times" in data else None
+    settings = _settings(json.loads(a["settings"]) | {"output_times": times})
     statistics = json.loads(a["statistics"])
     if statistics is not None:
-        statistics = Statistics(**{f.name: statistics[f.name] for f in fields(Statistics)})
+        statistics = Statistics(**{f.name: _number(statistics[f.name]) for f in fields(Statistics)})
     status = None if a["status"] == "INTERRUPTED" else Status[a["status"]]
     fail_time = None if np.isnan(a["fail_time"]) else float(a["fail_time"])
     t, q, u, memory, work, event = (
-        np.ascontiguousarray(data[name].values)
-        for name in ("time", "q", "u", "memory", "work", "event")
+        _floats(data, name) for name in ("time", "q", "u", "memory", "work", "event")
     )
+    if t.ndim != 1 or not np.all(np.diff(t) >= 0):
+        raise ValueError("its times do not increase")
     last = None
     if "last_t" in data:
-        last = (float(data["last_t"]), data["last_q"].values, data["last_u"].values)
+        last = (float(data["last_t"]), _floats(data, "last_q"), _floats(data, "last_u"))
     start = None
     if "start_q" in data:
-        start = (data["start_q"].values, data["start_u"].values)
+        start = (_floats(data, "start_q"), _floats(data, "start_u"))
     return Trajectory(
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,

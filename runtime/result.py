@@ -53,6 +53,7 @@ class Result(FlexibleResults):
         status: why it ended; None if it was interrupted.
         statistics: counts of the integrator; None for runs of other integrators.
         settings: how the run was made.
+        checkpoint: the file that keeps the run until its result is saved; None without one.
     """
 
     def __init__(
@@ -64,6 +65,7 @@ class Result(FlexibleResults):
     ) -> None:
         self.model, self.trajectory = model, run
         self._error, self._step = error, step
+        self.checkpoint: Checkpoint | None = None
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
         self.statistics: Statistics | None = run.statistics
@@ -250,12 +252,15 @@ class Result(FlexibleResults):
     def save(self, path: str | Path) -> Path:
         """Write ".nc" (NetCDF, extra: io) or ".csv" (a column per number); returns the path.
 
-        The file appears under its name when it is whole.  EnvironmentFailure if the extra is
-        missing or the file cannot be written.
+        The file appears under its name when it is whole; then the checkpoint of a run that has
+        ended is removed.  EnvironmentFailure if the extra is missing or the file cannot be written.
         """
         from .storage import save
 
-        return save(self, Path(path))
+        saved = save(self, Path(path))
+        if self.checkpoint is not None and self.status is not None:
+            self.checkpoint.remove()
+        return saved
 
     def table(self, *names: str, rows: int = 12) -> str:
         """A text table of some samples; by default of every hinge coordinate and the energy."""
@@ -318,7 +323,9 @@ def simulate(
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))
-    return result_of(model, run, error, step)
+    result = result_of(model, run, error, step)
+    result.checkpoint = watch.checkpoint
+    return result
 
 
 def load_result(path: str | Path) -> Result:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -29,8 +30,14 @@ from .switches import MOST
 
 Array = NDArray[np.float64]
 
-#: Seconds between looks at progress, Ctrl-C and checkpoints.
+#: Signals that ask a run to end with what it has.
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+
+#: Seconds between looks at progress, interrupts and checkpoints.
 SLICE = 0.1
+
+#: Seconds in which an interrupted run has to come to an end.
+PATIENCE = 5.0
 
 #: Bytes of samples at which a run stops and asks for output times.
 LARGEST = 2**30
@@ -246,26 +253,35 @@ def _energy(system: SceneSystem, t: float, y: Array) -> float:
 
 @contextmanager
 def interruptible() -> Iterator[list[bool]]:
-    """Ctrl-C sets the flag instead of raising, so that no sample is lost."""
-    flag = [False]
+    """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
+
+    A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
+    Where nobody has looked at the flag for PATIENCE, the next signal is a KeyboardInterrupt.
+    """
+    flag, since = [False], [0.0]
     if threading.current_thread() is not threading.main_thread():
         yield flag
         return
 
     def note(*_: object) -> None:
-        flag[0] = True
+        if not flag[0]:
+            flag[0], since[0] = True, time.monotonic()
+        elif time.monotonic() - since[0] > PATIENCE:
+            raise KeyboardInterrupt
 
-    previous = signal.signal(signal.SIGINT, note)
-    try:
+    with ExitStack() as restored:
+        for which in INTERRUPTS:
+            previous = signal.getsignal(which)
+            if previous is not None and previous is not signal.SIG_IGN:
+                restored.callback(signal.signal, which, previous)
+                signal.signal(which, note)
         yield flag
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def advance(
     run: Run, observe: Callable[[Run], None] | None = None, steps: int = 0
 ) -> Status | None:
-    """Run to the end; None if Ctrl-C came first or the samples fill the memory they may take.
+    """Run to the end; None if an interrupt came first or the samples fill the memory they may take.
 
     `observe` is called between slices.  RUNNING when so many steps have been made in all.
     """
@@ -285,17 +301,22 @@ def trajectory(
     run: Run,
     settings: Settings,
     status: Status | None,
+    message: str,
     earlier: Samples | None = None,
 ) -> Trajectory:
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    message = _interrupted(run) if status is None else message_of(system, run)
     found = split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
     return replace(found, notes=notes(system, settings, run.chatter))
+
+
+def said(system: SceneSystem, run: Run, status: Status | None) -> str:
+    """How a run came back, as a sentence; None for interrupted."""
+    return _interrupted(run) if status is None else message_of(system, run)
 
 
 def _interrupted(run: Run) -> str:

@@ -13,7 +13,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,10 @@ from .arrays import batch, by_name, numbers, pair, threads_of
 from .integrate import Failure, Run, Status, failure_text
 from .lanes_run import Lanes, run_lanes
 from .settings import Settings, checked
-from .simulate import Compiled, SceneSystem, advance, make_run, settled, trajectory
+from .simulate import Compiled, SceneSystem, advance, make_run, said, settled, trajectory
 from .steppers import get
 from .switches import has_switches
+from .threads import on_threads
 
 if TYPE_CHECKING:
     from .fused import FusedLibrary
@@ -191,20 +191,16 @@ def _one_by_one(
     def run(i: int) -> None:
         try:
             _alone(models[i], compiled[id(models[i])], settings, q[i], u[i], i, rows, look)
+        except _Stopped:
+            return
         except MstmmError as error:  # this trajectory's own affair
             rows.messages[i] = str(error)
 
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            list(pool.map(run, which.tolist()))
-        except BaseException:  # Ctrl-C: the others end within a slice
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+    on_threads(run, which.tolist(), threads, stop)
 
 
 class _Stopped(Exception):
-    """Another thread has ended the batch."""
+    """The batch has ended."""
 
 
 def _scalar(model: Model) -> Compiled | None:
@@ -219,7 +215,7 @@ def _alone(
     system = SceneSystem(model._engine, compiled, with_power=False)
     run = make_run(system, settings, q, u)
     status = advance(run, look)
-    found = trajectory(system, run, settings, status)
+    found = trajectory(system, run, settings, status, said(system, run, status))
     places = np.searchsorted(np.asarray(settings.output_times), found.t)
     rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
     rows.success[i], rows.messages[i] = found.success, found.message

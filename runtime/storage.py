@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import gc
 import shutil
+import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 from mstmm.scene import Scene
 
 from . import provenance, store
@@ -22,7 +24,9 @@ from .stability import check_step
 from .steppers import get
 
 if TYPE_CHECKING:
+    from .model import Model
     from .result import Result
+    from .simulate import Trajectory
 
 
 def save(result: Result, path: Path) -> Path:
@@ -85,22 +89,64 @@ def load(path: Path) -> Result:
         import xarray
     except ImportError as error:
         raise extra("io", "a NetCDF file", error) from None
-    try:
-        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
-            data = file.load()
-    except FileNotFoundError:
-        raise SceneError(f'result file "{path}": there is no such file') from None
-    except (OSError, ValueError, KeyError) as error:
-        raise SceneError(f'result file "{path}": not a NetCDF file ({error})') from None
+    if not path.is_file():
+        raise SceneError(f'result file "{path}": there is no such file')
+    data = _read(xarray, path)
     if data.attrs.get("format") != "mstmm result" or "scene" not in data:
         raise SceneError(f'result file "{path}": not a result of mstmm')
-    if int(data.attrs["format_version"]) > provenance.FORMAT:
-        raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
-    return _rebuilt(data, path)
+    try:
+        if int(data.attrs["format_version"]) > provenance.FORMAT:
+            raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
+        return _rebuilt(data, path)
+    except MstmmError as error:
+        if str(path) in str(error):
+            raise
+        raise SceneError(f'result file "{path}": {error}') from None
+    except _NOT_OURS as error:
+        raise SceneError(
+            f'result file "{path}": it was changed or damaged ({type(error).__name__}: {error}); '
+            "make it again"
+        ) from None
+
+
+#: What numbers and texts raise that are not as they were written.
+_NOT_OURS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+
+
+def _read(xarray: Any, path: Path) -> Any:
+    """All of a file.  SceneError for whatever the libraries make of one that is cut or overwritten.
+
+    Objects of theirs that are given up half made complain, past every caller, as they go: they go
+    here, unheard.
+    """
+    previous, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        try:
+            with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+                return file.load()
+        except Exception as error:
+            reason = str(error)
+        gc.collect()  # the exception, which held them, is gone
+    finally:
+        sys.unraisablehook = previous
+    raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
+
+
+def _fits(model: Model, run: Trajectory) -> bool:
+    """The sizes of every array follow from the scene and the number of samples."""
+    n, memory = len(run.t), model._engine.packed.n_memory
+    expected = {
+        "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
+    }  # fmt: skip
+    last = run.last is None or (run.last[1].shape, run.last[2].shape) == ((model.nq,), (model.nu,))
+    return last and all(getattr(run, name).shape == shape for name, shape in expected.items())
 
 
 def _rebuilt(data: Any, path: Path) -> Result:
-    """Scene and model as they were; what only the run knew comes from the file."""
+    """Scene and model as they were; what only the run knew comes from the file.
+
+    Raises one of _NOT_OURS where numbers are missing or of another kind or size.
+    """
     from .model import Model
     from .result import result_of
 
@@ -108,7 +154,7 @@ def _rebuilt(data: Any, path: Path) -> Result:
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
     model, run = Model(scene, known=elements), provenance.trajectory(data)
-    if run.q.shape[1] != model.nq or run.u.shape[1] != model.nu:
+    if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != provenance.kernels_hash(model):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -29,12 +30,17 @@ from mstmm.tape import compile_tape
 
 from . import prebuilt
 from .build_extension import COMPILE_ARGS
+from .cache_folder import objection
 from .entry import ABOUT, Damaged
+from .files import replacing
 from .library_build import Built, Order, fetched, found, remove
 from .prebuilt import Element
 from .toolchain import TIMEOUT
 
 Key = tuple[str, str]
+
+_ROOT = (0,)  # may put a store where all can read it
+_WAY_OUT = "set MSTMM_KERNELS to a folder of your own"
 
 
 def folder() -> Path:
@@ -51,6 +57,18 @@ def _place(key: Key) -> Path:
     return folder() / f"{key[0]}_{key[1]}"
 
 
+def _trusted(place: Path) -> None:
+    """EnvironmentFailure if somebody else may have put something into a folder of the store.
+
+    What lies there becomes equations and code of this process.
+    """
+    for each in (folder(), place):
+        with suppress(OSError):  # not there: nothing to trust
+            problem = objection(each, os.stat(each), "kernel store", _WAY_OUT, _ROOT)
+            if problem:
+                raise EnvironmentFailure(problem)
+
+
 def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
     """Write a generated element (`files`: name -> C text) and compile it.
 
@@ -58,17 +76,19 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
     cannot be written, or if a body or force element cannot be compiled.
     """
     place = _place((spec.kind, spec.name))
+    _trusted(place)
     replaced = _replaces(place, spec)
     try:
-        place.mkdir(parents=True, exist_ok=True)
+        folder().parent.mkdir(parents=True, exist_ok=True)
+        for made in (folder(), place):
+            made.mkdir(mode=0o700, exist_ok=True)
         for name, text in {**files, "element.json": element_to_json(spec)}.items():
-            temporary = place / f".{name}.{os.getpid()}"
-            temporary.write_text(text, encoding="utf-8")
-            os.replace(temporary, place / name)
-    except OSError as error:
+            with replacing(place / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+    except (OSError, EnvironmentFailure) as error:
+        said = error.strerror if isinstance(error, OSError) else error
         raise EnvironmentFailure(
-            f"the kernel store {folder()} cannot be written ({error.strerror}); "
-            "set MSTMM_KERNELS to a folder of your own"
+            f"the kernel store {folder()} cannot be written ({said}); {_WAY_OUT}"
         ) from error
     opened.cache_clear()
     try:
@@ -131,6 +151,7 @@ def specs() -> dict[Key, ElementSpec]:
     """Every element in the store; files that cannot be read are passed over."""
     found: dict[Key, ElementSpec] = {}
     for path in sorted(folder().glob("*/element.json")):
+        _trusted(path.parent)
         try:
             spec = _read(path)
         except ElementError:
@@ -144,6 +165,7 @@ def spec(key: Key) -> ElementSpec | None:
     path = _place(key) / "element.json"
     if not path.is_file():
         return None
+    _trusted(path.parent)
     return _read(path)
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.util
 import os
 import secrets
+import signal
 import tempfile
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -43,3 +45,14 @@ def pytest_report_header() -> str:
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers that depend on the run's seed and on the test's own name alone."""
     return np.random.default_rng([SEED, *request.node.nodeid.encode()])
+
+
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Ctrl-C and SIGTERM arrive, here and in processes started meanwhile, also where the tests run
+    with signals ignored, as under nohup."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before, strict=True):
+        signal.signal(number, handler)

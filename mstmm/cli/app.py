@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+
+from mstmm.errors import Interrupted
 
 from .cache import cache
 from .check import check
@@ -15,8 +18,20 @@ from .listing import list_elements
 from .show import show
 from .simulate import simulate
 
+
+class Commands(TyperGroup):
+    """The commands; an interrupt of one says so, where typer would leave without a word."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise Interrupted("interrupted") from None
+
+
 app = typer.Typer(
     name="mstmm",
+    cls=Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -46,9 +61,9 @@ def mstmm(
 ) -> None:
     """Multibody dynamics by transfer matrices: from a hinge's symbols to a simulation."""
     if context.invoked_subcommand is None:
-        from .output import say
+        from .output import put
 
-        say(context.get_help())
+        put(context.get_help())
 
 
 app.command("demo")(demo)

@@ -84,10 +84,10 @@ def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off:
     from .report import count
 
     whole = sum(1 for entry in entries if not entry.problem)
-    output.say(output.printable(
+    output.say(
         f"{folder}: {count(len(entries), 'library', 'libraries')}, {whole} whole; "
         f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
-    ))  # fmt: skip
+    )
     if cut_off:
         output.say(f"{count(cut_off, 'build', 'builds')} under way or cut off")
 
@@ -102,9 +102,9 @@ def _clean(folder: Path, unused: float, json: bool) -> None:
     if json:
         output.emit_json({"ok": True, "folder": str(folder), "removed": removed, "bytes": size})
     else:
-        output.say(output.printable(
+        output.say(
             f"{folder}: removed {count(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
-        ))  # fmt: skip
+        )
 
 
 def _row(entry: Listed) -> tuple[str, ...]:

@@ -23,11 +23,11 @@ def doctor(json: Json = False) -> None:
         report = {"ok": not problems, "interpreter": examination.summary(), "findings": plain}
         output.emit_json(report)
     else:
-        output.say(output.printable(examination.summary()))
+        output.say(examination.summary())
         width = max(len(finding.subject) for finding in findings)
         for finding in findings:
             mark = "ok     " if finding.ok else "PROBLEM"
-            output.say(output.printable(f"{mark}  {finding.subject:<{width}}  {finding.text}"))
+            output.say(f"{mark}  {finding.subject:<{width}}  {finding.text}")
         output.say(_verdict(len(problems)))
     if problems:
         raise typer.Exit(ENVIRONMENT)

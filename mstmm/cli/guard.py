@@ -16,11 +16,12 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from mstmm.errors import MstmmError
+from mstmm import interrupts
+from mstmm.errors import Interrupted, MstmmError
 
 from . import output
 
-DONE, DEFECT, BAD_INPUT, ENVIRONMENT, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, DEFECT, BAD_INPUT, ENVIRONMENT, INTERRUPTED = 0, 1, 2, 3, interrupts.CODE
 
 
 def leave(arguments: Sequence[str]) -> NoReturn:
@@ -28,8 +29,15 @@ def leave(arguments: Sequence[str]) -> NoReturn:
     output.prepare_streams()
     if not sys.warnoptions and not debugging():
         warnings.simplefilter("ignore")  # numpy's warnings go to developers, not to users
-    code = run(arguments)
-    output.settle_streams()
+    from . import app  # noqa: F401 - loaded while an interrupt still ends the process at once
+
+    interrupts.raise_in_the_command()
+    try:
+        code = run(arguments)
+        output.settle_streams()
+    finally:
+        interrupts.end_at_once()
+    interrupts.end_at_once(code, b"")
     sys.exit(code)
 
 
@@ -37,6 +45,8 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command; every exception becomes a message on stderr and an exit code."""
     try:
         code = _command(list(arguments))
+        if code == INTERRUPTED and interrupts.seen():  # typer took it for an exit
+            raise KeyboardInterrupt
         output.flush()
         return code
     except BrokenPipeError:  # the reader of our output has seen enough (`| head`)
@@ -46,6 +56,8 @@ def run(arguments: Sequence[str]) -> int:
         if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
             output.discard()  # typer met the closed pipe first
             return DONE
+        if interrupts.seen() and not isinstance(error, Interrupted):
+            error = KeyboardInterrupt()  # whatever became of it in the code that it met
         try:
             return _report(error, "--json" in arguments)
         except OSError:  # not even the message could be written

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from mstmm.printable import printable
+
 from .options import Json, quoted
 
 if TYPE_CHECKING:
@@ -209,7 +211,7 @@ def list_elements(
         if section.rows:
             console.print(output.table(section.title, section.columns, section.rows))
         else:
-            console.print(f"{section.title}: none")
+            console.print(f"{printable(section.title)}: none")
         console.print()
     if not parts:
         console.print("The equations of each: mstmm show NAME, such as mstmm show pin")

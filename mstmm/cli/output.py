@@ -12,6 +12,8 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from mstmm.printable import printable
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -51,13 +53,13 @@ def settle_streams() -> None:
             discard()
 
 
-def printable(text: str) -> str:
-    """Text without control characters, which a file name or a scene may contain."""
-    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
-
-
 def say(text: str = "") -> None:
-    """One or more lines on standard output, as they are."""
+    """One or more lines on standard output."""
+    sys.stdout.write(printable(text) + "\n")
+
+
+def put(text: str) -> None:
+    """Text of our own making on standard output, as it is: C, HTML, what others read."""
     sys.stdout.write(text + "\n")
 
 
@@ -116,7 +118,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **m
     from rich.text import Text
 
     made = Table(
-        title=Text(title, style="bold") if title else None,
+        title=Text(printable(title), style="bold") if title else None,
         title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, **more,
     )  # fmt: skip
     filled = [tuple(printable(cell) for cell in row) for row in rows]

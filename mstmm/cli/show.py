@@ -57,7 +57,7 @@ def show(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show an element's equations, matrix, intermediate form or C, with units and sources."""
-    from .output import emit_json, note, say
+    from .output import emit_json, note, put
 
     target = None if output is None else output_file(output, ())
     pages = {view.name: _page(view, at, format) for view in _views(element, at)}
@@ -68,7 +68,7 @@ def show(
         written = None if target is None else str(target)
         emit_json({"at": at, "format": format, "pages": pages, "file": written})
     elif target is None:
-        say(text.rstrip("\n"))
+        put(text.rstrip("\n"))
     else:
         note(f"wrote {target}")
 

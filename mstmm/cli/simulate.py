@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError, NumericalFailure, SceneError
 
 from .extras import need_for, result_ending
 from .options import Json, Times, not_negative, output_file, positive, python_file, times
@@ -160,15 +158,12 @@ def simulate(
     use_files(hinge or [])
     model = _model(plan)
     load_method(plan.method)
-    with _terminated_as_interrupted(), bar() as progress:
+    with bar() as progress, _kept_if_interrupted(plan.checkpoint):
         begin = time.perf_counter()
         result = _run(plan, model, progress)
         seconds = time.perf_counter() - begin
-        result.save(plan.output)
-        run = result.trajectory
-        if run.success and (seconds < SHORT if plan.certify is None else plan.certify):
-            result = certified(result, progress)
-            result.save(plan.output)
+        with _kept_if_it_fails(plan.checkpoint):
+            result = _saved(plan, result, seconds, progress)
     if plan.plot is not None:
         names = plan.quantities or report.default_panels(result)
         result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
@@ -266,6 +261,53 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     )  # fmt: skip
 
 
+def _saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
+    """The result in its place, with its error estimated where that was asked for.
+
+    The checkpoint goes with the last step, so that every part can be done again.  A run that was
+    resumed is no short one.
+    """
+    short = seconds < SHORT and not plan.resume
+    if result.trajectory.success and (short if plan.certify is None else plan.certify):
+        from mstmm.runtime import storage
+
+        storage.save(result, plan.output)
+        result = certified(result, progress)
+    result.save(plan.output)
+    return result
+
+
+@contextmanager
+def _kept_if_interrupted(checkpoint: Path) -> Iterator[None]:
+    """An interrupt beside the run itself says what there is to go on from."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not checkpoint.is_file():
+            raise
+        raise Interrupted(f"interrupted; {_kept(checkpoint)}") from None
+
+
+@contextmanager
+def _kept_if_it_fails(checkpoint: Path) -> Iterator[None]:
+    """What goes wrong while a result is saved costs no run: the message says where it is kept."""
+    try:
+        yield
+    except (MstmmError, MemoryError) as error:
+        if not checkpoint.is_file():
+            raise
+        if isinstance(error, MstmmError):
+            raise type(error)(f"{error}; {_kept(checkpoint)}") from None
+        raise EnvironmentFailure(
+            "there is not enough memory to evaluate all samples and to save them; "
+            f"{_kept(checkpoint)} where there is more memory, or run it again with fewer --times"
+        ) from None
+
+
+def _kept(checkpoint: Path) -> str:
+    return f"the run is kept in {checkpoint}; continue with the same command and --resume"
+
+
 def certified(result: Result, progress: Bar) -> Result:
     """The same result with its error estimated by a second, more accurate run from the start."""
     from dataclasses import replace
@@ -277,9 +319,11 @@ def certified(result: Result, progress: Bar) -> Result:
     watch = Watch(progress, result.settings, runs=2)
     run = result.trajectory
     error = second_run(result.model, run, *result.model.initial_state(), watch)
-    return result_of(
+    made = result_of(
         result.model, replace(run, notes=(*run.notes, *watch.notes)), error, result.certificate.step
     )
+    made.checkpoint = result.checkpoint
+    return made
 
 
 def load_method(name: str) -> None:
@@ -294,21 +338,8 @@ def load_method(name: str) -> None:
 
 
 def interrupted(result: Result) -> bool:
-    """True if Ctrl-C ended the run."""
+    """True if Ctrl-C or SIGTERM ended the run."""
     return result.status is None
-
-
-@contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """A polite kill (SIGTERM, as batch systems send it) keeps the result as Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)
 
 
 # --- what it says ---------------------------------------------------------------------------------

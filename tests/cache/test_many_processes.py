@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cache.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
+from cache.workbench import Kernel, alive, assert_tidy, entry_folders, false_compiler, scaled
 from mstmm.runtime import cache, lock
 from mstmm.runtime import entry as entries
 from mstmm.runtime.cache_upkeep import clean, unfinished
@@ -116,31 +116,40 @@ def _content(path: Path) -> bytes:
         return b""
 
 
-def test_lock_ends_with_its_killed_owner(
-    cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+#: A compiler whose pass, a process of its own, goes on for minutes; both leave their ids.
+ENDLESS = """\
+case "$*" in *--version*) exec $REAL "$@";; esac
+sleep 600 &
+echo $! >pass
+wait
+"""
+
+
+@pytest.mark.parametrize("which", [signal.SIGTERM, signal.SIGKILL], ids=["SIGTERM", "SIGKILL"])
+def test_lock_and_compiler_end_with_their_killed_owner(
+    cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: signal.Signals
 ) -> None:
-    marks = counting_compiler(tmp_path, 'case "$*" in *--version*) ;; *) sleep 600;; esac')
+    marks = counting_compiler(tmp_path, ENDLESS.replace("pass", str(tmp_path / "pass")))
     monkeypatch.setenv("CC", str(marks))
     crowd = Crowd([3])
-    _until(lambda: runs(tmp_path) > 0)
-    orphan = int(next((tmp_path / "marks").iterdir()).name)
-    os.kill(crowd.pids[0], signal.SIGKILL)
+    _until(lambda: (tmp_path / "pass").exists() and (tmp_path / "pass").read_text().endswith("\n"))
+    started = [int((tmp_path / "pass").read_text()), *map(int, os.listdir(tmp_path / "marks"))]
+    assert all(alive(pid) for pid in started)
+    os.kill(crowd.pids[0], which)
     assert crowd.said() == []
-    try:
-        assert unfinished(cache_folder) == 1 and entry_folders(cache_folder) == []
-        monkeypatch.delenv("CC")
-        path = cache._placed(Kernel().recipe)[0]
-        with lock.locked(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
-            assert remark == ""  # nobody waits for the dead
-        built = cache.library(Kernel().recipe)
-        assert scaled(built.path, built.key) == 21.0
-        assert unfinished(cache_folder) == 1  # young: it could be somebody's
-        (left,) = cache_folder.glob(".building-*")
-        os.utime(left, (1e9, 1e9))
-        cache.library(Kernel(factor=8).recipe)
-        assert_tidy(cache_folder, 2)
-    finally:
-        os.killpg(orphan, signal.SIGKILL)
+    _until(lambda: not any(alive(pid) for pid in started))
+    assert unfinished(cache_folder) == 1 and entry_folders(cache_folder) == []
+    monkeypatch.delenv("CC")
+    path = cache._placed(Kernel().recipe)[0]
+    with lock.locked(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
+        assert remark == ""  # nobody waits for the dead
+    built = cache.library(Kernel().recipe)
+    assert scaled(built.path, built.key) == 21.0
+    assert unfinished(cache_folder) == 1  # young: it could be somebody's
+    (left,) = cache_folder.glob(".building-*")
+    os.utime(left, (1e9, 1e9))
+    cache.library(Kernel(factor=8).recipe)
+    assert_tidy(cache_folder, 2)
 
 
 def _until(condition: object) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,9 @@ import pytest
 
 import mstmm
 from cache.workbench import false_compiler
+from mstmm.errors import EnvironmentFailure
 from mstmm.runtime import store
+from mstmm.runtime.cache_folder import objection
 
 DEFINITIONS = Path(__file__).parents[1] / "user_elements" / "definitions"
 KNEE = {"type": "knee", "parameters": {"width": 0.06, "depth": 0.03, "slip": 0.4}}
@@ -111,3 +115,41 @@ def test_library_of_an_earlier_definition_goes(library: Path, tmp_path: Path) ->
     assert "replacing" in made.how
     assert not library.exists() and len(list(made.folder.glob("*/hinge_knee.so"))) == 1
     assert os.listdir(made.folder / "..") == ["hinge_knee"]
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
+@pytest.mark.parametrize("below", [False, True], ids=["the store", "an element"])
+def test_nothing_is_taken_from_a_folder_that_others_may_write_to(
+    library: Path, mode: int, below: bool
+) -> None:
+    place = library.parents[1] if below else library.parents[2]
+    place.chmod(mode)
+    generate = partial(mstmm.generate_file, DEFINITIONS / "knee.py")
+    for attempt in (accelerations, store.specs, generate):
+        with pytest.raises(EnvironmentFailure, match=r"others may write.*chmod 700.*MSTMM_KERNELS"):
+            attempt()
+    place.chmod(0o755)
+    assert accelerations()[0] == "library"
+
+
+def test_nothing_is_taken_from_a_folder_of_somebody_else(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = os.geteuid()
+    monkeypatch.setattr("os.geteuid", lambda: owner + 1)
+    if owner != 0:  # root's are as good as ours
+        with pytest.raises(EnvironmentFailure, match=r"belongs to user .*MSTMM_KERNELS"):
+            accelerations()
+    place, status = library.parents[2], os.stat(library.parents[2])
+    assert "belongs to user" in objection(place, status, owners=())
+
+
+def test_a_new_store_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "new" / "store"))
+    before = os.umask(0)
+    try:
+        (made,) = mstmm.generate_file(DEFINITIONS / "knee.py")
+    finally:
+        os.umask(before)
+    for place in (made.folder, made.folder.parent):
+        assert stat.S_IMODE(place.stat().st_mode) == 0o700

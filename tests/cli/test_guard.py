@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -127,41 +125,30 @@ def test_ascii_terminal(folder: Path) -> None:
     assert done.returncode == 0 and done.stderr == ""
 
 
-def interrupted(folder: Path, which: signal.Signals, *more: str) -> str:
-    """What a run says on stderr that is interrupted after a while; its result is a.csv.
-
-    A slow machine gets more time until the run has begun.
-    """
-    options = ["--t-end", "1e7", "--times", "1e3", "-o", "a.csv", *more]
-    err = ""
-    for seconds in (3.0, 6.0, 12.0, 24.0):
-        run = subprocess.Popen(
-            [*PROGRAM, "simulate", "pendulum.toml", *options],
-            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        try:
-            time.sleep(seconds)
-            run.send_signal(which)
-            out, err = run.communicate(timeout=60)
-        finally:
-            run.kill()
-        assert run.returncode in (130, -which), err
-        assert "Traceback" not in err + out
-        if run.returncode == 130 and (folder / "a.csv").exists():
-            break
-    return err
+def test_nothing_in_a_name_reaches_the_terminal_raw(mstmm: Command, folder: Path) -> None:
+    name = "\x1b]0;own\x07\x1b[31mred\x9b.toml"
+    (folder / name).write_bytes((folder / "pendulum.toml").read_bytes())
+    (folder / "store").mkdir()
+    for command in (
+        ("simulate", name, "--t-end", "0.1", "-o", "\x1b[2J.csv", "--plot", "\x1b[2J.svg"),
+        ("check", name), ("check", "\x1bnone.toml"), ("simulate", "\x1bnone.toml"),
+        ("simulate", "--\x1boption"), ("show", "\x1bpin"), ("list", "\x1bpart"),
+        ("show", "pin", "--output", "\x1bpage.txt"), ("generate", "\x1bhinge.py"),
+    ):  # fmt: skip
+        done = mstmm(*command)
+        for text in (done.out, done.err):
+            assert all(c.isprintable() or c == "\n" for c in text), command
+    assert mstmm("simulate", name, "--t-end", "0.1").code == 0
 
 
-def test_interrupted_run_keeps_its_result_and_goes_on(folder: Path) -> None:
-    assert "--resume" in interrupted(folder, signal.SIGINT)
-    first = (folder / "a.csv").read_text().splitlines()
-    interrupted(folder, signal.SIGTERM, "--resume")
-    second = (folder / "a.csv").read_text().splitlines()
-    assert 2 < len(first) < len(second)
-    assert second[: len(first)] == first
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_an_interrupted_command_says_so(
+    mstmm: Command, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
 
-
-def test_checkpoint_of_another_run_is_refused(folder: Path) -> None:
-    interrupted(folder, signal.SIGINT)
-    done = program(folder, "simulate", "pendulum.toml", "-o", "a.csv", "--resume")
-    assert done.returncode == 2 and "checkpoint" in done.stderr
+    monkeypatch.setattr("mstmm.load_scene", interrupt, raising=False)
+    done = mstmm("simulate", "pendulum.toml", *options)
+    assert (done.code, done.err) == (130, "mstmm: interrupted\n")
+    assert not options or json.loads(done.out)["error"]["exit_code"] == 130

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from mstmm.runtime.build_extension import cdef, headers
+from mstmm.errors import EnvironmentFailure
+from mstmm.runtime import prebuilt
+from mstmm.runtime.build_extension import built_from, cdef, headers
 
 ROOT = Path(__file__).resolve().parents[2]
 INNER = """\
@@ -107,3 +112,27 @@ def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:
     done = build(project)
     assert done.returncode != 0
     assert "run `python -m mstmm generate`" in done.stderr
+
+
+def test_a_module_from_other_text_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After an update the module beside the new C may be the old one, with other functions."""
+    again = r"_kernels.* belong to another version of mstmm; build them again: pip install -e \."
+    assert prebuilt.module.__wrapped__() == prebuilt.module()
+    with monkeypatch.context() as patch:
+        patch.setattr(prebuilt, "built_from", lambda folder: "0" * 64)
+        with pytest.raises(EnvironmentFailure, match=again):
+            prebuilt.module.__wrapped__()
+    older = SimpleNamespace(ffi=prebuilt.module()[0], lib=object(), __file__="_kernels.abi3.so")
+    monkeypatch.setattr(prebuilt, "import_module", lambda name: older)
+    with pytest.raises(EnvironmentFailure, match=again):
+        prebuilt.module.__wrapped__()
+
+
+def test_the_manifest_tells_every_text_that_is_compiled(tmp_path: Path) -> None:
+    texts = [path for ending in ("*.c", "*.h") for path in (ROOT / "generated").glob(ending)]
+    digest = hashlib.sha256()
+    for path in sorted(texts, key=lambda path: path.name):
+        digest.update(f"{path.name}\n".encode() + path.read_bytes())
+    manifest = ROOT / "generated" / "manifest.json"
+    assert json.loads(manifest.read_text())["sources"] == digest.hexdigest()
+    assert built_from(manifest.parent) != built_from(tmp_path) == ""

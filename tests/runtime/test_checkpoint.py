@@ -10,10 +10,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from support.result_scenes import pins, rod
+from support.result_scenes import motor, pins, rod
 
 import mstmm
 from mstmm.runtime import execution
@@ -73,7 +74,7 @@ def start() -> Iterator[Start]:
 
 @pytest.mark.slow
 def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
-    tmp_path: Path, start: Start
+    tmp_path: Path, heard: None, start: Start
 ) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(remembering().to_toml())
@@ -100,7 +101,6 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
         for name in one.files:
             assert one[name].tobytes() == other[name].tobytes(), name
             assert one[name][: len(part["t"])].tobytes() == part[name].tobytes(), name
-    assert not (tmp_path / "rest.npz.ck.npz").exists()
 
 
 def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
@@ -115,7 +115,7 @@ def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
 
 
 def test_a_checkpoint_of_another_run_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
     with monkeypatch.context() as patch:
@@ -135,7 +135,8 @@ def test_a_checkpoint_of_another_run_is_refused(
     whole = model.simulate(5.0, step=0.01, method="rk4")
     again = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
     assert again.q.tobytes() == whole.q.tobytes() and again.statistics == whole.statistics
-    assert list(tmp_path.iterdir()) == []
+    again.save(tmp_path / "run.csv")
+    assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
     once_more = model.simulate(0.1, checkpoint=path, resume=True)  # nothing there: from the start
     assert once_more.success and once_more.t[0] == 0.0
 
@@ -149,6 +150,45 @@ def test_a_file_that_is_no_checkpoint(tmp_path: Path, content: bytes) -> None:
     np.savez(path, x=1)
     with pytest.raises(mstmm.SceneError, match="not one of this version"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
+
+
+EDITS: dict[str, Callable[[Any], Any]] = {
+    "t": lambda t: t[::-1],
+    "y": lambda y: y[:, :1],
+    "memory": lambda memory: np.zeros((len(memory), 7)),
+    "event": lambda event: event[1:],
+    "real": lambda real: real[:-1],
+    "integer": lambda integer: np.where(np.arange(len(integer)) == 8, 999, integer),
+    "engine": lambda engine: np.zeros(3),
+    "message": lambda message: np.array(7),
+}
+
+
+@pytest.mark.parametrize("name", [*EDITS, "missing"])
+def test_a_checkpoint_that_was_edited(tmp_path: Path, name: str) -> None:
+    model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
+    model.simulate(1.0, checkpoint=path)
+    with np.load(path) as file:
+        data = {key: file[key] for key in file.files}
+    if name == "missing":
+        del data["integer"]
+    else:
+        data[name] = EDITS[name](data[name])
+    np.savez(path, **data)
+    with pytest.raises(mstmm.SceneError, match=r"damaged|another scene, method or version"):
+        model.simulate(1.0, checkpoint=path, resume=True)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.97])
+def test_a_checkpoint_that_was_cut_or_overwritten(tmp_path: Path, share: float) -> None:
+    model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
+    model.simulate(1.0, checkpoint=path)
+    whole = path.read_bytes()
+    place = int(share * len(whole))
+    for content in (whole[:place], whole[:place] + b"\0" * 40 + whole[place + 40 :]):
+        path.write_bytes(content)
+        with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
+            model.simulate(1.0, checkpoint=path, resume=True)
 
 
 def test_a_folder_that_is_not_there_is_noticed_before_the_run(tmp_path: Path) -> None:
@@ -190,6 +230,32 @@ def test_checkpoints_are_written_on_the_way(
     assert len(seen) > 3 and seen == sorted(set(seen))
 
 
+@pytest.mark.parametrize("end", ["event", "failure"])
+def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    """However it ended: who asks again gets the same without another step."""
+    scene = motor("sqrt(0.5 - t)") if end == "failure" else pins(1, [0.3])
+    if end == "event":
+        low: Any = [{"name": "low", "when": "pin0.q < -0.5", "do": "stop"}]
+        scene = mstmm.Scene(gravity=scene.gravity, body=scene.body, hinge=scene.hinge, event=low)
+    model, path = mstmm.compile(scene), tmp_path / "run.npz"
+    first = model.simulate(5.0, checkpoint=path)
+    assert first.status is not None and first.t[-1] < 5.0
+    assert path.exists() and first.success is (end == "event")
+
+    def never(*_: object) -> None:
+        raise AssertionError("a step")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Run, "advance", never)
+        again = model.simulate(5.0, checkpoint=path, resume=True)
+    assert (again.message, again.status) == (first.message, first.status)
+    assert again.q.tobytes() == first.q.tobytes() and again.statistics == first.statistics
+    again.save(tmp_path / "run.csv")
+    assert not path.exists()
+
+
 # --- progress -------------------------------------------------------------------------------------
 
 
@@ -224,7 +290,9 @@ def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
     assert json.dumps(run.settings.output_times) == "[0.0, 0.5, 1.0]"
 
 
-def test_ctrl_c_in_the_second_run_costs_the_estimate_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_in_the_second_run_costs_the_estimate_only(
+    heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
 
     def look(self: execution.Watch, run: Run, earlier: object) -> None:

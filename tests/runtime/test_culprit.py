@@ -105,5 +105,7 @@ def test_a_motion_that_really_is_undetermined_blames_no_expression() -> None:
     thin = rod("rod") | {"inertia": [0, 1 / 12, 1 / 12]}
     ball = {"name": "ball", "type": "ball", "inboard": "ground", "outboard": "rod",
             "law": {"effort": ["sin(t)", 0, 0]}}  # fmt: skip
-    with pytest.raises(mstmm.SceneError, match=r'hinge "ball".*undetermined.*inertia in that direction'):
+    with pytest.raises(
+        mstmm.SceneError, match=r'hinge "ball".*undetermined.*inertia in that direction'
+    ):
         mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[thin], hinge=[ball]))

@@ -80,7 +80,7 @@ def test_work_and_samples_agree_with_the_looped_engine(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["dop853", "pirk13"])
 def test_an_interrupted_run_on_compiled_code_continues_bit_for_bit(
-    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, method: str
+    empty_cache: Path, heard: None, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     monkeypatch.setattr(simulate, "SLICE", 0.001)  # else a fast machine has done before Ctrl-C
     settings: dict[str, Any] = {

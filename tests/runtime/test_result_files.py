@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -150,3 +152,91 @@ def test_words_for_paths_that_make_no_sense(run: Result, tmp_path: Path) -> None
     xarray.Dataset({"x": 1}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
     with pytest.raises(mstmm.SceneError, match="not a result of mstmm"):
         mstmm.load_result(tmp_path / "other.nc")
+
+
+def _dropped(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
+    return lambda data: data.drop_vars(name)
+
+
+def _attribute(name: str, value: object) -> Callable[[xarray.Dataset], xarray.Dataset]:
+    return lambda data: data.assign_attrs({name: value})
+
+
+def _without_attribute(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
+    def change(data: xarray.Dataset) -> xarray.Dataset:
+        del data.attrs[name]
+        return data
+
+    return change
+
+
+def _as_text(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
+    return lambda data: data.assign({name: (data[name].dims, data[name].values.astype(str))})
+
+
+CHANGES: dict[str, Callable[[xarray.Dataset], xarray.Dataset]] = {
+    **{f"no {name}": _dropped(name) for name in ("q", "u", "memory", "work", "event", "last_q")},
+    **{f"text in {name}": _as_text(name) for name in ("q", "memory", "event", "error_q_0")},
+    **{
+        f"no {name}": _without_attribute(name)
+        for name in ("format_version", "settings", "statistics", "status", "notes", "fail_time")
+    },
+    "format_version": _attribute("format_version", "two"),
+    "settings": _attribute("settings", "{}"),
+    "a tolerance": _attribute("settings", '{"t_end": 1.0, "method": "dop853", "rtol": "small"}'),
+    "a method": _attribute("settings", '{"t_end": 1.0, "method": "dop999"}'),
+    "statistics": _attribute("statistics", '{"steps": 1}'),
+    "status": _attribute("status", "DONE"),
+    "notes": _attribute("notes", "[[["),
+    "scene": lambda data: data.assign(scene=((), "gravity = [0, 0, 0")),
+    "another scene": lambda data: data.assign(scene=((), pins(1, [0.3]).to_toml())),
+    "times": lambda data: data.assign_coords(time=data["time"].values[::-1].copy()),
+    "memory": lambda data: data.drop_vars("memory").assign(
+        memory=(("time", "place"), np.zeros((data.sizes["time"], 40)))
+    ),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_result_that_was_edited(run: Result, tmp_path: Path, change: str) -> None:
+    path = tmp_path / "run.nc"
+    CHANGES[change](run.to_xarray()).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(mstmm.SceneError, match=r"run\.nc"):
+        mstmm.load_result(path)
+
+
+#: Reads damaged files; says what it meets.
+READER = """
+import sys
+import mstmm
+for path in sys.argv[1:]:
+    try:
+        mstmm.load_result(path)
+        print("read")
+    except mstmm.SceneError as error:
+        print("refused" if path in str(error) else error)
+"""
+
+
+def test_damaged_files_are_refused_without_noise(run: Result, tmp_path: Path) -> None:
+    """In a process of its own: what objects of h5py complain of as they go shows on its stderr."""
+    whole = run.save(tmp_path / "run.nc").read_bytes()
+    rng, paths = np.random.default_rng(7), list[str]()
+    for number in range(24):
+        content = bytearray(whole)
+        place = int(rng.integers(len(whole)))
+        if number % 3 == 0:
+            del content[place:]
+        elif number % 3 == 1:
+            content[place : place + 512] = bytes(512)
+        else:
+            for at in rng.integers(len(whole) // 8, size=4):
+                content[at] = rng.integers(256)
+        paths.append(str(tmp_path / f"{number}.nc"))
+        Path(paths[-1]).write_bytes(content)
+    done = subprocess.run(
+        [sys.executable, "-c", READER, *paths], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0 and done.stderr == ""
+    said = done.stdout.splitlines()
+    assert len(said) == 24 and set(said) <= {"read", "refused"} and said.count("refused") > 8

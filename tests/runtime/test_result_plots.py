@@ -95,3 +95,9 @@ def test_a_run_without_samples_is_refused() -> None:
 
     with pytest.raises(mstmm.SceneError, match="the run has no sample; ask for other times"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, output_times=[]).plot()
+
+
+@pytest.mark.parametrize("title", [r"$\foo$", "$", "a\x1b[31mred", "50 $ and 60 $"])
+def test_a_title_is_text(run: Result, tmp_path: Path, title: str) -> None:
+    figure = run.plot("energy", path=tmp_path / "a.png", title=title)
+    assert figure.get_suptitle() == title.replace("\x1b", "\\x1b")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
-import threading
+from concurrent import futures
 from functools import cache
 from typing import Any
 
@@ -17,6 +16,7 @@ from support.integration_lab import same_bits
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.runtime import threads as on_threads
 from mstmm.runtime.model import Model
 
 RUN: dict[str, Any] = {"t_end": 1.5, "rtol": 1e-9, "atol": 1e-11, "output_times": [0.4, 1.1, 1.5]}
@@ -183,17 +183,24 @@ def test_what_makes_no_sense_is_refused(pins: Model) -> None:
             pins.simulate_batch(initial, **RUN | more)
 
 
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("engine", ENGINES)
-def test_ctrl_c_ends_a_batch(engine: str) -> None:
+def test_an_interrupt_ends_a_batch(
+    engine: str, which: signal.Signals, heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model = compiled("pins", engine)
     q, u = states(model, 40)
-    before = signal.getsignal(signal.SIGINT)
-    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        model.simulate_batch((q, u), t_end=1e5, threads=2)
-    timer.join()
-    assert signal.getsignal(signal.SIGINT) is before
+    before = signal.getsignal(which)
+
+    def wait(*arguments: Any, **more: Any) -> Any:
+        signal.raise_signal(which)
+        return futures.wait(*arguments, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(on_threads, "wait", wait)
+        with pytest.raises(KeyboardInterrupt):
+            model.simulate_batch((q, u), t_end=1e5, threads=2)
+    assert signal.getsignal(which) is before
     assert model.simulate_batch((q[:3], u[:3]), **RUN).success.all()
 
 

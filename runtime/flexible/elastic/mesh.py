@@ -16,6 +16,7 @@ from mstmm.errors import SceneError
 
 from ...dataset import extra
 from ...files import refuse_special
+from .mesh_references import refuse_outside
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -80,6 +81,7 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         raise extra("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
+    refuse_outside(path, where)
     try:
         with redirect_stdout(StringIO()):  # it prints empty lines
             read = meshio.read(path)

@@ -1,0 +1,144 @@
+"""What goes wrong while a result is saved costs no run; what killed writers left is swept."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cli.commands import Command
+
+from mstmm import errors
+from mstmm.runtime import execution, simulate, storage
+from mstmm.runtime.files import replacing
+
+RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
+KEPT = "the run is kept in a.csv.checkpoint; continue with the same command and --resume"
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), 3, "No space left on device"),
+        (MemoryError(), 3, "not enough memory"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+    ids=["disk", "memory", "interrupt"],
+)
+@pytest.mark.parametrize("options", [(), ("--certify",)], ids=["plain", "certified"])
+def test_a_result_that_cannot_be_saved(
+    mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch,
+    error: BaseException, code: int, said: str, options: tuple[str, ...],
+) -> None:  # fmt: skip
+    assert mstmm(*RUN, *options).code == 0
+    whole = (folder / "a.csv").read_bytes()
+    (folder / "a.csv").unlink()
+
+    def fail(*_: object) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(storage, "_csv", fail)
+        done = mstmm(*RUN, *options)
+    assert done.code == code and said in done.err and KEPT in done.err
+    assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv.checkpoint"}
+    with monkeypatch.context() as patch:
+        patch.setattr(execution, "_advanced", fail)  # nothing is computed again
+        assert mstmm(*RUN, "--resume").code == 0
+    assert (folder / "a.csv").read_bytes() == whole
+    assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv"}
+
+
+def test_an_interrupt_while_the_error_is_estimated(
+    mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The result is there, and the checkpoint goes with the last step alone."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(execution, "second_run", interrupt)
+        done = mstmm(*RUN[:-1], "--certify", "--json")
+    assert done.code == 130 and KEPT in json.loads(done.out)["error"]["message"]
+    first = (folder / "a.csv").read_bytes()
+    assert mstmm(*RUN[:-1], "--certify", "--resume").code == 0
+    assert (folder / "a.csv").read_bytes() == first
+    assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv"}
+
+
+#: Writes half a file, says so, and waits to be killed.
+WRITER = """
+import sys, time
+from pathlib import Path
+from mstmm.runtime.files import replacing
+with replacing(Path(sys.argv[1])) as file:
+    file.write_text("half")
+    print("half", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_leftovers_go_with_their_writer_and_not_before(tmp_path: Path) -> None:
+    target = tmp_path / "a[1].csv"
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(target)], stdout=subprocess.PIPE, text=True
+    )
+    assert writer.stdout is not None and writer.stdout.readline() == "half\n"
+    with replacing(tmp_path / "b.csv") as file:
+        file.write_text("whole")
+    assert len(list(tmp_path.iterdir())) == 3  # the other one is still at work
+    writer.kill()
+    writer.communicate()
+    with replacing(target) as file:
+        file.write_text("whole")
+    assert {path.name for path in tmp_path.iterdir()} == {"a[1].csv", "b.csv"}
+    assert target.read_text() == "whole"
+
+
+def test_a_file_is_on_the_disk_before_it_takes_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = list[str]()
+    fsync, replace = os.fsync, Path.replace
+
+    def noted_fsync(handle: int) -> None:
+        steps.append("sync")
+        fsync(handle)
+
+    def noted_replace(path: Path, target: Path) -> Path:
+        steps.append("name")
+        return replace(path, target)
+
+    monkeypatch.setattr(os, "fsync", noted_fsync)
+    monkeypatch.setattr(Path, "replace", noted_replace)
+    with replacing(tmp_path / "a.csv") as file:
+        file.write_text("whole")
+    assert steps == ["sync", "name", "sync"]
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    with (
+        pytest.raises(errors.EnvironmentFailure, match="cannot be written"),
+        replacing(tmp_path / "none" / "a.csv") as file,
+    ):
+        file.write_text("")
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
+    heard: None, monkeypatch: pytest.MonkeyPatch, which: signal.Signals
+) -> None:
+    with simulate.interruptible() as flag:
+        for _ in range(3):
+            signal.raise_signal(which)
+        assert flag == [True]
+        monkeypatch.setattr(simulate, "PATIENCE", -1.0)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(which)
+    assert signal.getsignal(which) is signal.default_int_handler
