@@ -71,6 +71,12 @@ class SecondOrder:
             found[:, :3, some] = drawn + np.einsum("ab,mbkl->makl", lever, carried)
         return found
 
+    def at_section(self, x: float) -> Array:
+        """(6, n, n) at one section."""
+        if x == 0.0:
+            return np.zeros((6, self.shapes.n, self.shapes.n))
+        return np.asarray(self.from_root(np.array([x]))[0])
+
 
 class _Values:
     """What the rates along the beam are made of, at points x."""
@@ -118,9 +124,7 @@ def _rigid_motion(field: SecondOrder, frames: Mapping[str, Frame]) -> Array:
 def _value(field: SecondOrder, row: int, frame: Frame) -> Array:
     """What the frame takes from a row by itself: its value at a section, or its mean."""
     if frame.origin is not None:
-        if frame.origin == 0.0:
-            return np.zeros((field.shapes.n, field.shapes.n))
-        return np.asarray(field.from_root(np.array([frame.origin]))[0, row])
+        return field.at_section(frame.origin)[row]
     x, w = field.shapes.rule()
     sections = field.shapes.sections(x)
     polar = sections.rho_I[0]
@@ -132,12 +136,12 @@ def _line(field: SecondOrder, rows: tuple[int, int], frame: Frame) -> tuple[Arra
     """(displacement at the origin, rotation) that the frame takes from deflection and slope."""
     sign = 1.0 if rows[0] == 1 else -1.0  # v' = theta_z, w' = -theta_y
     if frame.kind == "tangent":
-        here = field.from_root(np.array([frame.x]))[0]
+        here = field.at_section(frame.x)
         turn = here[rows[1]]
         return here[rows[0]] - sign * frame.x * turn, turn
     if frame.kind == "chord":
         length = field.shapes.length
-        end = field.from_root(np.array([length]))[0, rows[0]]
+        end = field.at_section(length)[rows[0]]
         return np.zeros_like(end), sign * end / length
     x, w = field.shapes.rule()
     sections = field.shapes.sections(x)
