@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,8 +46,13 @@ class ShapeValues:
     theta: Array  #: (m, 3, n) rotation vector of the section
     curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -w'', v''
     stretch: Array  #: (m, n) s'
-    #: (m, 6, n, n) g of -1/2 eta^T g eta: displacement of the axis, rotation vector of the section
-    second_order: Array
+    make_second_order: Callable[[], Array]
+
+    @cached_property
+    def second_order(self) -> Array:
+        """(m, 6, n, n) g of -1/2 eta^T g eta: displacement of the axis, rotation vector of the
+        section; made when it is asked for, as it has all pairs of modes."""
+        return self.make_second_order()
 
 
 class BeamShapes:
@@ -133,7 +139,7 @@ class BeamShapes:
             np.moveaxis(here["theta"], 2, 0),
             np.moveaxis(change["theta"], 2, 0),
             slopes[0].T.copy(),
-            self.second_order.at(x),
+            lambda: self.second_order.at(x),
         )
 
     # --- ports -----------------------------------------------------------------------------------
@@ -142,7 +148,8 @@ class BeamShapes:
         """The section at x as a port; exact zeros where the frame's conditions hold it."""
         values = self.at(np.array([x]))
         turn = np.eye(3) if rotation is None else rotation
-        return self.port(x, turn, values.phi[0], values.theta[0], values.second_order[0])
+        second = self._second(values)[0]
+        return self.port(x, turn, values.phi[0], values.theta[0], second)
 
     def mean_section(self, start: float, end: float) -> ModalPort:
         """The mean of all sections between `start` and `end` (m): where a force that is the same
@@ -152,16 +159,22 @@ class BeamShapes:
         w = w / (end - start)
         values = self.at(x)
         phi, theta, second = (
-            np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, values.second_order)
+            np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, self._second(values))
         )
         return self.port((start + end) / 2, np.eye(3), phi, theta, second)
+
+    def _second(self, values: ShapeValues) -> Array:
+        """What is of second order at the sections of `values`; zeros where the beam is linear."""
+        if self.stiffening:
+            return values.second_order
+        return np.zeros((len(values.phi), 6, self.n, self.n))
 
     def port(self, x: float, turn: Array, phi: Array, theta: Array, second: Array) -> ModalPort:
         """A port from its values, rounding noise set to zero."""
         size, slope, _ = self._scales()
         return ModalPort(
             np.array([x, 0.0, 0.0]), turn, without_noise(phi, size), without_noise(theta, slope),
-            self._cleaned(second) if self.stiffening else np.zeros_like(second),
+            self._cleaned(second),
         )  # fmt: skip
 
     def _cleaned(self, second: Array) -> Array:

@@ -157,7 +157,7 @@ def _places(motion: Motion, x: Array) -> Array:
 
 
 #: Products of two shapes at sections that are held at once.
-_PRODUCTS = 2**19
+_PRODUCTS = 2**21
 
 
 def _in_portions(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
