@@ -47,6 +47,7 @@ class Certificate:
         give: of the stiffest spring, which the estimated error does not count; None without one.
         failures: why the run, or some of its samples, cannot be used at all.
         models: where models of the scene are outside their range whatever the run.
+        unseen: of expressions of the scene, what the steps may have passed over.
     """
 
     energy: Drift
@@ -66,6 +67,7 @@ class Certificate:
     give: Give | None = None
     failures: tuple[str, ...] = ()
     models: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
 
     def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
@@ -145,6 +147,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
+        unseen=result.trajectory.unseen,
     )
 
 
@@ -153,6 +156,7 @@ def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | N
 
 def _doubts(c: Certificate) -> list[str]:
     found = [] if c.finite else ["the states hold numbers that are not finite"]
+    found += c.unseen
     found += [
         f"{d.name} cannot be balanced: it is beyond what numbers hold, or no sample gives it"
         for d in (c.energy, *c.momentum)

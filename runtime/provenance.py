@@ -84,6 +84,7 @@ def attributes(result: Result) -> dict[str, Any]:
         "statistics": json.dumps(None if run.statistics is None else asdict(run.statistics)),
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
         "notes": json.dumps(list(run.notes)),
+        "unseen": json.dumps(list(run.unseen)),
         "norm_residual": run.norm_residual,
         "certificate": str(result.certificate),
     }
@@ -183,7 +184,8 @@ def trajectory(data: Any) -> Trajectory:
     settings = _settings(json.loads(a["settings"]) | {"output_times": times})
     statistics = json.loads(a["statistics"])
     if statistics is not None:
-        statistics = Statistics(**{f.name: _number(statistics[f.name]) for f in fields(Statistics)})
+        known = {"crossings": 0} | statistics  # older files do not tell of them
+        statistics = Statistics(**{f.name: _number(known[f.name]) for f in fields(Statistics)})
     status = None if a["status"] == "INTERRUPTED" else Status[a["status"]]
     fail_time = None if np.isnan(a["fail_time"]) else float(a["fail_time"])
     t, q, u, memory, work, event = (
@@ -200,5 +202,5 @@ def trajectory(data: Any) -> Trajectory:
     return Trajectory(
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
-        start,
+        start, tuple(json.loads(a.get("unseen", "[]"))),
     )  # fmt: skip

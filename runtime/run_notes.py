@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .simulate import SceneSystem
 
 
-def notes(
+def unseen(
     system: SceneSystem, settings: Settings, chatter: tuple[int, float] | None
 ) -> tuple[str, ...]:
     """Of a run's expressions: those that could not be mapped, are passed over by a fixed step, or

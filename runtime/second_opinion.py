@@ -21,7 +21,7 @@ from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
 from .integrate import Failure, Samples, Statistics, Status, failure_text
 from .jacobian import Jacobian
-from .run_notes import endless, notes
+from .run_notes import endless, unseen
 from .settings import Settings
 from .simulate import SceneSystem, Trajectory, interruptible, split, tolerances
 
@@ -166,7 +166,7 @@ class _Loop:
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
         )  # fmt: skip
-        return replace(found, notes=notes(scene, settings, self.crossings.chatter))
+        return replace(found, unseen=unseen(scene, settings, self.crossings.chatter))
 
     def piece(self, y: Array, stop: float) -> Array:
         """From self.t to the next break, with a new integrator after every event.

@@ -23,7 +23,7 @@ from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
 from .layout import StateNames
 from .pack import resize
-from .run_notes import notes
+from .run_notes import unseen
 from .settings import Settings
 from .steppers import get
 from .switches import MOST
@@ -73,6 +73,7 @@ class Trajectory:
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
+    unseen: tuple[str, ...] = ()  # of expressions: what the steps may have passed over
 
     @property
     def first(self) -> tuple[float, Array, Array]:
@@ -311,7 +312,7 @@ def trajectory(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
-    return replace(found, notes=notes(system, settings, run.chatter))
+    return replace(found, unseen=unseen(system, settings, run.chatter))
 
 
 def said(system: SceneSystem, run: Run, status: Status | None) -> str:

@@ -49,6 +49,21 @@ def test_the_verdict_comes_first(mstmm: Command) -> None:
     assert data["verdict"].startswith("NOT trusted")
 
 
+def test_no_step_is_longer_than_the_longest(mstmm: Command, folder: Path) -> None:
+    command = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv")
+    assert mstmm(*command, "--max-step", "0.01").code == 0
+    assert np.diff(columns(folder / "run.csv")["time [s]"]).max() <= 0.01 * (1 + 1e-12)
+
+
+def test_a_motion_that_sticks_ends_by_name(mstmm: Command, folder: Path) -> None:
+    law = PENDULUM + '\nlaw = { effort = "-10*sign(u)" }\n'
+    (folder / "sticky.toml").write_text(law)
+    done = mstmm("simulate", "sticky.toml", "--times", "5", "-o", "run.csv")
+    assert done.code == 4
+    assert "no end in sight" in done.err
+    assert "'sign(u)' (effort of hinge \"pivot\") switches without end" in done.err
+
+
 def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> None:
     assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
     assert package.load_result(folder / "pendulum.nc").t[-1] == 0.1
@@ -152,6 +167,7 @@ def test_mass_that_leaves_a_motion_undetermined_is_bad_input(mstmm: Command, fol
         (("--rtol", "0"), "above 0"),
         (("--atol", "-1e-9"), "0 or more"),
         (("--step", "-0.1"), "above 0"),
+        (("--max-step", "0"), "above 0"),
         (("--times", "1"), "2 samples"),
         (("--times", "0.0"), "--times"),
         (("--times", "99999999999999999999"), "at most"),
