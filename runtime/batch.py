@@ -158,7 +158,8 @@ def _looped(engine: Engine, states: States, udot: Array) -> Callable[[int, int],
 def _error(engine: Engine, states: States, failed: Failed) -> NumericalFailure:
     i = failed.index
     error = engine.failed(failed.failure, float(states.t[i]), states.q[i], states.u[i])
-    return type(error)(f"{_named(states.lead, i)}{error}")
+    error.args = (f"{_named(states.lead, i)}{error}",)
+    return error
 
 
 def _named(lead: tuple[int, ...], index: int) -> str:

@@ -10,6 +10,7 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
+from mstmm.errors import UndeterminedMotion
 from mstmm.runtime.integrate import Status
 
 
@@ -86,8 +87,23 @@ def test_a_condition_that_is_not_a_number_ends_the_run_by_name(method: str) -> N
     event = {"name": "late", "when": "sqrt(1 - t) < -1", "do": "stop"}
     run = mstmm.compile(pair(event=[event])).simulate(5.0, method=method)
     assert run.status is Status.EVENT_FAILED and not run.success
-    assert 'the condition of event "late" is not a number at t = 1.00' in run.message
+    assert 'the condition of event "late" is not a number at t = 1' in run.message
     assert "last good state at t = " in run.message
+
+
+def test_a_state_of_a_batch_is_named_and_keeps_what_is_known_of_its_failure() -> None:
+    """A massless carriage, its rod without inertia about the axis of both: in line in state 1."""
+    thin = rod("rod") | {"inertia": [0, 1 / 12, 1 / 12]}
+    roll = {"name": "roll", "type": "pin", "axis": [1, 0, 0], "inboard": "ground",
+            "outboard": "carriage"}  # fmt: skip
+    fold = {"name": "fold", "type": "pin", "inboard": "carriage", "outboard": "rod",
+            "initial": {"q": [0.5]}}  # fmt: skip
+    bodies = [{"name": "carriage", "mass": 0.0}, thin]
+    scene = mstmm.Scene(gravity=(0, 0, 0), body=bodies, hinge=[roll, fold])
+    model = mstmm.compile(scene, engine="looped")
+    with pytest.raises(UndeterminedMotion, match='state 1: hinge "roll"') as refused:
+        model.accelerations(np.array([[0.0, 0.5], [0.0, 0.0]]), np.zeros(2))
+    assert refused.value.place == 0
 
 
 def test_a_quaternion_of_zeros_is_named() -> None:
