@@ -21,6 +21,7 @@ def refuse_special(path: Path, where: str) -> None:
     if os.path.exists(path) and not os.path.isfile(path):  # False where a folder is closed to us
         raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
 
+
 #: What is being written lies beside its place, PART, with a LOCK that ends with the writer.
 _MARK, _LOCK, _PART = ".mstmm-", ".lock", ".part"
 

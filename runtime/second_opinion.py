@@ -18,9 +18,10 @@ from mstmm.errors import SceneError
 
 from .endings import busiest, cause_of
 from .integrate import Samples, Statistics, Status
+from .interruptible import interruptible
 from .jacobian import Jacobian
 from .settings import Settings
-from .simulate import SceneSystem, Trajectory, interruptible, split, tolerances
+from .simulate import SceneSystem, Trajectory, split, tolerances
 
 if TYPE_CHECKING:
     from .model import Model
