@@ -16,12 +16,12 @@ from . import compiled_run, second_opinion
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .integrate import Run, Samples, Status
+from .interruptible import interruptible
 from .settings import Settings
 from .simulate import (
     SceneSystem,
     Trajectory,
     advance,
-    interruptible,
     make_run,
     said,
     trajectory,

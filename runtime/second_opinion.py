@@ -20,10 +20,11 @@ from mstmm.errors import SceneError
 from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
 from .integrate import Failure, Samples, Statistics, Status, failure_text
+from .interruptible import interruptible
 from .jacobian import Jacobian
 from .run_notes import endless, unseen
 from .settings import Settings
-from .simulate import SceneSystem, Trajectory, interruptible, split, tolerances
+from .simulate import SceneSystem, Trajectory, split, tolerances
 
 if TYPE_CHECKING:
     from .model import Model

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,6 +17,7 @@ from .endings import message_of
 from .engine import Engine, Probe
 from .fused import FusedLibrary
 from .integrate import Run, Samples, Statistics, Status
+from .interruptible import interruptible
 from .layout import StateNames
 from .pack import resize
 from .run_notes import unseen
@@ -30,14 +27,8 @@ from .switches import MOST
 
 Array = NDArray[np.float64]
 
-#: Signals that ask a run to end with what it has.
-INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
-
 #: Seconds between looks at progress, interrupts and checkpoints.
 SLICE = 0.1
-
-#: Seconds in which an interrupted run has to come to an end.
-PATIENCE = 5.0
 
 #: Bytes of samples at which a run stops and asks for output times.
 LARGEST = 2**30
@@ -250,33 +241,6 @@ def _energy(system: SceneSystem, t: float, y: Array) -> float:
         else f"the energy at t = {t:.9g} s is not finite; see "
         "whether masses, speeds and stiffnesses are of the size that was meant"
     )
-
-
-@contextmanager
-def interruptible() -> Iterator[list[bool]]:
-    """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
-
-    A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
-    Where nobody has looked at the flag for PATIENCE, the next signal is a KeyboardInterrupt.
-    """
-    flag, since = [False], [0.0]
-    if threading.current_thread() is not threading.main_thread():
-        yield flag
-        return
-
-    def note(*_: object) -> None:
-        if not flag[0]:
-            flag[0], since[0] = True, time.monotonic()
-        elif time.monotonic() - since[0] > PATIENCE:
-            raise KeyboardInterrupt
-
-    with ExitStack() as restored:
-        for which in INTERRUPTS:
-            previous = signal.getsignal(which)
-            if previous is not None and previous is not signal.SIG_IGN:
-                restored.callback(signal.signal, which, previous)
-                signal.signal(which, note)
-        yield flag
 
 
 def advance(

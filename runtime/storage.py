@@ -138,8 +138,9 @@ def _fits(model: Model, run: Trajectory) -> bool:
     expected = {
         "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
     }  # fmt: skip
-    last = run.last is None or (run.last[1].shape, run.last[2].shape) == ((model.nq,), (model.nu,))
-    return last and all(getattr(run, name).shape == shape for name, shape in expected.items())
+    states = [run.last[1:] if run.last is not None else None, run.start]
+    rows = all((q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states))
+    return rows and all(getattr(run, name).shape == shape for name, shape in expected.items())
 
 
 def _rebuilt(data: Any, path: Path) -> Result:

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import TypeVar
 
-from .simulate import SLICE, interruptible
+from .interruptible import interruptible
+from .simulate import SLICE
 
 T = TypeVar("T")
 

@@ -14,7 +14,7 @@ import pytest
 from cli.commands import Command
 
 from mstmm import errors
-from mstmm.runtime import execution, simulate, storage
+from mstmm.runtime import execution, interruptible, storage
 from mstmm.runtime.files import replacing
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
@@ -134,11 +134,11 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
 def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
     heard: None, monkeypatch: pytest.MonkeyPatch, which: signal.Signals
 ) -> None:
-    with simulate.interruptible() as flag:
+    with interruptible.interruptible() as flag:
         for _ in range(3):
             signal.raise_signal(which)
         assert flag == [True]
-        monkeypatch.setattr(simulate, "PATIENCE", -1.0)
+        monkeypatch.setattr(interruptible, "PATIENCE", -1.0)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(which)
     assert signal.getsignal(which) is signal.default_int_handler

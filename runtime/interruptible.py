@@ -1,0 +1,42 @@
+"""Ctrl-C and SIGTERM while something runs that must not be cut off just anywhere."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+#: Signals that ask a run to end with what it has.
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+
+#: Seconds in which an interrupted run has to come to an end.
+PATIENCE = 5.0
+
+
+@contextmanager
+def interruptible() -> Iterator[list[bool]]:
+    """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
+
+    A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
+    Where nobody has looked at the flag for PATIENCE, the next signal is a KeyboardInterrupt.
+    """
+    flag, since = [False], [0.0]
+    if threading.current_thread() is not threading.main_thread():
+        yield flag
+        return
+
+    def note(*_: object) -> None:
+        if not flag[0]:
+            flag[0], since[0] = True, time.monotonic()
+        elif time.monotonic() - since[0] > PATIENCE:
+            raise KeyboardInterrupt
+
+    with ExitStack() as restored:
+        for which in INTERRUPTS:
+            previous = signal.getsignal(which)
+            if previous is not None and previous is not signal.SIG_IGN:
+                restored.callback(signal.signal, which, previous)
+                signal.signal(which, note)
+        yield flag
