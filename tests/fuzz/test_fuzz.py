@@ -36,7 +36,8 @@ def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
 
 @pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
 def test_what_once_broke(worker: Worker, path: Path) -> None:
-    worker.ask(json.loads(path.read_text("utf-8")))
+    record = json.loads(path.read_text("utf-8"))
+    worker.ask(record["scene"], record["turn"])
     outcome = worker.answer()
     assert outcome.kind not in BAD, outcome
 
