@@ -70,6 +70,9 @@ class Start(Table):
     def _check(self) -> Start:
         if self.static and self.eta is not None:
             raise refuse("static gives the deformation itself; leave one of them out", "eta")
+        for key in ("eta", "etad"):
+            if getattr(self, key) == ():
+                raise refuse("expected one number per shape, found none; leave it out", key)
         return self
 
 

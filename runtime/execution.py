@@ -103,7 +103,8 @@ def first_run(
     system = SceneSystem(engine, compiled)
     start = system.start(settings.t_start, q, u)
     step = check_step(engine, get(settings.method), settings, start, system.memory)
-    run, message = make_run(system, settings, q, u), ""
+    run = make_run(system, settings, q, u)
+    message = "" if run.status is Status.RUNNING else said(system, run, run.status)
     if state is not None and earlier is not None and watch.checkpoint is not None:
         message = _restored(run, state, earlier, watch.checkpoint)
     look = 0 if compiled else compiled_run.look_after(model, settings)

@@ -118,7 +118,9 @@ def check_slew(model: mstmm.Model) -> None:
     energy = result.energy() - result.energy()[0]
     slow = t >= 8
     rest = float(np.ptp(L[slow], axis=0).max())
-    bent = abs(result.deflection("east", "tip")[slow, 1:]).max(axis=0)
+    arm = result.position("east.tip") - result.position("hub.right")
+    back = result.orientation("hub") * [1, -1, -1, -1]
+    bent = abs(turned(back, arm)[slow, 1:]).max(axis=0)
     angle = 2 * np.arccos(np.clip(abs(result.orientation("hub")[-1, 0]), 0, 1))
     print(f"turned by {np.degrees(angle):.1f} degrees; tips swing by {bent.round(4)} m afterwards")
     print(f"momentum {abs(result.momentum()).max():.1e} N s; angular momentum less torque ", end="")

@@ -26,7 +26,7 @@ UNIT = 2.0**-53
 
 
 class Interpreted:
-    """The fused IR of a model with plain floats, and how rounding of the scene's numbers moves it.
+    """The fused IR of a model with plain floats, and how rounding of numbers and state moves it.
 
     A body whose frame is far from the section that is held may pass rounding of its moments on a
     thousandfold, and the mass matrix passes rounding on by its condition; no engine can be nearer
@@ -40,17 +40,22 @@ class Interpreted:
             "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
             "memory": [0.0] * structure.n_memory,
         }  # fmt: skip
-        self.udot = self._at(p)
+        self.udot = self._at(p, q, u)
         rng, step = np.random.default_rng(1), 1e-8
-        moved = [self._at(p * (1 + step * rng.uniform(-1, 1, len(p)))) for _ in range(3)]
+        moved = [
+            self._at(*(x * (1 + step * rng.uniform(-1, 1, len(x))) for x in (p, q, u)))
+            for _ in range(6)
+        ]
         sensitive = max(worst(udot, self.udot) for udot in moved) * UNIT / step
         matrix = model.mass_matrix(q)
         size = np.sqrt(np.diag(matrix))
         condition = float(np.linalg.cond(matrix / np.outer(size, size))) if len(size) else 1.0
-        self.allowed = max(AGREEMENT, 30 * sensitive, 10 * UNIT * condition)
+        solved = max(10, 2 * len(size)) * UNIT * condition  # n equations: n rounding errors each
+        self.allowed = max(AGREEMENT, 30 * sensitive, solved)
 
-    def _at(self, p: Array) -> Array:
-        return np.array(evaluate_floats(self.kernel, self.inputs | {"p": list(p)})["udot"])
+    def _at(self, p: Array, q: Array, u: Array) -> Array:
+        given = self.inputs | {"p": list(p), "q": list(q), "u": list(u)}
+        return np.array(evaluate_floats(self.kernel, given)["udot"])
 
 
 def compiled(scene: dict[str, Any], engine: str) -> mstmm.Model:

@@ -127,7 +127,7 @@ def test_a_trial_that_failed_and_recovered_is_not_blamed_for_the_end(
     assert not run.success and "band" not in run.message and "0.5" in run.message
 
 
-def test_ctrl_c_ends_a_step_of_endless_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_ends_a_step_of_endless_trials(heard: None, monkeypatch: pytest.MonkeyPatch) -> None:
     class Endless(scipy.integrate.RK45):
         def _step_impl(self) -> Any:
             for _ in range(1000):
