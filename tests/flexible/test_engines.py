@@ -51,7 +51,7 @@ class Interpreted:
         size = np.sqrt(np.diag(matrix))
         condition = float(np.linalg.cond(matrix / np.outer(size, size))) if len(size) else 1.0
         solved = max(10, 2 * len(size)) * UNIT * condition  # n equations: n rounding errors each
-        self.allowed = max(AGREEMENT, 30 * sensitive, solved)
+        self.allowed = max(AGREEMENT, 100 * sensitive, solved)
 
     def _at(self, p: Array, q: Array, u: Array) -> Array:
         given = self.inputs | {"p": list(p), "q": list(q), "u": list(u)}
