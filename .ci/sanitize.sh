@@ -28,4 +28,4 @@ LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.
 
 echo "--- changed scenes, sanitized"
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m tests.fuzz \
-    --count 40 --seed 9 --first 43 --memory 0 --cpu 120 --keep "$scratch/found"
+    --count 15 --seed 9 --first 43 --memory 0 --cpu 120 --keep "$scratch/found"

@@ -12,7 +12,7 @@ import numpy as np
 from ..modal_body import Array, ModalPort
 from . import kernels as beam_kernels
 from .data import BeamData, BeamSections
-from .gauss import gauss_between
+from .gauss import density_of, gauss_between
 from .second_order import SecondOrder
 from .shapes import Shape
 
@@ -76,7 +76,7 @@ class BeamShapes:
         self.pieces = tuple(
             b for a, b in zip((-data.length, *places), places, strict=False) if b - a > smallest
         )  #: every place between which all shapes and sections are smooth
-        self.density = max((mode.shape.density for mode in modes), default=0.0)
+        self.density = density_of([mode.shape for mode in modes])
         self.second_order = SecondOrder(self, frames)
 
     @property

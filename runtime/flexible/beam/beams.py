@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -154,11 +155,12 @@ def _described(choice: Choice, count: int) -> str:
 
 def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
     """Gauss points with the slices' mass: 3 n + 4 of them, n shapes of the finest direction, shared
-    among the pieces by length."""
+    by length among the pieces between changes of section and ends."""
     n = max((sum(m.direction == d for m in shapes.modes) for d in DIRECTIONS), default=0)
     total = 3 * n + 4
     points = []
-    for a, b in zip(shapes.pieces, shapes.pieces[1:], strict=False):
+    places = sorted({*shapes.breaks, *(x for x, _ in shapes.data.ends.values())})
+    for a, b in pairwise(places):
         count = max(4, int(np.ceil(total * (b - a) / shapes.length)))
         nodes, weights = np.polynomial.legendre.leggauss(count)
         for t, w in zip(nodes, weights, strict=True):

@@ -20,7 +20,7 @@ from mstmm.errors import SceneError
 from ..modal_body import Array
 from .beam_shapes import Mode
 from .data import BeamData
-from .gauss import gauss_between
+from .gauss import density_of, gauss_between
 from .shapes import Moved, Shape
 
 #: What is left of a shape without its rigid part, or without the shapes before it, as a share of
@@ -107,8 +107,7 @@ def _rule(data: BeamData, direction: str, shapes: list[Shape]) -> tuple[Array, A
     """(x, mass, inertia of turning sections) of a quadrature along the beam, per direction."""
     places = np.unique([*data.breaks, *(b for shape in shapes for b in shape.breaks)])
     places = places[(places >= 0) & (places <= data.length)]
-    density = max((shape.density for shape in shapes), default=0.0)
-    x, w = gauss_between(places, density)
+    x, w = gauss_between(places, density_of(shapes))
     mass, yy, zz = data.inertia[:, data.piece(x)]
     if direction == "twist":
         polar = yy + zz
