@@ -267,9 +267,26 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str 
     return Rule(expected, check, forms[0] if len(forms) == 1 else {"anyOf": forms})
 
 
+#: Entries of vectors: products of two of them must be numbers as well.
+_LARGEST = 1e150
+
+
 def vector(of: str) -> Rule:
-    """Three numbers in the unit `of`."""
-    return numbers(f"three numbers{_unit(of)}", 3, of=of.partition(",")[0])
+    """Three numbers in the unit `of`, whose squares are finite."""
+    inner = numbers(f"three numbers{_unit(of)}", 3, of=of.partition(",")[0])
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        for i, entry in enumerate(result):
+            if abs(entry) > _LARGEST:
+                raise refuse(
+                    f"expected a number{_unit(of)} of {_LARGEST:g} at most in size, found "
+                    f"{found(entry)}; its square is beyond what numbers hold",
+                    i,
+                )
+        return result
+
+    return Rule(inner.expected, check, inner.schema)
 
 
 def direction() -> Rule:

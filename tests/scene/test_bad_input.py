@@ -361,3 +361,16 @@ def test_in_python_the_scene_stands_for_the_file() -> None:
 def test_keys_that_are_words_of_python() -> None:
     assert "unknown key" in message_of(arm() | {"self": 1})
     assert "unknown key" in message_of(arm() | {"__class__": 1, "data": 2, "where": 3})
+
+
+def test_an_end_beyond_what_numbers_hold_is_refused() -> None:
+    """Its velocity would be infinite in a run that calls itself a success."""
+    scene: Data = {
+        "gravity": [0, 0, -9.81],
+        "body": [
+            {"name": "top", "mass": 1.0, "inertia": [1, 1, 1], "ends": {"head": [0, 0, 1.7e308]}}
+        ],
+        "hinge": [{"name": "point", "type": "ball", "inboard": "ground", "outboard": "top"}],
+    }
+    with pytest.raises(SceneError, match=r"head.*1e\+150 at most.*1.7e\+308"):
+        Scene(**scene)
