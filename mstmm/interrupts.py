@@ -13,6 +13,7 @@ from __future__ import annotations
 import _signal
 import os
 import sys
+import time
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -27,8 +28,9 @@ CODE = 130
 
 _SIGNALS = (_signal.SIGINT, _signal.SIGTERM)
 
-#: Seconds after which an interrupt comes again that met code which cannot raise.
-_AGAIN = 0.01
+#: Seconds after which an interrupt comes again that met code which cannot raise, and those that an
+#: import has to come to its end.
+_AGAIN, _IMPORT = 0.001, 1.0
 
 _seen: list[int] = []
 
@@ -53,19 +55,39 @@ def end_at_once(code: int = CODE, word: bytes = b"mstmm: interrupted\n") -> None
         _end(code, word)
 
     _handle(end)
+    if _seen and _signal.setitimer(_signal.ITIMER_REAL, 0.0)[0]:  # one was to come again
+        _end(CODE, b"mstmm: interrupted\n")
 
 
 def raise_in_the_command() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, and the second one ends the process."""
+    """From now on an interrupt is a KeyboardInterrupt, and the second one ends the process.
+
+    An import is not cut off in its middle, unless it takes long: what it loads may tell of the
+    exception in its own words, as libraries written in other languages do.
+    """
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _seen:
             _end(CODE, b"mstmm: interrupted\n")
         _seen.append(number)
-        raise KeyboardInterrupt
+        raise_when_loaded(time.monotonic() + _IMPORT, frame)
+
+    def raise_when_loaded(latest: float, frame: FrameType | None) -> None:
+        if time.monotonic() < latest and _importing(frame):
+            _call_again(lambda _, later: raise_when_loaded(latest, later))
+        else:
+            raise KeyboardInterrupt
 
     _handle(interrupt)
     sys.unraisablehook = _lost
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _handle(handler: Handler) -> None:
@@ -92,5 +114,9 @@ def _lost(unraisable: sys.UnraisableHookArgs) -> None:
     def again(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    _signal.signal(_signal.SIGALRM, again)
+    _call_again(again)
+
+
+def _call_again(handler: Handler) -> None:
+    _signal.signal(_signal.SIGALRM, handler)
     _signal.setitimer(_signal.ITIMER_REAL, _AGAIN)
