@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +45,9 @@ _LOOKS = np.linspace(0.0, 1.0, 9)[1:]
 
 #: Steps in a row that do not move the time: the integrator has given up without saying so.
 _STUCK = 20
+
+#: LSODA before SciPy 1.17 keeps its state in one place for the whole process: one run at a time.
+_ONE_LSODA = RLock()
 
 #: Two breaks so near to each other, as part of the time or the run, are one.
 _GAP = 2.0**-39
@@ -125,7 +130,11 @@ def integrate(
     """
     if settings.step is not None:
         raise SceneError(f"method {settings.method!r} chooses its own steps: leave step out")
-    return _Loop(model, settings, tell).run(q, u)
+    alone: AbstractContextManager[object] = nullcontext()
+    if METHODS[settings.method] == "LSODA":
+        alone = _ONE_LSODA
+    with alone:
+        return _Loop(model, settings, tell).run(q, u)
 
 
 class _Loop:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -59,6 +61,25 @@ def test_an_event_that_holds_from_the_start_fires_at_once() -> None:
     for method in ("dop853", "scipy-RK45"):
         run = model.simulate(1.0, method=method)
         assert run.status is Status.STOPPED and run.t[-1] == 0.0
+
+
+def test_runs_of_lsoda_side_by_side() -> None:
+    """Before SciPy 1.17 it keeps its state in one place: two at once end in errors, or worse."""
+    models = [mstmm.compile(pins(n, [0.3] * n)) for n in (1, 3)]
+
+    def run(n: int) -> Array:
+        return np.array(models[n].simulate(0.5, method="scipy-LSODA", certify=False).q[-1])
+
+    alone = [run(0), run(1)]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(run, [0, 1] * 4))
+    finally:
+        sys.setswitchinterval(before)
+    for k, q in enumerate(found):
+        np.testing.assert_array_equal(q, alone[k % 2])
 
 
 def test_a_jump_in_an_effort_is_a_break_in_time() -> None:
