@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 from flexible import elastic_bar as bar
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.runtime.flexible.elastic import mesh
 from mstmm.runtime.flexible.elastic.bodies import elastic_bodies
 
 meshio = pytest.importorskip("meshio", reason="comes with the extra test")
@@ -127,6 +129,42 @@ def test_a_mesh_too_large_is_refused_unmade(monkeypatch: pytest.MonkeyPatch) -> 
         bar.body(bar.table(box=fine))
     with pytest.raises(SceneError, match=r"208333 hexahedra of degree 1 or fewer"):
         bar.body(bar.table(box=fine, order=1))
+
+
+def test_meshes_are_factorised_sparsely_and_no_oftener_than_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A plate whose unknowns are taken as they come fills six times more than the matrix holds."""
+    fills, known = [], scipy.sparse.linalg.splu
+
+    def counted(matrix: Any, *given: Any, **how: Any) -> Any:
+        found = known(matrix, *given, **how)
+        fills.append((found.L.nnz + found.U.nnz) / matrix.nnz)
+        return found
+
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", counted)
+    box = {"size": [1.0, 0.05, 0.4], "divisions": [8, 1, 16]}
+    bar.body(bar.table(box=box, modes=2))
+    assert len(fills) == 2 and max(fills) < 3  # with both its sections held, then with one
+
+
+@pytest.mark.parametrize("element", ["ElementTetP1", "ElementTetP2"])
+def test_stiffness_is_that_of_the_form_of_vectors(element: str) -> None:
+    from skfem.helpers import ddot, sym_grad, trace
+
+    vector = skfem.Basis(
+        skfem.MeshTet().refined(1), skfem.ElementVector(getattr(skfem, element)()), intorder=4
+    )
+    material = mesh.Material(young=3.0, poisson=0.3, density=1.0)
+    first, second = material.lame
+
+    def energy(u: Any, v: Any, w: Any) -> Any:
+        strain, virtual = sym_grad(u), sym_grad(v)
+        return first * trace(strain) * trace(virtual) + 2 * second * ddot(strain, virtual)
+
+    expected = skfem.BilinearForm(energy).assemble(vector).toarray()
+    found = mesh._stiffness(vector.with_element(getattr(skfem, element)()), material).toarray()
+    np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("package", ["skfem", "meshio"])

@@ -96,6 +96,8 @@ def _one_piece(model: ElasticModel) -> None:
 
 def _definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> None:
     """No negative eigenvalue beyond rounding, by the signs of the pivots of the scaled matrix."""
+    if model.definite:
+        return
     diagonal = matrix.diagonal()
     row = int(np.argmin(diagonal))
     if diagonal[row] < 0:

@@ -168,11 +168,12 @@ def mesh_model(
     return ElasticModel(
         where=where,
         mass=_each_direction(mass),
-        stiffness=_stiffness(skfem, vector, material),
+        stiffness=_stiffness(scalar, material),
         nodes=np.ascontiguousarray(scalar.doflocs.T),
         scalar_mass=mass.tocsr(),
         sets=_sets(mesh, scalar),
         stress=MeshStress(vector, material),
+        definite=True,  # sums of squares with positive weights
         notes=(f"{mesh.nelements} elements of degree {order}, {vector.N} unknowns",),
         warnings=(f"{where}: {LOCKING}",) if order == 1 else (),
     )
@@ -224,18 +225,26 @@ def _each_direction(scalar: Any) -> Any:
     return sparse.csr_array(sparse.kron(sparse.csr_array(scalar), sparse.eye_array(3)))
 
 
-def _stiffness(skfem: Any, basis: Any, material: Material) -> Any:
-    """Stiffness of (8.25) to (8.32) of Rui, Wang, Zhang in their weak form."""
+def _stiffness(scalar: Any, material: Material) -> Any:
+    """Stiffness of (8.25) to (8.32) of Rui, Wang, Zhang in their weak form, node by node.
+
+    For all elements at once: as a form of vectors every pair of shapes would be taken by itself.
+    """
     from scipy import sparse
-    from skfem.helpers import ddot, sym_grad, trace
 
     first, second = material.lame
-
-    def energy(u: Any, v: Any, w: Any) -> Any:
-        strain, virtual = sym_grad(u), sym_grad(v)
-        return first * trace(strain) * trace(virtual) + 2 * second * ddot(strain, virtual)
-
-    return sparse.csr_array(skfem.BilinearForm(energy).assemble(basis))
+    shapes, cells = scalar.element_dofs.shape
+    along = np.stack([np.asarray(one[0].grad) for one in scalar.basis])  # shape, axis, cell, point
+    points = along.transpose(2, 0, 1, 3).reshape(cells, 3 * shapes, -1)
+    weighted = points * np.asarray(scalar.dx)[:, None, :]
+    pairs = (weighted @ points.transpose(0, 2, 1)).reshape(cells, shapes, 3, shapes, 3)
+    alike = np.trace(pairs, axis1=2, axis2=4)[:, :, None, :, None] * np.eye(3)[:, None, :]
+    local = first * pairs + second * (pairs.swapaxes(2, 4) + alike)
+    places = (3 * scalar.element_dofs.T[:, :, None] + np.arange(3)).reshape(cells, 3 * shapes)
+    rows = np.repeat(places, 3 * shapes, axis=1).ravel()
+    columns = np.tile(places, (1, 3 * shapes)).ravel()
+    size = 3 * scalar.N
+    return sparse.csr_array(sparse.coo_array((local.ravel(), (rows, columns)), shape=(size, size)))
 
 
 def _sets(mesh: Any, scalar: Any) -> Mapping[str, Any]:

@@ -81,8 +81,13 @@ class Sections:
         return found
 
     def clamped(self, held: Sequence[Port]) -> Clamped:
-        """The same body with the sections of some ports held."""
-        return Clamped(self, tuple(held))
+        """The same body with the sections of some ports held, factorised once."""
+        names = tuple(port.name for port in held)
+        return self._clamped.setdefault(names, Clamped(self, tuple(held)))
+
+    @cached_property
+    def _clamped(self) -> dict[tuple[str, ...], Clamped]:
+        return {}
 
 
 @dataclass(frozen=True)
@@ -122,10 +127,12 @@ class Clamped:
         matrix = self.sections.stiffness.tocsc()[free][:, free]
         #  rows of the size of the stiffness, or pivoting would take them first
         scale = float(np.max(np.abs(matrix.diagonal())))
-        if rows is not None:
+        options: dict[str, object] = {"diag_pivot_thresh": 0.01, "options": {"SymmetricMode": True}}
+        if rows is not None:  # indefinite
             matrix = sparse.block_array([[matrix, scale * rows.T], [scale * rows, None]])
+            options = {}
         try:
-            lu = splu(sparse.csc_array(matrix))
+            lu = splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", **options)
         except RuntimeError:
             raise self.sections.model.refuse(
                 "stiffness: expected a body that is stiff once an end is held, found one that "
