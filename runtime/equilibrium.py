@@ -44,7 +44,7 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Equilibri
     try:
         found = at_rest(problem, q, tolerance)
     except Undetermined as failure:
-        names = ", ".join(model.layout.u_name(int(free[k])) for k in failure.places)
+        names = _some([model.layout.u_name(int(free[k])) for k in failure.places])
         raise NumericalFailure(
             f"the equilibrium is undetermined along {names}: nothing pushes these coordinates "
             "back; fix them, drive them or add a stiffness"
@@ -116,6 +116,12 @@ def _with_drives(model: Model, q: Array, t: float) -> Array:
     from .simulate import SceneSystem
 
     return SceneSystem(model._engine).start(t, q, np.zeros(model.nu))[: model.nq]
+
+
+def _some(names: list[str]) -> str:
+    """All of a few names, the first of many and how many there are besides."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _largest(model: Model, free: list[int], residual: Array, sizes: Array) -> str:

@@ -109,7 +109,7 @@ def respond(model: Model, run: Trajectory) -> OneWay:
         spent += sampled.statistics.evaluations
         observed = Observed(model, sampled)
         loads = {
-            name: grid.polynomials(modal_loads(model, body, observed))
+            name: grid.polynomials(_finite(modal_loads(model, body, observed), name, observed))
             for name, body in rigid.one_way.items()
         }
         error = max((_error(rigid.one_way[n], grid, p) for n, p in loads.items()), default=0.0)
@@ -149,9 +149,12 @@ def _sampled(model: Model, run: Trajectory, grid: Cells) -> Trajectory:
         float(grid.samples[-1]), s.method, s.step, s.rtol, s.atol, grid.samples, t_start=t,
         initial=(q, u), max_step=s.max_step, max_steps=s.max_steps,
     )  # fmt: skip
-    if not result.success:
-        raise NumericalFailure(f"one-way response: the run could not be repeated: {result.message}")
-    return _without_events(result.trajectory, grid)
+    repeated = result.trajectory  # its loads are judged, and nothing else of it is used
+    if not repeated.success:
+        raise NumericalFailure(
+            f"one-way response: the run could not be repeated: {repeated.message}"
+        )
+    return _without_events(repeated, grid)
 
 
 def _without_events(run: Trajectory, grid: Cells) -> Trajectory:
@@ -199,6 +202,13 @@ def modal_loads(model: Model, body: ModalBody, observed: Observed) -> Array:
         port = body.ports[end]
         loads = loads + inward(load[:, :3]) @ port.phi + inward(load[:, 3:]) @ port.theta
     return np.asarray(loads)
+
+
+def _finite(loads: Array, name: str, observed: Observed) -> Array:
+    if not np.isfinite(loads).all():
+        why = next(iter(observed.failures), "they are beyond what numbers hold")
+        raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {why}')
+    return loads
 
 
 def split_node(node: str) -> tuple[str, str]:

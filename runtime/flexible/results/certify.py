@@ -78,13 +78,13 @@ class Flexibility:
     @property
     def frame_error(self) -> float:
         """kappa^2 / 2, at most 1: what one frame may err by, as a part of the deflection."""
-        return min(self.slope**2 / 2, 1.0)
+        return min(self.slope * self.slope / 2, 1.0)  # ** raises where this is infinite
 
     @property
     def shortening_error(self) -> float:
         """kappa^2: the same as a part of how far a bent body shortens, which goes with the square
         of its deflection and so errs by twice as much."""
-        return self.slope**2
+        return self.slope * self.slope
 
     @property
     def load_ratio(self) -> float:
