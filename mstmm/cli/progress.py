@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -67,4 +68,28 @@ def bar() -> Iterator[Bar]:
         made.stop()
 
 
-Progress = Callable[[float, float], None]
+@contextmanager
+def waiting(text: str) -> Iterator[None]:
+    """On a terminal a sentence and the seconds that have passed, for work without a measure."""
+    ended = threading.Event()
+
+    def show() -> None:
+        if ended.wait(PATIENCE):
+            return
+        from rich.console import Console
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+            shown.add_task(text, total=None)
+            ended.wait()
+
+    thread = threading.Thread(target=show, daemon=True)
+    if sys.stderr.isatty():
+        thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        if thread.ident is not None:
+            thread.join()

@@ -15,7 +15,7 @@ from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError, NumericalF
 
 from .extras import need_for, result_ending
 from .options import Json, Times, not_negative, output_file, positive, python_file, times
-from .progress import Bar, bar
+from .progress import Bar, bar, waiting
 
 if TYPE_CHECKING:
     from mstmm.runtime.model import Model
@@ -236,8 +236,9 @@ def compiled(
     import mstmm
 
     try:
-        model = mstmm.compile(scene, engine=engine, sweep=sweep, flexibility=flexibility)
-        udot = model.accelerations(*model.initial_state())
+        with waiting("preparing the scene"):
+            model = mstmm.compile(scene, engine=engine, sweep=sweep, flexibility=flexibility)
+            udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
         lines = str(error).splitlines()
         named = (f"{path}: " + line.removeprefix("scene: ") for line in lines)

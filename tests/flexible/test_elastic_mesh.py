@@ -125,10 +125,20 @@ def test_ends_are_looked_at_before_anything_long(monkeypatch: pytest.MonkeyPatch
 def test_a_mesh_too_large_is_refused_unmade(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr("mstmm.runtime.flexible.elastic.bodies.box_mesh")
     fine = bar.table()["box"] | {"divisions": [384, 384, 384]}
-    with pytest.raises(SceneError, match=r"18289 hexahedra of degree 2 or fewer, found 56623104"):
+    with pytest.raises(SceneError, match=r"6096 hexahedra of degree 2 or fewer, found 56623104"):
         bar.body(bar.table(box=fine))
-    with pytest.raises(SceneError, match=r"208333 hexahedra of degree 1 or fewer"):
+    with pytest.raises(SceneError, match=r"69444 hexahedra of degree 1 or fewer"):
         bar.body(bar.table(box=fine, order=1))
+
+
+def test_a_factorisation_too_long_is_refused_unbegun(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cube of as many cells as a plate needs far more."""
+    for name in ("scipy.sparse.linalg.splu", "scipy.sparse.linalg.eigsh"):
+        monkeypatch.delattr(name)
+    monkeypatch.setattr("mstmm.runtime.flexible.elastic.checks.MOST_WORK", 1e8)
+    cube = bar.table()["box"] | {"divisions": [4, 4, 4]}
+    with pytest.raises(SceneError, match=r"2187 unknowns .* 1e\+08 multiplications .*, found 4"):
+        bar.body(bar.table(box=cube))
 
 
 def test_meshes_are_factorised_sparsely_and_no_oftener_than_held(

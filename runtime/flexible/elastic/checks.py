@@ -16,6 +16,9 @@ SYMMETRIC = 1e-9
 RIGID = 1e-6
 #: Negative eigenvalues below this part of the diagonal are rounding.
 DEFINITE = 1e-9
+#: Most multiplications of a factorisation row by row, unknowns numbered for the least: about half a
+#: minute for the one that is used, which needs a tenth of them.
+MOST_WORK = 5e11
 #: Smallest entry of a matrix, square of a frequency and length, and the inverse of the largest.
 _TINY = 1e-60
 _MOTIONS = ("translation along x", "translation along y", "translation along z",
@@ -39,6 +42,7 @@ def checked(model: ElasticModel) -> ElasticModel:
     )
     _sizes(model)
     _one_piece(model)
+    _affordable(model)
     _definite(model, "mass", model.mass, "kg")
     _equal_masses(model)
     _rigid_motions(model)
@@ -79,18 +83,43 @@ def _symmetric(model: ElasticModel, key: str, matrix: Any) -> Any:
 
 
 def _one_piece(model: ElasticModel) -> None:
-    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    d, n = model.unknowns, len(model.nodes)
-    entries = model.stiffness.tocoo()
-    graph = csr_array((np.ones(entries.nnz), (entries.row // d, entries.col // d)), shape=(n, n))
-    pieces, labels = connected_components(graph, directed=False)
+    pieces, labels = connected_components(_joined(model), directed=False)
     if pieces > 1:
         first = int(np.flatnonzero(labels != labels[0])[0])
         raise model.refuse(
             f"stiffness: expected one connected body, found {pieces} pieces (node {first}, counted "
             f"from 0, is not joined to node 0); join them, or leave out nodes without elements"
+        )
+
+
+def _joined(model: ElasticModel) -> Any:
+    """Sparse (N, N): which nodes push on which."""
+    from scipy.sparse import csr_array
+
+    d, n = model.unknowns, len(model.nodes)
+    entries = model.stiffness.tocoo()
+    places = (entries.row // d, entries.col // d)
+    return csr_array((np.ones(entries.nnz, np.int8), places), shape=(n, n))
+
+
+def _affordable(model: ElasticModel) -> None:
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    joined = _joined(model).tocoo()
+    place = np.empty(len(model.nodes), np.int64)
+    place[reverse_cuthill_mckee(joined.tocsr(), symmetric_mode=True)] = np.arange(len(place))
+    rows, columns = place[joined.row], place[joined.col]
+    reach = np.zeros(len(place))
+    np.maximum.at(reach, rows, np.maximum(rows - columns, 0).astype(float))
+    work = model.unknowns**3 * float(np.sum(reach**2))
+    if work > MOST_WORK:
+        raise model.refuse(
+            f"stiffness: expected a body whose {model.stiffness.shape[0]} unknowns can be solved "
+            f"for with {MOST_WORK:.0e} multiplications (half a minute), found {work:.1e}; take "
+            "fewer divisions or a coarser mesh (a slender or thin body may have many more than a "
+            "compact one), or name the matrices of a reduced model in `matrices`"
         )
 
 

@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
 #: Points of integration that are taken together.
 _TOGETHER = 20_000
-#: Entries of all elements' stiffness matrices: 3 GB, and some minutes.
-MOST_ENTRIES = 120_000_000
+#: Entries of all elements' stiffness matrices: 4 GB, and about a minute.
+MOST_ENTRIES = 40_000_000
 
 LOCKING = (
     "elements of degree 1 are too stiff in bending (by 30 % in frequency with two layers); "

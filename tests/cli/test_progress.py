@@ -1,0 +1,37 @@
+"""What a terminal shows of work that takes long."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+
+import pytest
+
+from mstmm.cli import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("stream", [Terminal(), io.StringIO()], ids=["terminal", "file"])
+def test_work_without_a_measure_is_shown_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, stream: io.StringIO
+) -> None:
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    with progress.waiting("preparing the scene"):
+        latest = time.monotonic() + 20
+        while stream.isatty() and "0:00:0" not in stream.getvalue() and time.monotonic() < latest:
+            time.sleep(0.01)
+    assert ("preparing the scene" in stream.getvalue()) == stream.isatty()
+
+
+def test_short_work_is_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(progress, "PATIENCE", 1e6)
+    with progress.waiting("preparing the scene"):
+        pass
+    assert sys.stderr.getvalue() == ""  # type: ignore[attr-defined]
