@@ -16,6 +16,7 @@ from .coupling import couplings
 from .observe import elastic_moment
 from .observe_energy import frequencies, modal_energy, strain_energy
 from .observe_loads import section_loads
+from .sideways import rule, sideways
 
 if TYPE_CHECKING:
     from .observe import Motion
@@ -56,6 +57,8 @@ class Flexibility:
             the section's radius of gyration is not known.
         strain: largest strain of its axis and, where the radius of gyration is known, of its
             outermost fibres; None where it has no length.
+        sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
+            where it has all shapes.
         said: what is known of the body's model before it moves, one sentence each.
     """
 
@@ -73,6 +76,7 @@ class Flexibility:
     coupling: tuple[float, str] | None
     shear: float | None
     strain: float | None = None
+    sideways: float | None = None
     said: tuple[str, ...] = ()
 
     @property
@@ -118,14 +122,14 @@ def _one(
     motion, some = whole.some(good), good[picked]
     slope, shapes = e.largest_slope(bent_all), body.shapes
     first = float(frequencies(body)[0])
-    judged = shapes is not None and slope > _STRAIGHT
+    tail, aside = _from_sections(flexible, name, some, line) if shapes is not None else (None, None)
     return Flexibility(
         name, len(body.modes), body.frame,
         bool(np.any(body.G)) if shapes is None else bool(shapes.stiffening),
         slope, e.largest_turn(bent_all), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
-        _tail(flexible, name, some) if judged else None, _leading(motion, coupling),
-        e.shear_error(body, line), e.largest_strain(bent_all), body.warnings,
+        tail if slope > _STRAIGHT else None, _leading(motion, coupling),
+        e.shear_error(body, line), e.largest_strain(bent_all), aside, body.warnings,
     )  # fmt: skip
 
 
@@ -156,18 +160,24 @@ def _gamma(
         return None
 
 
-def _tail(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
-    """Bending energy of the difference of the true moments and those of the shapes, over the
-    former."""
+def _from_sections(
+    flexible: FlexibleBodies, name: str, some: NDArray[np.int64], line: float | None
+) -> tuple[float | None, float | None]:
+    """What the true loads of a beam's sections tell: bending energy of the difference of their
+    moments and those of the shapes, over that of the former; and `sideways`."""
     motion = flexible.motion(name).some(some)
     if not len(some):
-        return None
-    places, weights = motion.shapes.rule()
+        return None, None
+    held = flexible.held_place(name)
+    places, weights = rule(motion.shapes, held)
     points = [p.some(some) for p in flexible.point_loads(name)]
     lines = [line.some(some) for line in flexible.line_loads(name)]
-    held = flexible.held_place(name)
-    _, moment = section_loads(motion, places, flexible.gravity, held, points, lines)
-    return missed(motion, places, weights, moment[:, :, 1:])
+    force, moment = section_loads(motion, places, flexible.gravity, held, points, lines)
+    length = motion.shapes.length if line is None else line
+    return (
+        missed(motion, places, weights, moment[:, :, 1:]),
+        sideways(motion.body, places, weights, held, length, force, moment),
+    )
 
 
 def missed(motion: Motion, places: Array, weights: Array, moment: Array) -> float | None:
@@ -242,7 +252,7 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
 
 def warnings(found: Sequence[Flexibility]) -> list[str]:
     """What speaks against the model, one sentence per kind, for the worst body of each."""
-    kinds = (_linear, _steep, _turned, _strained, _missed, _buckled, _sheared)
+    kinds = (_linear, _steep, _turned, _strained, _missed, _buckled, _aside, _sheared)
     sentences = []
     for kind in kinds:
         said = [text for text in map(kind, _worst_first(found)) if text]
@@ -319,6 +329,15 @@ def _buckled(one: Flexibility) -> str:
     return (
         f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
         "its buckling load, by compression, or sideways by bending moments at work on its twist"
+    )
+
+
+def _aside(one: Flexibility) -> str:
+    if one.sideways is None or one.sideways < -BUCKLING:
+        return ""
+    return (
+        f'the loads of "{one.name}" reach {one.sideways:.0%} of those that buckle it out of the '
+        "plane of its shapes, which does not show: give it shapes of y, z and twist"
     )
 
 
