@@ -57,6 +57,11 @@ class Plan:
     max_step: float = 0.0
 
     @property
+    def resumable(self) -> bool:
+        """SciPy's integrators keep no checkpoints."""
+        return not self.method.startswith("scipy-")
+
+    @property
     def checkpoint(self) -> Path:
         """Where an interrupted run keeps its state."""
         return self.output.with_name(self.output.name + ".checkpoint")
@@ -258,7 +263,7 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
         max_step=plan.max_step, progress=progress, resume=plan.resume,
-        checkpoint=None if plan.method.startswith("scipy-") else str(plan.checkpoint),
+        checkpoint=str(plan.checkpoint) if plan.resumable else None,
     )  # fmt: skip
 
 
@@ -353,13 +358,15 @@ def _report(plan: Plan, result: Result, seconds: float, json: bool) -> None:
     if json:
         data = report.to_json(result, seconds, _verdict(plan, result))
         data |= {"scene": plan.scene, "files": made}
-        if interrupted(result):
+        if interrupted(result) and plan.resumable:
             data["checkpoint"] = str(plan.checkpoint)
         output.emit_json(data)
     else:
         _say(plan, result, seconds, made)
-    if interrupted(result):
+    if interrupted(result) and plan.resumable:
         output.complain(f"{result.message}; continue with the same command and --resume")
+    elif interrupted(result):
+        output.complain(f"{result.message}; what was computed is in {plan.output}")
     elif not result.success:
         output.complain(f"{plan.scene}: {result.message}; what was computed is in {plan.output}")
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 import mstmm as package
 from cli.commands import PENDULUM, Command
@@ -47,6 +49,24 @@ def test_the_verdict_comes_first(mstmm: Command) -> None:
     data = json.loads(mstmm(*command, "--accuracy", "1e-15", "--json").out)
     assert data["success"] and not data["trusted"]
     assert data["verdict"].startswith("NOT trusted")
+
+
+def test_an_interrupted_run_of_scipy_promises_no_checkpoint(
+    mstmm: Command, folder: Path, heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Late(scipy.integrate.RK45):
+        def step(self) -> str | None:
+            if self.t > 0.5:
+                signal.raise_signal(signal.SIGINT)
+            return super().step()
+
+    monkeypatch.setattr(scipy.integrate, "RK45", Late)
+    command = ("simulate", "pendulum.toml", "--method", "scipy-RK45", "-o", "run.csv")
+    done = mstmm(*command)
+    assert done.code == 130 and "what was computed is in run.csv" in done.err
+    assert "--resume" not in done.err and not (folder / "run.csv.checkpoint").exists()
+    assert columns(folder / "run.csv")["time [s]"][-1] > 0.5
+    assert "checkpoint" not in json.loads(mstmm(*command, "--json").out)
 
 
 def test_no_step_is_longer_than_the_longest(mstmm: Command, folder: Path) -> None:
