@@ -95,13 +95,29 @@ class _Run:
             operands = map(self._value, statement.args)
             self.temporaries[statement.number] = _OPERATIONS[statement.op](*operands)
             return
+        axis = LOOPS.index(statement.over) - 2
+        product = self._product(statement, axis)
+        if product is not None:
+            self.temporaries[statement.number] = product
+            return
         for inner in statement.body:
             self._inner(inner)
-        value, axis = self._value(statement.value), LOOPS.index(statement.over) - 2
+        value = self._value(statement.value)
         # A value that is the same for all has the length 1 there.
         alike = value.shape[axis] == 1
         total = value * self.n if alike else value.sum(axis=axis, keepdims=True)
         self.temporaries[statement.number] = total
+
+    def _product(self, statement: Sum, axis: int) -> Array | None:
+        """The sum where it is a vector of every point times a matrix that is the same for all."""
+        (inner, *more) = statement.body
+        if more or not isinstance(inner, Assign) or inner.op != "mul":
+            return None
+        values = (np.moveaxis(self._value(operand), axis, -1) for operand in inner.args)
+        matrix, vector = sorted(values, key=lambda a: a.ndim)
+        if matrix.ndim > 2 or vector.shape[-2:] != (1, self.n) or matrix.shape != (self.n, self.n):
+            return None
+        return np.asarray(np.expand_dims(vector[..., 0, :] @ matrix.T, axis))
 
     def _value(self, operand: Operand) -> Array:
         if isinstance(operand, Temporary):

@@ -8,6 +8,7 @@ by as much as the model is made for, as what moves the held end sees it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..sizes import modal_sizes
 from ..vectorized import evaluate
+from .parts import slices
 from .records import moments_of, section_inputs
 from .results.modal_kernels import kernel
 from .support import ANY, Support, Supports
@@ -52,22 +54,22 @@ def stays_definite(body: ModalBody, held: ModalPort, support: Support, turns: Ar
 
 def is_definite_at(body: ModalBody, held: ModalPort, support: Support, eta: Array) -> bool:
     """Whether deflections (N, n) leave a positive inertia to every motion that has one without."""
-    seen = np.concatenate([np.zeros((1, body.n)), eta])
-    mass = _mass(body, seen)
+    straight, bent = (_Inertia(body, held, of) for of in (np.zeros((1, body.n)), eta))
     for way in (support, ANY):
-        scaled = _scaled(_on_its_support(mass, held, way, seen))
-        if _is_definite(scaled[:1]):
-            return _is_definite(scaled[1:])
+        kept, scale = _scale(next(straight.on(way)))
+        scaled = (m[:, kept[:, None], kept] / scale for at in (straight, bent) for m in at.on(way))
+        if _is_definite(next(scaled)):
+            return all(map(_is_definite, scaled))
     return True  # what a straight body lacks is not lost by bending
 
 
-def _scaled(matrices: Array) -> Array:
-    """The matrices by the roots of the first one's diagonal, without motions that it leaves free of
-    inertia."""
-    own = np.diagonal(matrices[0])
+def _scale(straight: Array) -> tuple[NDArray[np.intp], Array]:
+    """Motions that a matrix (1, ., .) has an inertia for, and the roots of their own inertias,
+    products of two."""
+    own = np.diagonal(straight[0])
     kept = np.flatnonzero(own > _NONE * own.max(initial=0.0))
-    scale = np.sqrt(own[kept])
-    return np.asarray(matrices[:, kept[:, None], kept] / np.outer(scale, scale))
+    root = np.sqrt(own[kept])
+    return kept, np.outer(root, root)
 
 
 def _is_definite(matrices: Array) -> bool:
@@ -100,36 +102,36 @@ def _deflections(body: ModalBody, turns: Array) -> Array:
 # --- mass matrix ----------------------------------------------------------------------------------
 
 
-def _mass(body: ModalBody, eta: Array) -> Array:
-    """(N, 6 + n, 6 + n): M(eta) of [v; w; etad], frame axes."""
-    n, zero = body.n, np.zeros(3)
-    given = {**moments_of(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
-    found = evaluate(kernel("momentum"), given, n)
-    whole = np.zeros((len(eta), 6 + n, 6 + n))
-    rows, columns = np.triu_indices(6)
-    whole[:, rows, columns] = whole[:, columns, rows] = found["S"]
-    whole[:, :6, 6:] = found["S_rf"]
-    whole[:, 6:, :6] = np.swapaxes(found["S_rf"], 1, 2)
-    whole[:, 6:, 6:] = body.Mff
-    return whole
+class _Inertia:
+    """Mass matrices at deflections eta (N, n), as what the held end rides on sees them."""
 
-
-def _on_its_support(mass: Array, held: ModalPort, support: Support, eta: Array) -> Array:
-    """(N, m + n, m + n): the same for the speeds of the support and the modes."""
-    n, m = eta.shape[1], support.speeds
-    carried = np.zeros((len(eta), 6 + n, m + n))
-    carried[:, 6:, m:] = np.eye(n)
-    carried[:, :6, :m] = support.motion
-    if held.moves:
-        ride, own = _frame_motion(held, eta)
-        carried[:, :6, :m] = ride @ support.motion
-        carried[:, :6, m:] = own
-    else:
+    def __init__(self, body: ModalBody, held: ModalPort, eta: Array) -> None:
+        n, zero, self.held, self.Mff = body.n, np.zeros(3), held, body.Mff
+        given = {**moments_of(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
+        found = evaluate(kernel("momentum"), given, n)
+        self.S, self.S_rf = np.empty((len(eta), 6, 6)), found["S_rf"]
+        rows, columns = np.triu_indices(6)
+        self.S[:, rows, columns] = self.S[:, columns, rows] = found["S"]
         back = held.rotation.T
-        carried[:, :6, :m] = _shifted(back, -back @ held.position) @ support.motion
-    whole = np.swapaxes(carried, 1, 2) @ mass @ carried
-    whole[:, :m, :m] += support.inertia
-    return np.asarray(whole)
+        self.ride, self.own = _shifted(back, -back @ held.position), np.zeros((len(eta), 6, n))
+        if held.moves:
+            self.ride, self.own = _frame_motion(held, eta)
+
+    def on(self, support: Support) -> Iterator[Array]:
+        """(., m + n, m + n) for the speeds of the support and the modes, some deflections at a
+        time: M(eta) of [v; w; etad] in frame axes, with v, w by the speeds and by etad."""
+        m, n = support.speeds, len(self.Mff)
+        moved = self.ride @ support.motion
+        pushed = self.S @ self.own + self.S_rf
+        corner = np.swapaxes(moved, -1, -2) @ self.S @ moved + support.inertia
+        edge = np.swapaxes(moved, -1, -2) @ pushed
+        for some in slices(len(self.S), (m + n) ** 2):
+            own, free = np.swapaxes(self.own[some], 1, 2), np.swapaxes(self.S_rf[some], 1, 2)
+            whole = np.empty((len(own), m + n, m + n))
+            whole[:, :m, :m], whole[:, :m, m:] = corner[some], edge[some]
+            whole[:, m:, :m] = np.swapaxes(edge[some], 1, 2)
+            whole[:, m:, m:] = own @ pushed[some] + free @ self.own[some] + self.Mff
+            yield whole
 
 
 def _frame_motion(held: ModalPort, eta: Array) -> tuple[Array, Array]:

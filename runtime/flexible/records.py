@@ -170,6 +170,6 @@ class ModalRecords:
         return record
 
     def _reals(self, numbers: Array | Sequence[float]) -> Any:
-        array = self.ffi.new("real[]", np.ravel(numbers).tolist() or [0.0])
+        array = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
         self.kept.append(array)
-        return array
+        return self.ffi.from_buffer("real[]", array)

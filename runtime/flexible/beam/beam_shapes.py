@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..modal_body import Array, ModalPort
+from ..parts import slices
 from . import kernels as beam_kernels
 from .data import BeamData, BeamSections
 from .gauss import density_of, gauss_between
@@ -46,13 +46,6 @@ class ShapeValues:
     theta: Array  #: (m, 3, n) rotation vector of the section
     curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -w'', v''
     stretch: Array  #: (m, n) s'
-    make_second_order: Callable[[], Array]
-
-    @cached_property
-    def second_order(self) -> Array:
-        """(m, 6, n, n) g of -1/2 eta^T g eta: displacement of the axis, rotation vector of the
-        section; made when it is asked for, as it has all pairs of modes."""
-        return self.make_second_order()
 
 
 class BeamShapes:
@@ -139,17 +132,22 @@ class BeamShapes:
             np.moveaxis(here["theta"], 2, 0),
             np.moveaxis(change["theta"], 2, 0),
             slopes[0].T.copy(),
-            lambda: self.second_order.at(x),
         )
 
     # --- ports -----------------------------------------------------------------------------------
 
     def section(self, x: float, rotation: Array | None = None) -> ModalPort:
         """The section at x as a port; exact zeros where the frame's conditions hold it."""
-        values = self.at(np.array([x]))
-        turn = np.eye(3) if rotation is None else rotation
-        second = self._second(values)[0]
-        return self.port(x, turn, values.phi[0], values.theta[0], second)
+        port = next(self.ports(np.array([x])))
+        return port if rotation is None else replace(port, rotation=rotation)
+
+    def ports(self, x: Array) -> Iterator[ModalPort]:
+        """The sections at x (m,), turned as the beam is."""
+        values = self.at(x)
+        for some in slices(len(x), 12 * self.n**2):
+            second = self._second(x[some], np.eye(len(x[some])))
+            for fields in zip(x[some], values.phi[some], values.theta[some], second, strict=True):
+                yield self._port(*fields)
 
     def mean_section(self, start: float, end: float) -> ModalPort:
         """The mean of all sections between `start` and `end` (m): where a force that is the same
@@ -158,23 +156,21 @@ class BeamShapes:
         x, w = gauss_between((start, *inner, end), self.density)
         w = w / (end - start)
         values = self.at(x)
-        phi, theta, second = (
-            np.einsum("m,m...->...", w, v) for v in (values.phi, values.theta, self._second(values))
-        )
-        return self.port((start + end) / 2, np.eye(3), phi, theta, second)
+        phi, theta = (np.einsum("m,mak->ak", w, v) for v in (values.phi, values.theta))
+        return self._port((start + end) / 2, phi, theta, self._second(x, w[None])[0])
 
-    def _second(self, values: ShapeValues) -> Array:
-        """What is of second order at the sections of `values`; zeros where the beam is linear."""
+    def _second(self, x: Array, weights: Array) -> Array:
+        """(p, 6, n, n) sums of what is of second order; zeros where the beam is linear."""
         if self.stiffening:
-            return values.second_order
-        return np.zeros((len(values.phi), 6, self.n, self.n))
+            return self.second_order.sums(x, weights)
+        return np.zeros((len(weights), 6, self.n, self.n))
 
-    def port(self, x: float, turn: Array, phi: Array, theta: Array, second: Array) -> ModalPort:
+    def _port(self, x: float, phi: Array, theta: Array, second: Array) -> ModalPort:
         """A port from its values, rounding noise set to zero."""
         size, slope, _ = self._scales()
         return ModalPort(
-            np.array([x, 0.0, 0.0]), turn, without_noise(phi, size), without_noise(theta, slope),
-            self._cleaned(second),
+            np.array([x, 0.0, 0.0]), np.eye(3), without_noise(phi, size),
+            without_noise(theta, slope), self._cleaned(second),
         )  # fmt: skip
 
     def _cleaned(self, second: Array) -> Array:

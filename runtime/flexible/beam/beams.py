@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from mstmm.scene_parts import Load
 
 from ..computable import computed
 from ..definiteness import stays_definite
-from ..modal_body import Array, MassPoint, ModalBody
+from ..modal_body import Array, ModalBody
 from ..support import Support, Supports
 from .bases import shapes_of
 from .beam_shapes import DIRECTIONS, BeamShapes, Mode
@@ -23,6 +22,7 @@ from .frames import in_frame
 from .holding import Holding, Surroundings, holding
 from .moments import drag_moments, mass_moments, stiffness
 from .planar import Planar
+from .quadrature import mass_points
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -148,26 +148,6 @@ def _described(choice: Choice, count: int) -> str:
     why = f", because {choice.why}" if choice.why and choice.why != "as asked for" else ""
     shapes = f"{count} {choice.basis.kind} shape{'s' if count != 1 else ''}"
     return f"{choice.direction}: {shapes}, frame {frame.kind}{where}{why}"
-
-
-# --- quadrature -----------------------------------------------------------------------------------
-
-
-def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
-    """Gauss points with the slices' mass: 3 n + 4 of them, n shapes of the finest direction, shared
-    by length among the pieces between changes of section and ends."""
-    n = max((sum(m.direction == d for m in shapes.modes) for d in DIRECTIONS), default=0)
-    total = 3 * n + 4
-    points = []
-    places = sorted({*shapes.breaks, *(x for x, _ in shapes.data.ends.values())})
-    for a, b in pairwise(places):
-        count = max(4, int(np.ceil(total * (b - a) / shapes.length)))
-        nodes, weights = np.polynomial.legendre.leggauss(count)
-        for t, w in zip(nodes, weights, strict=True):
-            x, slice_ = a + (b - a) * (t + 1) / 2, (b - a) * w / 2
-            m, yy, zz = shapes.data.inertia[:, shapes.data.piece(np.array([x]))][:, 0] * slice_
-            points.append(MassPoint(float(m), np.diag([yy + zz, zz, yy]), shapes.section(float(x))))
-    return tuple(points)
 
 
 # --- damping, start -------------------------------------------------------------------------------

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
 from ..modal_body import Array
 
@@ -57,30 +58,71 @@ def _cuts(a: float, b: float, waves: float) -> int:
     return max(1, int(np.ceil((b - a) * waves / _WAVES)))
 
 
-def antiderivatives(
-    places: Iterable[float], density: Density, x: Array
-) -> tuple[Array, Array, Array]:
-    """(points (N,), once (m, N), twice (m, N)): from values f of products of two shapes at the
-    points, once @ f is the integral of f from the first place to every x, and twice @ f that of
-    (x - t) f(t) dt, the integral of the integral."""
-    points, once, twice = [], [], []
-    for a, b in pairwise(places):
-        waves = density(a, b)
-        cuts = _cuts(a, b, waves)
-        h = (b - a) / cuts
-        for start in a + h * np.arange(cuts):
-            nodes, weights, first, second = _partial(16 + int(np.ceil(5.0 * h * waves)))
-            ours, weights = start + h * nodes, h * weights
-            beyond = (x >= start + h)[:, None]
-            part, whole = beyond * weights, beyond * weights * (x[:, None] - ours)
-            inside = (x > start) & (x < start + h)
-            at = 2 * (x[inside] - start) / h - 1
-            part[inside] = h * legendre.legval(at, first).T
-            whole[inside] = h**2 * legendre.legval(at, second).T
-            points.append(ours)
-            once.append(part)
-            twice.append(whole)
-    return np.concatenate(points), np.concatenate(once, axis=1), np.concatenate(twice, axis=1)
+class Antiderivatives:
+    """Integrals along a beam from its first place to any x, and the integrals of these, of products
+    of two shapes that are known at `points` (N,)."""
+
+    def __init__(self, places: Iterable[float], density: Density) -> None:
+        self._cells: list[_Cell] = []
+        count = 0
+        for a, b in pairwise(places):
+            waves = density(a, b)
+            cuts = _cuts(a, b, waves)
+            h = (b - a) / cuts
+            order = 16 + int(np.ceil(5.0 * h * waves))
+            for start in a + h * np.arange(cuts):
+                self._cells.append(_Cell(float(start), h, slice(count, count + order)))
+                count += order
+        self.points = np.concatenate([cell.points for cell in self._cells])
+
+    def of(self, values: Array, x: Array) -> tuple[Array, Array]:
+        """Once and twice integrated (..., m) at x (m,), from values (..., N) at the points."""
+        once, twice = (np.zeros((*values.shape[:-1], len(x))) for _ in range(2))
+        for cell, inside, beyond in self._places(x):
+            own = values[..., cell.known]
+            if len(inside):
+                first, second = cell.partial(x[inside])
+                once[..., inside] += own @ first.T
+                twice[..., inside] += own @ second.T
+            whole, lever = (own @ w for w in (cell.weights, cell.weights * cell.points))
+            once[..., beyond] += whole[..., None]
+            twice[..., beyond] += whole[..., None] * x[beyond] - lever[..., None]
+        return once, twice
+
+    def weights(self, x: Array, of_places: Array) -> tuple[Array, Array]:
+        """Weights (p, N) of the points in sums over x (m,), weighted by `of_places` (p, m), of what
+        is once integrated and of what is twice."""
+        once, twice = (np.zeros((len(of_places), len(self.points))) for _ in range(2))
+        for cell, inside, beyond in self._places(x):
+            rest = of_places[:, beyond]
+            whole, lever = rest.sum(axis=1)[:, None], (rest @ x[beyond])[:, None]
+            once[:, cell.known] = whole * cell.weights
+            twice[:, cell.known] = (lever - whole * cell.points) * cell.weights
+            if len(inside):
+                first, second = cell.partial(x[inside])
+                once[:, cell.known] += of_places[:, inside] @ first
+                twice[:, cell.known] += of_places[:, inside] @ second
+        return once, twice
+
+    def _places(self, x: Array) -> Iterator[tuple[_Cell, NDArray[np.intp], NDArray[np.intp]]]:
+        for cell in self._cells:
+            end = cell.start + cell.length
+            yield cell, np.flatnonzero((x > cell.start) & (x < end)), np.flatnonzero(x >= end)
+
+
+class _Cell:
+    """A stretch of a beam with a Gauss rule of its own."""
+
+    def __init__(self, start: float, length: float, known: slice) -> None:
+        self.start, self.length, self.known = start, length, known
+        nodes, weights, *self._integrals = _partial(known.stop - known.start)
+        self.points, self.weights = start + length * nodes, length * weights
+
+    def partial(self, x: Array) -> tuple[Array, Array]:
+        """Weights (m, .) of the first and the second integral from the start to x (m,)."""
+        first, second = self._integrals
+        values = legendre.legvander(2 * (x - self.start) / self.length - 1, len(second) - 1)
+        return self.length * values[:, : len(first)] @ first, self.length**2 * values @ second
 
 
 @lru_cache(maxsize=64)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..modal_body import Array, Moments
 from . import kernels as beam_kernels
 from .beam_shapes import BeamShapes, without_noise
-from .parts import slices
+from .multilinear import Row, Term, Terms, add_products, known, rows_of, terms
 
 
 def mass_moments(shapes: BeamShapes) -> Moments:
@@ -30,38 +32,44 @@ def stiffness(shapes: BeamShapes) -> Array:
     """K (n, n) from the strain energy."""
     x, w = shapes.rule()
     data = shapes.data.stiffness[:, shapes.data.piece(x)]
-    k = _integrals(shapes, "stiffness", data, x, w)["K"][0]
+    k = _integrals(shapes, np.concatenate([np.zeros((3, len(x))), data]), x, w, ("K",))[0][0]
     k = (k + k.T) / 2
     size = np.sqrt(np.abs(np.diag(k)))
     return without_noise(k, np.outer(size, size))
 
 
-def _integrals(shapes: BeamShapes, what: str, data: Array, x: Array, w: Array) -> dict[str, Array]:
-    """Integrals of the kernel of two shapes; `data` are inertia or stiffness (., m) of the
-    sections."""
-    total: dict[str, Array] = {}
-    for some in slices(len(x), shapes.n**2):
-        inputs = _inputs(shapes, x[some])
-        inputs[what] = data[:, None, None, some]
-        for name, values in beam_kernels.evaluate("moments", inputs).items():
-            part = values @ w[some]
-            total[name] = total[name] + part if name in total else part
-    return total
+#: What the integrand of two shapes is linear in: in the place, the section, shape k and shape l.
+_FIRST = (
+    ("x",), ("inertia", "stiffness"),
+    ("axis_k", "turn_k", "strain_k"), ("axis_l", "turn_l", "strain_l"),
+)  # fmt: skip
+#: The same of second order; last the displacement and rotation of second order at the section.
+_SECOND = (("x",), ("inertia",), ("turn_k",), ("turn_l",), ("g", "h_turn"))
 
 
-def _inputs(shapes: BeamShapes, x: Array) -> dict[str, Array]:
-    """Inputs of the kernel of two shapes for all pairs k, l at all x; section data are zero."""
+def _integrals(
+    shapes: BeamShapes, data: Array, x: Array, w: Array, names: tuple[str, ...]
+) -> list[Array]:
+    """Integrals (..., n, n) of outputs of the kernel of two shapes, (..., n, 1) of those that one
+    shape has alone; `data` (7, m) are inertia and stiffness of the sections."""
     values, slopes, bends = (shapes.rows(x, d) for d in range(3))
-    rows = {
-        "axis": values[:3],
-        "turn": shapes.carried(slopes, values[3]),
-        "strain": np.stack([slopes[0], slopes[3], bends[2], bends[1]]),
-    }
-    inputs = {"inertia": np.zeros((3, 1)), "stiffness": np.zeros((4, 1))}
-    inputs["x"] = x[None, None, None, :]
-    for name, array in rows.items():
-        inputs[f"{name}_k"], inputs[f"{name}_l"] = array[:, :, None, :], array[:, None, :, :]
-    return inputs
+    strain = np.stack([slopes[0], slopes[3], bends[2], bends[1]])
+    rows = rows_of(np.concatenate([values[:3], shapes.carried(slopes, values[3]), strain]))
+    every: Row = (np.zeros(1, dtype=np.intp), np.ones((1, len(x))))
+    found = []
+    for output in (terms("moments", *_FIRST)[name] for name in names):
+        paired = any(term.entries[-1] is not None for whole in output.values() for term in whole)
+        *_, last = output
+        total = np.zeros((*(k + 1 for k in last), shapes.n, shapes.n if paired else 1))
+        for index, term in _entries(output):
+            _, _, k, other = term.entries
+            assert k is not None
+            weights = known(term, x[None], data * w)[None]
+            add_products(
+                total[index][None], rows[k], every if other is None else rows[other], weights
+            )
+        found.append(total)
+    return found
 
 
 def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
@@ -69,8 +77,8 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     mass = float(rigid["mass"][0] @ w)
     first = rigid["first"] @ w
     second = _symmetric(rigid["second"] @ w)
-    found = _integrals(shapes, "inertia", density, x, w)
-    c, e, f = found["C"][:, :, 0], found["E"][:, :, :, 0], found["F"]
+    data = np.concatenate([density, np.zeros((4, len(x)))])
+    c, e, f = _integrals(shapes, data, x, w, ("C", "E", "F"))
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
     g, moment = second_moments(shapes, density, x, w) if shapes.stiffening else _none(shapes.n)
@@ -78,8 +86,8 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
         mass=mass,
         first=first,
         second=second,
-        C=without_noise(c, np.sqrt(mass) * modal),
-        E=without_noise(e, lever[:, None, None] * modal),
+        C=without_noise(c[..., 0], np.sqrt(mass) * modal),
+        E=without_noise(e[..., 0], lever[:, None, None] * modal),
         F=without_noise(f, np.outer(modal, modal)),
         G=g,
         X=moment,
@@ -89,13 +97,25 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
 def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tuple[Array, Array]:
     """G (3, n, n) and X (3, 3, n, n) of the second-order field under a density (3, m) at the points
     and weights of a quadrature."""
+    outputs = terms("second_moments", *_SECOND)
+    turn = rows_of(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
     g, lever = _none(shapes.n)
-    for some in slices(len(x) if shapes.n else 0, 9 * shapes.n**2):
-        found = beam_kernels.evaluate(
-            "second_moments", _second_inputs(shapes, density[:, some], x[some])
-        )
-        g += found["G"] @ w[some]
-        lever += found["X"] @ w[some]
+    of_field: dict[tuple[int | None, ...], list[tuple[Array, Term]]] = {}
+    for total, output in ((g, outputs["G"]), (lever, outputs["X"])):
+        for index, term in _entries(output):
+            _, _, k, other, field = term.entries
+            if field is not None:
+                of_field.setdefault(term.entries[:2], []).append((total[index], term))
+            elif k is not None and other is not None:
+                weights = known(term, x[None], density * w)[None]
+                add_products(total[index][None], turn[k], turn[other], weights)
+    of_places = np.stack([
+        known(Term(1.0, places), x[None], density * w) for places in of_field
+    ])  # fmt: skip
+    sums = shapes.second_order.sums(x, of_places, carried=True)
+    for entries, field in zip(of_field.values(), sums, strict=True):
+        for total, term in entries:
+            total += term.factor * field[term.entries[-1]]
     turned, length = shapes.second_scale, shapes.length
     arms = np.array([density[0] @ w * length**2, density[1] @ w, density[2] @ w])
     return (
@@ -104,17 +124,8 @@ def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tu
     )
 
 
-def _second_inputs(shapes: BeamShapes, density: Array, x: Array) -> dict[str, Array]:
-    second = shapes.second_order.at(x)
-    turn = shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3])
-    return {
-        "x": x[None, None, None, :],
-        "inertia": density[:, None, None, :],
-        "turn_k": turn[:, :, None, :],
-        "turn_l": turn[:, None, :, :],
-        "g": np.moveaxis(second[:, :3], 0, 3),
-        "h_turn": np.moveaxis(shapes.second_order.carried(second), 0, 3),
-    }
+def _entries(output: Terms) -> Iterator[tuple[tuple[int, ...], Term]]:
+    return ((index, term) for index, whole in output.items() for term in whole)
 
 
 def _halved(pairs: Array) -> Array:

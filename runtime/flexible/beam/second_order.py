@@ -3,19 +3,22 @@
 The rates along the beam are generated kernels (`derive.flexible.beam_second_order`); here they are
 integrated, and the rigid motion that the choice of the floating frame leaves open is taken off: to
 second order as to first, the frame is that of a section, of the chord or of the mean.
+
+Arrays g of all pairs of shapes are made for few sections or sums over sections; for given modal
+coordinates a^T g b is integrated from their own fields, without the pairs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..modal_body import Array
-from . import kernels
-from .gauss import antiderivatives
-from .parts import slices
+from ..parts import slices
+from .rates import Rates
 
 if TYPE_CHECKING:
     from .beam_shapes import BeamShapes
@@ -23,140 +26,151 @@ if TYPE_CHECKING:
 
 
 class SecondOrder:
-    """g (6, n, n) at any section: displacement x, y, z in 1/m, rotation vector x, y, z."""
+    """g (6, n, n) at any section: displacement x, y, z in 1/m, rotation vector x, y, z.
+
+    With `carried` the rotation is that which carries the sections' inertia: all of it with rotary
+    inertia, else the twist and what the frame's choice turned back.
+    """
 
     def __init__(self, shapes: BeamShapes, frames: Mapping[str, Frame]) -> None:
-        self.shapes = shapes
-        self._rigid = np.zeros((6, shapes.n, shapes.n))
-        if shapes.n:
-            self._rigid = _rigid_motion(self, frames)
+        self.shapes, self._frames = shapes, frames
 
-    def at(self, x: Array) -> Array:
+    @cached_property
+    def _rates(self) -> Rates:
+        return Rates(self.shapes)
+
+    @cached_property
+    def _rigid(self) -> Array:
+        return _RigidMotion(self).taken(self._frames)
+
+    def at(self, x: Array, carried: bool = False) -> Array:
         """(m, 6, n, n) at sections x (m,)."""
-        found = self.from_root(x)
-        shift, turn = self._rigid[:3], self._rigid[3:]
-        found[:, :3] -= shift
-        found[:, 1] -= x[:, None, None] * turn[2]
-        found[:, 2] += x[:, None, None] * turn[1]
-        found[:, 3:] -= turn
+        found = np.empty((len(x), 6, self.shapes.n, self.shapes.n))
+        for some in slices(len(x), 12 * self.shapes.n**2):
+            found[some] = self.sums(x[some], np.eye(len(x[some])), carried)
         return found
 
-    def carried(self, g: Array) -> Array:
-        """(m, 3, n, n) rotation that carries the sections' inertia: all of it with rotary inertia,
-        else the twist and what the frame's choice turned back."""
-        if self.shapes.rotary:
-            return g[:, 3:]
-        kept = np.broadcast_to(-self._rigid[3:], g[:, 3:].shape).copy()
-        kept[:, 0] = g[:, 3]
-        return kept
+    def sums(self, x: Array, weights: Array, carried: bool = False) -> Array:
+        """(p, 6, n, n): sums over sections x (m,) with weights (p, m)."""
+        moved = _moved(weights.sum(axis=1), weights @ x)
+        return self.from_root(x, weights, carried) - np.tensordot(moved, self._rigid, axes=(2, 0))
 
-    def from_root(self, x: Array) -> Array:
-        """(m, 6, n, n) with neither displacement nor rotation of second order at x = 0.
-
-        The rate of the displacement contains the rotation, which is an integral itself.
-        """
-        shapes, n = self.shapes, self.shapes.n
-        places, once, twice = antiderivatives(
-            shapes.pieces, shapes.density, np.clip(x, 0.0, shapes.length)
-        )
-        values = _Values(shapes, places)
-        found = np.empty((len(x), 6, n, n))
-        for some in slices(n, 3 * len(places) * n):
-            turning, drawing, lever = values.rates(some)
-            turned, drawn, carried = (
-                np.tensordot(weights, rate, axes=(1, 0))
-                for weights, rate in ((once, turning), (once, drawing), (twice, turning))
-            )
-            found[:, 3:, some] = turned
-            found[:, :3, some] = drawn + np.einsum("ab,mbkl->makl", lever, carried)
+    def from_root(self, x: Array, weights: Array, carried: bool = False) -> Array:
+        """`sums` with neither displacement nor rotation of second order at x = 0."""
+        found = self._rates.sums(x, weights)
+        if carried and not self.shapes.rotary:
+            found[:, 4:] = 0.0
         return found
 
-    def at_section(self, x: float) -> Array:
-        """(6, n, n) at one section."""
-        if x == 0.0:
-            return np.zeros((6, self.shapes.n, self.shapes.n))
-        return np.asarray(self.from_root(np.array([x]))[0])
+    def of(self, x: Array, a: Array, b: Array, carried: bool = False) -> Array:
+        """(t, m, 6) numbers a^T g b at sections x (m,) for modal coordinates a and b (t, n)."""
+        rows = len(self._rates.points) * 32
+        found = np.empty((len(a), len(x), 6))
+        for some in slices(len(a), max(rows, 6 * len(x), self.shapes.n**2)):
+            found[some] = self._of(x, a[some], b[some], carried)
+        return found
+
+    def _of(self, x: Array, a: Array, b: Array, carried: bool) -> Array:
+        if self.shapes.n <= _FEW:
+            pairs = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
+            g = _pairs_first(self, x.tobytes(), carried)
+            return np.asarray(pairs @ g).reshape(len(a), len(x), 6)
+        found = self._rates.of(x, a, b)
+        if carried and not self.shapes.rotary:
+            found[..., 4:] = 0.0
+        rigid = np.stack([((a @ g) * b).sum(axis=1) for g in self._rigid], axis=1)
+        return found - np.tensordot(rigid, _moved(np.ones(len(x)), x), axes=(1, 2))
 
 
-class _Values:
-    """What the rates along the beam are made of, at points x."""
-
-    def __init__(self, shapes: BeamShapes, x: Array) -> None:
-        values, slopes, bends = (shapes.rows(x, d) for d in range(3))
-        self.theta = kernels.evaluate("section", {"values": values, "slopes": slopes[1:3]})["theta"]
-        self.kappa = kernels.evaluate("section", {"values": slopes, "slopes": bends[1:3]})["theta"]
-        self.stretch = slopes[:1]
-
-    def rates(self, some: slice) -> tuple[Array, Array, Array]:
-        """dh/dx (m, 3, k, n), dg/dx without its part from h, and that part per h (3, 3), of some
-        shapes with all."""
-        turned = _pairs("theta", self.theta, some)
-        turning = kernels.evaluate("turning", turned | _pairs("kappa", self.kappa, some))["dh"]
-        stretched = turned | _pairs("stretch", self.stretch, some)
-        drawing = kernels.evaluate("drawing", stretched | {"h": np.zeros((3, 1, 1, 1))})["dg"]
-        unmoved = {name: np.zeros((len(a), 1)) for name, a in stretched.items()}
-        lever = kernels.evaluate("drawing", unmoved | {"h": np.eye(3)})["dg"]
-        return np.moveaxis(turning, 3, 0), np.moveaxis(drawing, 3, 0), lever
+#: Shapes up to which all their pairs are fewer than the points that rates are integrated from.
+_FEW = 25
 
 
-def _pairs(name: str, values: Array, some: slice) -> dict[str, Array]:
-    """Values (rows, n, m) of some shapes and of all as the two inputs of a kernel of pairs."""
-    return {f"{name}_k": values[:, some, None, :], f"{name}_l": values[:, None, :, :]}
+@lru_cache(maxsize=16)
+def _pairs_first(field: SecondOrder, places: bytes, carried: bool) -> Array:
+    """(n n, m 6) g at sections."""
+    g = field.at(np.frombuffer(places), carried)
+    return np.ascontiguousarray(np.moveaxis(g, (2, 3), (0, 1)).reshape(field.shapes.n**2, -1))
 
 
-def _rigid_motion(field: SecondOrder, frames: Mapping[str, Frame]) -> Array:
+def _moved(whole: Array, lever: Array) -> Array:
+    """(p, 6, 6): sums of the rigid motion of the origin over sections, from the sums `whole` of the
+    weights and `lever` of the weights times x."""
+    found = np.multiply.outer(whole, np.eye(6))
+    found[:, 1, 5], found[:, 2, 4] = lever, -lever
+    return found
+
+
+class _RigidMotion:
     """Translation and rotation (6, n, n) of the origin that the frame takes from the field.
 
     Each bending plane, the twist and the displacement along the beam follow the frame of their own
     direction, and where it has no shapes that of the first one that has.
     """
-    first = next(iter(frames.values()))
-    rigid = np.zeros((6, field.shapes.n, field.shapes.n))
-    rigid[0] = _value(field, 0, first)
-    rigid[3] = _value(field, 3, frames.get("twist", first))
-    rigid[1], rigid[5] = _line(field, (1, 5), frames.get("y", first))
-    # A rotation about y moves the axis against z.
-    rigid[2], slope = _line(field, (2, 4), frames.get("z", first))
-    rigid[4] = slope
-    return rigid
 
+    def __init__(self, field: SecondOrder) -> None:
+        self.field, self.shapes = field, field.shapes
+        self._at: dict[float, Array] = {0.0: np.zeros((6, self.shapes.n, self.shapes.n))}
 
-def _value(field: SecondOrder, row: int, frame: Frame) -> Array:
-    """What the frame takes from a row by itself: its value at a section, or its mean."""
-    if frame.origin is not None:
-        return field.at_section(frame.origin)[row]
-    x, w = field.shapes.rule()
-    sections = field.shapes.sections(x)
-    polar = sections.rho_I[0]
-    weight = w * (sections.mass_per_length if row == 0 or not polar.all() else polar)
-    return np.asarray(np.einsum("m,mkl->kl", weight, field.from_root(x)[:, row]) / weight.sum())
+    def taken(self, frames: Mapping[str, Frame]) -> Array:
+        rigid = np.zeros((6, self.shapes.n, self.shapes.n))
+        if not frames:
+            return rigid
+        first = next(iter(frames.values()))
+        rigid[0] = self._value(0, first)
+        rigid[3] = self._value(3, frames.get("twist", first))
+        rigid[1], rigid[5] = self._line((1, 5), frames.get("y", first))
+        # A rotation about y moves the axis against z.
+        rigid[2], rigid[4] = self._line((2, 4), frames.get("z", first))
+        return rigid
 
+    def _section(self, x: float) -> Array:
+        """(6, n, n) at one section."""
+        if x not in self._at:
+            self._at[x] = self.field.from_root(np.array([x]), np.ones((1, 1)))[0]
+        return self._at[x]
 
-def _line(field: SecondOrder, rows: tuple[int, int], frame: Frame) -> tuple[Array, Array]:
-    """(displacement at the origin, rotation) that the frame takes from deflection and slope."""
-    sign = 1.0 if rows[0] == 1 else -1.0  # v' = theta_z, w' = -theta_y
-    if frame.kind == "tangent":
-        here = field.at_section(frame.x)
-        turn = here[rows[1]]
-        return here[rows[0]] - sign * frame.x * turn, turn
-    if frame.kind == "chord":
-        length = field.shapes.length
-        end = field.at_section(length)[rows[0]]
-        return np.zeros_like(end), sign * end / length
-    x, w = field.shapes.rule()
-    sections = field.shapes.sections(x)
-    found = field.from_root(x)
-    mass = w * sections.mass_per_length
-    inertia = w * sections.rho_I[2 if rows[0] == 1 else 1]
-    carried = found[:, rows[1]] if field.shapes.rotary else np.zeros_like(found[:, 0])
-    matrix = np.array([[mass.sum(), mass @ x], [mass @ x, mass @ x**2 + inertia.sum()]])
-    right = np.stack([
-        np.einsum("m,mkl->kl", mass, found[:, rows[0]]),
-        np.einsum("m,mkl->kl", mass * x, found[:, rows[0]])
-        + sign * np.einsum("m,mkl->kl", inertia, carried),
-    ])  # fmt: skip
-    place, slope = np.einsum("ij,jkl->ikl", np.linalg.inv(matrix), right)
-    return place, sign * slope
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Sections of the mean, and how the mass, the mass times x, the rotary inertia about y and
+        z and what twist is the mean by weigh them."""
+        x, w = self.shapes.rule()
+        sections = self.shapes.sections(x)
+        mass, (polar, about_y, about_z) = sections.mass_per_length, sections.rho_I
+        twist = polar if polar.all() else mass
+        return x, w * np.stack([mass, mass * x, about_y, about_z, twist])
+
+    @cached_property
+    def _sums(self) -> Array:
+        """(5, 6, n, n) by the weights of the mean."""
+        return self.field.from_root(*self._weights, carried=True)
+
+    def _value(self, row: int, frame: Frame) -> Array:
+        """What the frame takes from a row by itself: its value at a section, or its mean."""
+        if frame.origin is not None:
+            return self._section(frame.origin)[row]
+        which = 0 if row == 0 else 4
+        return np.asarray(self._sums[which, row] / self._weights[1][which].sum())
+
+    def _line(self, rows: tuple[int, int], frame: Frame) -> tuple[Array, Array]:
+        """(displacement at the origin, rotation) that the frame takes from deflection and slope."""
+        place, turn = rows
+        sign = 1.0 if place == 1 else -1.0  # v' = theta_z, w' = -theta_y
+        if frame.kind == "tangent":
+            here = self._section(frame.x)
+            return here[place] - sign * frame.x * here[turn], here[turn]
+        if frame.kind == "chord":
+            length = self.shapes.length
+            end = self._section(length)[place]
+            return np.zeros_like(end), sign * end / length
+        (x, weights), about = self._weights, 3 if place == 1 else 2
+        mass, first, inertia = weights[0].sum(), weights[1].sum(), weights[about].sum()
+        matrix = np.array([[mass, first], [first, weights[1] @ x + inertia]])
+        right = np.stack(
+            [self._sums[0, place], self._sums[1, place] + sign * self._sums[about, turn]]
+        )
+        origin, slope = np.tensordot(np.linalg.inv(matrix), right, axes=1)
+        return origin, sign * slope
 
 
 __all__ = ["SecondOrder"]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mstmm.scene_lines import lines
 
+from ..parts import slices
 from . import estimators as e
 from .coupling import couplings
 from .observe import elastic_moment
@@ -145,19 +146,20 @@ def _gamma(
     flexible: FlexibleBodies, name: str, some: NDArray[np.int64]
 ) -> tuple[float, float] | None:
     """Load ratios; of a linear beam by the shortening that it leaves out."""
-    motion = flexible.motion(name).some(some)
+    motion, loads = flexible.motion(name), flexible.end_loads(name)
     second = e.second_order(motion.body)
     if second is None or not len(some):
         return None
-    loads = {
-        port: (force[some], moment[some])
-        for port, (force, moment) in flexible.end_loads(name).items()
-    }
-    from_loads = e.stiffness_from_loads(motion, flexible.gravity, loads, second)
+    ratios = []
     try:
-        return e.load_ratios(motion.body.K, from_loads)
+        for part in (some[k] for k in slices(len(some), 4 * motion.body.n**2)):
+            own = {port: (force[part], moment[part]) for port, (force, moment) in loads.items()}
+            k_g = e.stiffness_from_loads(motion.some(part), flexible.gravity, own, second)
+            ratios.append(e.load_ratios(motion.body.K, k_g))
     except np.linalg.LinAlgError:  # loads beyond what numbers hold
         return None
+    lowest, highest = zip(*ratios, strict=True)
+    return min(lowest), max(highest)
 
 
 def _from_sections(

@@ -66,7 +66,9 @@ def _shapes(name: str, body: ModalBody) -> dict[str, Variable]:
     assert shapes is not None
     x = np.linspace(0.0, shapes.length, STATIONS)
     at, station, modes = shapes.at(x), f"{name}_x", f"{name}_mode"
-    drawn = at.second_order[:, :3] * float(shapes.stiffening)
+    drawn = np.zeros((len(x), 3, body.n, body.n))
+    if shapes.stiffening:
+        drawn = shapes.second_order.at(x)[:, :3]
     words = np.array(body.modes, dtype=object)
     return {
         station: ((station,), x, _about("m", f"place along {name}")),

@@ -78,7 +78,7 @@ def second_order(body: ModalBody) -> SecondOrder | None:
     x, weights = body.shapes.rule()
     density = body.shapes.data.inertia[:, body.shapes.data.piece(x)]
     places = np.array([port.position[0] for port in body.ports.values()])
-    at_ends = values_at(body.shapes, places).second_order
+    at_ends = body.shapes.second_order.at(places)
     return SecondOrder(
         *second_moments(body.shapes, density, x, weights),
         dict(zip(body.ports, at_ends, strict=True)),
@@ -99,12 +99,12 @@ def stiffness_from_loads(
     force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
     spin = tilde(motion.frame_spin)
     turning = tilde(motion.frame_spin_rate) + spin @ spin
-    total = -np.einsum("ta,akl->tkl", force, second.G)
-    total -= np.einsum("tab,bakl->tkl", turning, second.X)
+    total = -np.tensordot(force, second.G, axes=1)
+    total -= np.tensordot(turning, second.X, axes=((1, 2), (1, 0)))
     for name, loads in ports.items():
         wrench = np.concatenate([motion.inward(load) for load in loads], axis=1)
-        total += np.einsum("ta,akl->tkl", wrench, second.ends[name])
-    return total
+        total += np.tensordot(wrench, second.ends[name], axes=1)
+    return np.asarray(total)
 
 
 def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
@@ -112,9 +112,8 @@ def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
 
     gamma is the larger of the two in size; at -1 the loads alone buckle the body.
     """
-    lower = np.linalg.cholesky(stiffness)
-    half = np.linalg.solve(lower, from_loads)
-    both = np.linalg.solve(lower, np.swapaxes(half, -1, -2))
+    whitened = np.linalg.inv(np.linalg.cholesky(stiffness))
+    both = whitened @ from_loads @ whitened.T
     values = np.linalg.eigvalsh((both + np.swapaxes(both, -1, -2)) / 2)
     return float(values.min(initial=0.0)), float(values.max(initial=0.0))
 

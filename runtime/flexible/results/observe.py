@@ -134,13 +134,13 @@ def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
     """Values of the shapes at x (m,), kept for the next who asks for the same places, if they are
     not too many."""
-    if len(places) * shapes.n**2 > _MOST_KEPT:
+    if len(places) * shapes.n > _MOST_KEPT:
         return shapes.at(places)
     return _kept(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
 
 
-#: Products of two shapes at sections that are kept.
-_MOST_KEPT = 2**20
+#: Values of shapes at sections that are kept.
+_MOST_KEPT = 2**17
 
 
 @lru_cache(maxsize=16)
@@ -150,26 +150,30 @@ def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
 
 def deflection(motion: Motion, places: Array) -> Array:
     """(n, m, 3) elastic displacement in m of the axis at x, frame axes, second order included."""
-    return _to_second_order(motion, values_at(motion.shapes, places), "phi", slice(0, 3))
-
-
-def _to_second_order(motion: Motion, at: ShapeValues, field: str, rows: slice) -> Array:
-    """(n, m, 3) phi eta - 1/2 eta^T g eta; without g of a linear beam."""
-    found = np.einsum("mak,tk->tma", getattr(at, field), motion.eta)
-    if motion.shapes.stiffening:
-        found -= 0.5 * bilinear(at.second_order[:, rows], motion.eta, motion.eta)
-    return found
-
-
-def bilinear(matrices: Array, a: Array, b: Array) -> Array:
-    """(n, m, 3) numbers a^T g b of matrices (m, 3, k, k) at a, b (n, k)."""
-    return np.einsum("tmik,tk->tmi", np.einsum("mikl,tl->tmik", matrices, b), a)
+    first = to_first_order(values_at(motion.shapes, places).phi, motion.eta)
+    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., :3]
 
 
 def turns(motion: Motion, places: Array) -> Array:
     """(n, m, 3) rotation vectors in rad of the sections against the frame, second order included:
     to first order twist, -w', v'."""
-    return _to_second_order(motion, values_at(motion.shapes, places), "theta", slice(3, 6))
+    first = to_first_order(values_at(motion.shapes, places).theta, motion.eta)
+    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., 3:]
+
+
+def to_first_order(field: Array, modal: Array) -> Array:
+    """(n, m, 3) of a field (m, 3, modes) and modal coordinates or their rates (n, modes)."""
+    flat = field.reshape(-1, field.shape[-1])
+    return np.asarray((modal @ flat.T).reshape(len(modal), *field.shape[:-1]))
+
+
+def drawn(motion: Motion, places: Array, a: str, b: str, carried: bool = False) -> Array:
+    """(n, m, 6) displacement and rotation a^T g b of second order at x, for a and b among eta, etad
+    and etadd; zeros of a linear beam; `carried` as in `SecondOrder`."""
+    if not motion.shapes.stiffening:
+        return np.zeros((len(motion.t), len(places), 6))
+    field = motion.shapes.second_order
+    return field.of(places, getattr(motion, a), getattr(motion, b), carried)
 
 
 def slope(motion: Motion, places: Array) -> Array:

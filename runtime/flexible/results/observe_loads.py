@@ -16,7 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .observe import Motion, bilinear, deflection, section_rotations, tilde, turns, values_at
+from .observe import (
+    Motion,
+    deflection,
+    drawn,
+    section_rotations,
+    tilde,
+    to_first_order,
+    turns,
+    values_at,
+)  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -112,7 +121,7 @@ class _Sums:
         half = np.diff(edges) / 2
         x = (edges[:-1, None] + half[:, None] * (1 + nodes)).ravel()
         self.weights = (half[:, None] * weights).ravel()
-        place, force, moment = _in_portions(motion, x, gravity)
+        place, force, moment = _densities(motion, x, gravity)
         for line in lines:
             share = ((x > line.first) & (x < line.last)) / max(line.last - line.first, 1e-300)
             force = force + motion.inward(line.force)[:, None] * share[:, None]
@@ -156,30 +165,14 @@ def _places(motion: Motion, x: Array) -> Array:
     return at_rest + deflection(motion, x)
 
 
-#: Products of two shapes at sections that are held at once.
-_PRODUCTS = 2**21
-
-
-def _in_portions(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
-    """The densities below at x (m,), some sections at a time where there are many shapes."""
-    count = max(1, _PRODUCTS // max(1, motion.shapes.n**2))
-    parts = [_densities(motion, x[k : k + count], gravity) for k in range(0, len(x), count)]
-    place, force, moment = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
-    return place, force, moment
-
-
 def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
     """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
     body, shapes, at = motion.body, motion.shapes, values_at(motion.shapes, x)
     sections = shapes.sections(x)
     place = _places(motion, x)
-    moving = np.einsum("mak,tk->tma", at.phi, motion.etad)
-    pushed = np.einsum("mak,tk->tma", at.phi, motion.etadd)
-    if shapes.stiffening:
-        drawn = at.second_order[:, :3]
-        moving -= bilinear(drawn, motion.eta, motion.etad)
-        pushed -= bilinear(drawn, motion.eta, motion.etadd)
-        pushed -= bilinear(drawn, motion.etad, motion.etad)
+    moving = to_first_order(at.phi, motion.etad) - drawn(motion, x, "eta", "etad")[..., :3]
+    pushed = to_first_order(at.phi, motion.etadd)
+    pushed -= drawn(motion, x, "eta", "etadd")[..., :3] + drawn(motion, x, "etad", "etad")[..., :3]
     w = motion.frame_spin[:, None]
     wd = motion.frame_spin_rate[:, None]
     turning = np.cross(w, place)
@@ -216,22 +209,22 @@ def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
 
 def _section_turn(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
     """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3)."""
-    shapes, at = motion.shapes, values_at(motion.shapes, x)
-    if motion.body.points:
-        theta, h = at.theta, at.second_order[:, 3:]
-    else:
+    shapes, carried = motion.shapes, not motion.body.points
+    theta = values_at(shapes, x).theta
+    if carried:
         theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
-        h = shapes.second_order.carried(at.second_order)
-    eta, etad, etadd = motion.eta, motion.etad, motion.etadd
-    turn, rate, growth = (np.einsum("mak,tk->tma", theta, modal) for modal in (eta, etad, etadd))
+    turn, rate, growth = (
+        to_first_order(theta, modal) for modal in (motion.eta, motion.etad, motion.etadd)
+    )
     if not shapes.stiffening:
         return np.eye(3) + tilde(turn), tilde(rate), tilde(growth)
     now, moving, pushed = tilde(turn), tilde(rate), tilde(growth)
     once = now @ moving
     twice = now @ pushed + moving @ moving
+    second = [("eta", "eta"), ("eta", "etad"), ("eta", "etadd"), ("etad", "etad")]
+    still, moved, slow, fast = (drawn(motion, x, a, b, carried)[..., 3:] for a, b in second)
     return (
-        np.eye(3) + now + tilde(-0.5 * bilinear(h, eta, eta)) + now @ now / 2,
-        moving - tilde(bilinear(h, eta, etad)) + (once + np.swapaxes(once, -1, -2)) / 2,
-        pushed - tilde(bilinear(h, eta, etadd) + bilinear(h, etad, etad))
-        + (twice + np.swapaxes(twice, -1, -2)) / 2,
-    )  # fmt: skip
+        np.eye(3) + now + tilde(-0.5 * still) + now @ now / 2,
+        moving - tilde(moved) + (once + np.swapaxes(once, -1, -2)) / 2,
+        pushed - tilde(slow + fast) + (twice + np.swapaxes(twice, -1, -2)) / 2,
+    )
