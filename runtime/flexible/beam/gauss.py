@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from ..modal_body import Array
 
@@ -76,38 +75,38 @@ class Antiderivatives:
         self.points = np.concatenate([cell.points for cell in self._cells])
 
     def of(self, values: Array, x: Array) -> tuple[Array, Array]:
-        """Once and twice integrated (..., m) at x (m,), from values (..., N) at the points."""
-        once, twice = (np.zeros((*values.shape[:-1], len(x))) for _ in range(2))
-        for cell, inside, beyond in self._places(x):
+        """Once and twice integrated (..., m) at x (m,), ascending, from values (..., N) at the
+        points."""
+        once, twice = (np.empty((*values.shape[:-1], len(x))) for _ in range(2))
+        whole, lever = (np.zeros((*values.shape[:-1], 1)) for _ in range(2))
+        for cell, inside in self._places(x):
             own = values[..., cell.known]
-            if len(inside):
-                first, second = cell.partial(x[inside])
-                once[..., inside] += own @ first.T
-                twice[..., inside] += own @ second.T
-            whole, lever = (own @ w for w in (cell.weights, cell.weights * cell.points))
-            once[..., beyond] += whole[..., None]
-            twice[..., beyond] += whole[..., None] * x[beyond] - lever[..., None]
+            first, second = cell.partial(x[inside])
+            once[..., inside] = whole + own @ first.T
+            twice[..., inside] = whole * x[inside] - lever + own @ second.T
+            whole = whole + (own @ cell.weights)[..., None]
+            lever = lever + (own @ (cell.weights * cell.points))[..., None]
         return once, twice
 
     def weights(self, x: Array, of_places: Array) -> tuple[Array, Array]:
-        """Weights (p, N) of the points in sums over x (m,), weighted by `of_places` (p, m), of what
-        is once integrated and of what is twice."""
-        once, twice = (np.zeros((len(of_places), len(self.points))) for _ in range(2))
-        for cell, inside, beyond in self._places(x):
-            rest = of_places[:, beyond]
-            whole, lever = rest.sum(axis=1)[:, None], (rest @ x[beyond])[:, None]
-            once[:, cell.known] = whole * cell.weights
-            twice[:, cell.known] = (lever - whole * cell.points) * cell.weights
-            if len(inside):
-                first, second = cell.partial(x[inside])
-                once[:, cell.known] += of_places[:, inside] @ first
-                twice[:, cell.known] += of_places[:, inside] @ second
+        """Weights (p, N) of the points in sums over x (m,), ascending, weighted by `of_places`
+        (p, m), of what is once integrated and of what is twice."""
+        once, twice = (np.empty((len(of_places), len(self.points))) for _ in range(2))
+        whole, lever = (np.zeros((len(of_places), 1)) for _ in range(2))
+        for cell, inside in reversed(list(self._places(x))):
+            own = of_places[:, inside]
+            first, second = cell.partial(x[inside])
+            once[:, cell.known] = own @ first + whole * cell.weights
+            twice[:, cell.known] = own @ second + (lever - whole * cell.points) * cell.weights
+            whole = whole + own.sum(axis=1)[:, None]
+            lever = lever + (own @ x[inside])[:, None]
         return once, twice
 
-    def _places(self, x: Array) -> Iterator[tuple[_Cell, NDArray[np.intp], NDArray[np.intp]]]:
-        for cell in self._cells:
-            end = cell.start + cell.length
-            yield cell, np.flatnonzero((x > cell.start) & (x < end)), np.flatnonzero(x >= end)
+    def _places(self, x: Array) -> Iterator[tuple[_Cell, slice]]:
+        """Every cell with the x that lie in it; the last one's end is in it."""
+        firsts = np.searchsorted(x, [cell.start for cell in self._cells[1:]])
+        for cell, first, end in zip(self._cells, (0, *firsts), (*firsts, len(x)), strict=True):
+            yield cell, slice(first, end)
 
 
 class _Cell:
@@ -121,7 +120,11 @@ class _Cell:
     def partial(self, x: Array) -> tuple[Array, Array]:
         """Weights (m, .) of the first and the second integral from the start to x (m,)."""
         first, second = self._integrals
-        values = legendre.legvander(2 * (x - self.start) / self.length - 1, len(second) - 1)
+        if not len(x):
+            return np.zeros((0, first.shape[1])), np.zeros((0, first.shape[1]))
+        at = np.maximum(2 * (x - self.start) / self.length - 1, -1.0)
+        values = legendre.legvander(at, len(second) - 1)
+        values[at == -1.0] = 0.0
         return self.length * values[:, : len(first)] @ first, self.length**2 * values @ second
 
 

@@ -43,7 +43,9 @@ class Rates:
     def sums(self, x: Array, weights: Array) -> Array:
         """(p, 6, n, n): sums over sections x (m,) with weights (p, m) of g of all pairs of shapes,
         displacement and rotation from the root."""
-        once, twice = self._integrals.weights(np.clip(x, 0.0, self._length), weights)
+        order = np.argsort(x)
+        x = np.clip(x[order], 0.0, self._length)
+        once, twice = self._integrals.weights(x, weights[:, order])
         found = np.zeros((len(weights), 6, self._n, self._n))
         for (row,), whole in self._dh.items():
             both = np.zeros((2 * len(weights), self._n, self._n))
@@ -57,11 +59,14 @@ class Rates:
 
     def of(self, x: Array, a: Array, b: Array) -> Array:
         """(t, m, 6) numbers a^T g b at sections x (m,) for modal coordinates a and b (t, n)."""
-        x = np.clip(x, 0.0, self._length)
+        order = np.argsort(x)
+        x = np.clip(x[order], 0.0, self._length)
         turned, carried = self._integrals.of(_rates(self._dh, self._turning, a, b), x)
         drawn, _ = self._integrals.of(_rates(self._dg, self._drawing, a, b), x)
         drawn += np.tensordot(self._lever, carried, axes=1)
-        return np.moveaxis(np.concatenate([drawn, turned]), 0, 2)
+        found = np.empty((len(a), len(x), 6))
+        found[:, order] = np.moveaxis(np.concatenate([drawn, turned]), 0, 2)
+        return found
 
 
 def _add(found: Array, rows: list[Row], whole: tuple[Term, ...], weights: Array) -> None:

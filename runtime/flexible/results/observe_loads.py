@@ -165,14 +165,26 @@ def _places(motion: Motion, x: Array) -> Array:
     return at_rest + deflection(motion, x)
 
 
+def _of_second_order(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
+    """Displacement and rotation (n, m, 6) of second order of the sections and their two rates; the
+    rotation is that of the sections' inertia, which of slices that are rigid bodies of their own is
+    all of it."""
+    carried = not motion.body.points
+    pairs = [("eta", "eta"), ("eta", "etad"), ("eta", "etadd"), ("etad", "etad")]
+    now, rate, slow, fast = (drawn(motion, x, a, b, carried) for a, b in pairs)
+    return -0.5 * now, -rate, -(slow + fast)
+
+
 def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
     """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
     body, shapes, at = motion.body, motion.shapes, values_at(motion.shapes, x)
     sections = shapes.sections(x)
-    place = _places(motion, x)
-    moving = to_first_order(at.phi, motion.etad) - drawn(motion, x, "eta", "etad")[..., :3]
-    pushed = to_first_order(at.phi, motion.etadd)
-    pushed -= drawn(motion, x, "eta", "etadd")[..., :3] + drawn(motion, x, "etad", "etad")[..., :3]
+    second = _of_second_order(motion, x)
+    place, moving, pushed = (
+        to_first_order(at.phi, modal) + of_second[..., :3]
+        for modal, of_second in zip((motion.eta, motion.etad, motion.etadd), second, strict=True)
+    )
+    place[..., 0] += x
     w = motion.frame_spin[:, None]
     wd = motion.frame_spin_rate[:, None]
     turning = np.cross(w, place)
@@ -184,10 +196,13 @@ def _densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, 
     if body.drag is not None:
         drag = sections.drag[:, None]
         force -= drag * (motion.frame_velocity[:, None] + turning + moving)
-    return place, force, -_rotary(motion, x, sections.rho_I.T)
+    turned = [of_second[..., 3:] for of_second in second]
+    return place, force, -_rotary(motion, x, at.theta, turned, sections.rho_I.T)
 
 
-def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
+def _rotary(
+    motion: Motion, x: Array, theta: Array, turned: Sequence[Array], per_length: Array
+) -> Array:
     """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
 
     A point s of a section lies at B s from the axis, B = exp(Psi~) to second order with the part of
@@ -197,7 +212,10 @@ def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     """
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
-    placed, rate, growth = _section_turn(motion, x)
+    if not motion.body.points:
+        rows = motion.shapes.rows
+        theta = np.moveaxis(motion.shapes.carried(rows(x, 1), rows(x, 0)[3]), 2, 0)
+    placed, rate, growth = _section_turn(motion, theta, turned)
     w = tilde(motion.frame_spin)[:, None]
     pushed = (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ placed + 2 * w @ rate + growth
     second = np.zeros((len(x), 3, 3))
@@ -207,24 +225,21 @@ def _rotary(motion: Motion, x: Array, per_length: Array) -> Array:
     return np.stack(axial, axis=-1)
 
 
-def _section_turn(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
-    """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3)."""
-    shapes, carried = motion.shapes, not motion.body.points
-    theta = values_at(shapes, x).theta
-    if carried:
-        theta = np.moveaxis(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]), 2, 0)
-    turn, rate, growth = (
-        to_first_order(theta, modal) for modal in (motion.eta, motion.etad, motion.etadd)
+def _section_turn(
+    motion: Motion, theta: Array, turned: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3), from
+    the rotation (m, 3, modes) of first order and that of second order with its rates (n, m, 3)."""
+    now, moving, pushed = (
+        tilde(to_first_order(theta, modal)) for modal in (motion.eta, motion.etad, motion.etadd)
     )
-    if not shapes.stiffening:
-        return np.eye(3) + tilde(turn), tilde(rate), tilde(growth)
-    now, moving, pushed = tilde(turn), tilde(rate), tilde(growth)
+    if not motion.shapes.stiffening:
+        return np.eye(3) + now, moving, pushed
     once = now @ moving
     twice = now @ pushed + moving @ moving
-    second = [("eta", "eta"), ("eta", "etad"), ("eta", "etadd"), ("etad", "etad")]
-    still, moved, slow, fast = (drawn(motion, x, a, b, carried)[..., 3:] for a, b in second)
+    still, moved, driven = map(tilde, turned)
     return (
-        np.eye(3) + now + tilde(-0.5 * still) + now @ now / 2,
-        moving - tilde(moved) + (once + np.swapaxes(once, -1, -2)) / 2,
-        pushed - tilde(slow + fast) + (twice + np.swapaxes(twice, -1, -2)) / 2,
+        np.eye(3) + now + still + now @ now / 2,
+        moving + moved + (once + np.swapaxes(once, -1, -2)) / 2,
+        pushed + driven + (twice + np.swapaxes(twice, -1, -2)) / 2,
     )
