@@ -245,9 +245,10 @@ def test_a_load_per_length_acts_on_the_mean_section() -> None:
     port, shapes = body.ports["wind"], body.shapes
     assert shapes is not None
     nodes, weights = np.polynomial.legendre.leggauss(30)
-    values = shapes.at(0.55 + 0.35 * nodes)
+    x = 0.55 + 0.35 * nodes
+    values, second = shapes.at(x), shapes.second_order.at(x)
     for found, exact in (
-        (port.phi, values.phi), (port.theta, values.theta), (port.second_order, values.second_order)
+        (port.phi, values.phi), (port.theta, values.theta), (port.second_order, second)
     ):  # fmt: skip
         assert found == pytest.approx(np.einsum("m,m...->...", weights / 2, exact), abs=1e-12)
     assert port.position == pytest.approx([0.55, 0, 0])
