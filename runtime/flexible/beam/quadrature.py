@@ -12,8 +12,9 @@ from ..modal_body import Array, MassPoint
 from .beam_shapes import DIRECTIONS, BeamShapes
 from .gauss import gauss
 
-#: Most numbers of second order that the sections of all points may hold together: half a gigabyte.
-_MOST = 2**26
+#: Most numbers of second order that the sections of all points may hold together: a quarter of a
+#: gigabyte, which every evaluation of the accelerations reads.
+_MOST = 2**25
 
 
 def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
@@ -27,8 +28,8 @@ def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
     if numbers > _MOST:
         raise SceneError(
             f'beam "{shapes.data.name}": {shapes.n} shapes need {len(x)} points of mass '
-            f"(quadrature) and {8e-9 * numbers:.1f} GB for what their sections move by; expected "
-            f"{8e-9 * _MOST:.1f} GB or less; give fewer shapes"
+            f"(quadrature) and {8e-6 * numbers:.0f} MB for what their sections move by; expected "
+            f"{8e-6 * _MOST:.0f} MB or less; give fewer shapes"
         )
     mass, yy, zz = shapes.data.inertia[:, shapes.data.piece(x)] * lengths
     inertia = [np.diag(about) for about in np.stack([yy + zz, zz, yy], axis=1)]
