@@ -54,10 +54,10 @@ def stays_definite(body: ModalBody, held: ModalPort, support: Support, turns: Ar
 
 def is_definite_at(body: ModalBody, held: ModalPort, support: Support, eta: Array) -> bool:
     """Whether deflections (N, n) leave a positive inertia to every motion that has one without."""
-    straight, bent = (_Inertia(body, held, of) for of in (np.zeros((1, body.n)), eta))
+    inertia = _Inertia(body, held, np.concatenate([np.zeros((1, body.n)), eta]))
     for way in (support, ANY):
-        kept, scale = _scale(next(straight.on(way)))
-        scaled = (m[:, kept[:, None], kept] / scale for at in (straight, bent) for m in at.on(way))
+        kept, scale = _scale(next(inertia.on(way)))
+        scaled = (m[:, kept[:, None], kept] / scale for m in inertia.on(way))
         if _is_definite(next(scaled)):
             return all(map(_is_definite, scaled))
     return True  # what a straight body lacks is not lost by bending
@@ -118,14 +118,14 @@ class _Inertia:
             self.ride, self.own = _frame_motion(held, eta)
 
     def on(self, support: Support) -> Iterator[Array]:
-        """(., m + n, m + n) for the speeds of the support and the modes, some deflections at a
-        time: M(eta) of [v; w; etad] in frame axes, with v, w by the speeds and by etad."""
+        """(., m + n, m + n) for the speeds of the support and the modes, the first one and then
+        some at a time: M(eta) of [v; w; etad] in frame axes, with v, w by the speeds and etad."""
         m, n = support.speeds, len(self.Mff)
         moved = self.ride @ support.motion
         pushed = self.S @ self.own + self.S_rf
         corner = np.swapaxes(moved, -1, -2) @ self.S @ moved + support.inertia
         edge = np.swapaxes(moved, -1, -2) @ pushed
-        for some in slices(len(self.S), (m + n) ** 2):
+        for some in (slice(0, 1), *slices(len(self.S), (m + n) ** 2)):
             own, free = np.swapaxes(self.own[some], 1, 2), np.swapaxes(self.S_rf[some], 1, 2)
             whole = np.empty((len(own), m + n, m + n))
             whole[:, :m, :m], whole[:, :m, m:] = corner[some], edge[some]
