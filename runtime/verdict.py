@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ class Verdict:
 
 
 def _first_clause(sentence: str) -> str:
-    return sentence.split(";")[0].split("): ")[0].split(": split ")[0]
+    return re.split(r";|(?<=\)): |: split ", sentence)[0]
 
 
 def verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:

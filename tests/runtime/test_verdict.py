@@ -11,6 +11,7 @@ from support.result_scenes import motor, pins, rod
 
 import mstmm
 from mstmm.runtime.result import Result
+from mstmm.runtime.verdict import Verdict
 
 
 def test_a_clean_certified_run_is_trusted() -> None:
@@ -25,6 +26,21 @@ def test_without_a_second_run_nothing_is_trusted() -> None:
     assert run.success
     assert not run.trusted
     assert "not judged: no second run" in str(run.certificate.verdict())
+
+
+@pytest.mark.parametrize(
+    ("sentence", "clause"),
+    [
+        ('loads take 98% of "p" (gamma): it is at its load', 'loads take 98% of "p" (gamma)'),
+        ('bends by 0.6; beyond 0.3 split it', 'bends by 0.6'),
+        ('turns by 1.4 rad: split the body', 'turns by 1.4 rad'),
+        ('beam "p": modes: 1 is too few', 'beam "p": modes: 1 is too few'),
+    ],
+)  # fmt: skip
+def test_the_first_clause_comes_first(sentence: str, clause: str) -> None:
+    assert str(Verdict((sentence, "more"), (), "")) == (
+        f"NOT trusted: {clause} (and 1 more, see below)"
+    )
 
 
 def test_bounds_that_are_asked_for_are_those_that_hold() -> None:
