@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from .errors import ExpressionError
 from .expression import Expression
@@ -69,10 +69,30 @@ def motion_at(drive: Expression, t: float) -> tuple[float, float, float]:
 
     An entry is nan or infinite where the mathematics has no finite value.
     """
-    time = Graph().element("t")
-    nodes = motion(drive, time)
-    q, u, a = (value(node, lambda _: t) for node in nodes)
+    q, u, a = (value(node, lambda _: t) for node in motion(drive, Graph().element("t")))
     return q, u, a
+
+
+#: A drive may jump by no more than this share of its own size, in position and in speed.
+_CONTINUOUS = 1e-6
+
+
+def jump(drive: Expression, gaps: Iterable[tuple[float, float]]) -> str:
+    """What jumps first across gaps (before, after) in time, in s; "" if nothing does.
+
+    A position that jumps is no motion, a speed that jumps needs an impulse, and neither has a
+    finite effort.
+    """
+    nodes = motion(drive, Graph().element("t"))[:2]
+    for gap in gaps:
+        for what, node in zip(("position", "speed"), nodes, strict=True):
+            a, b = (value(node, lambda _, t=t: t) for t in gap)  # type: ignore[misc]
+            if abs(b - a) > _CONTINUOUS * max(1.0, abs(a), abs(b)):
+                return (
+                    f"jumps in {what} at t = {gap[0]:g} s, from {a:g} to {b:g}; "
+                    "join the pieces so that position and speed are continuous"
+                )
+    return ""
 
 
 def value(node: Node, leaf: Callable[[Node], float]) -> float:

@@ -6,7 +6,7 @@ import math
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from .drive import motion_at
+from .drive import jump, motion_at
 from .errors import ExpressionError
 from .expression import Expression
 from .hinge_types import HINGE_TYPES, HingeType, effort_unit
@@ -239,28 +239,6 @@ def _drive(
     return drive
 
 
-#: A drive may jump by no more than this share of its own size, in position and in speed.
-_CONTINUOUS = 1e-6
-
-
-def _jumps(entry: Expression, place: Location) -> list[tuple[Location, str]]:
-    """Times at which a drive jumps: a position that jumps is no motion, a speed that jumps needs an
-    impulse, and neither has a finite effort."""
-    for t in entry.time_breaks():
-        if t < 0:
-            continue
-        before = motion_at(entry, math.nextafter(t, -math.inf))
-        after = motion_at(entry, math.nextafter(t, math.inf))
-        for what, a, b in zip(("position", "speed"), before, after, strict=False):
-            if abs(b - a) > _CONTINUOUS * max(1.0, abs(a), abs(b)):
-                return [(
-                    place,
-                    f"{found(entry.text)} jumps in {what} at t = {t:g} s, from {a:g} to {b:g}; "
-                    "join the pieces so that position and speed are continuous",
-                )]  # fmt: skip
-    return []
-
-
 def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
     """A drive whose start is not finite or whose derivatives cannot be formed."""
     try:
@@ -268,7 +246,10 @@ def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
     except ExpressionError as error:
         return [(place, str(error))]
     if all(math.isfinite(x) for x in start):
-        return _jumps(entry, place)
+        breaks = [t for t in entry.time_breaks() if t >= 0]
+        ways = ((math.nextafter(t, -math.inf), math.nextafter(t, math.inf)) for t in breaks)
+        jumps = jump(entry, ways)
+        return [(place, f"{found(entry.text)} {jumps}")] if jumps else []
     return [(
         place,
         f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "

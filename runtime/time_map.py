@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.drive import jump
+from mstmm.errors import SceneError
 from mstmm.expression_parser import Term
 
 from .acting import Acting
@@ -67,7 +69,10 @@ class TimeMap:
 
 
 def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap:
-    """The map of all expressions for a run from `start` to `end` (s)."""
+    """The map of all expressions for a run from `start` to `end` (s).
+
+    Raises SceneError for a drive that jumps on the way.
+    """
     if not end > start:
         return TimeMap(np.zeros(0), np.zeros(0), np.zeros(0))
     once = {(e.expression, e.constants, e.drive): e for e in reversed(list(expressions))}
@@ -83,6 +88,9 @@ def _mapped(expressions: list[Acting], start: float, end: float) -> TimeMap:
         for margin in view.margins():
             found = roots(margin, start, end, view.most)
             breaks.update(found.gaps.ravel().tolist())
+            jumps = jump(one.expression, found.gaps.tolist()) if one.drive else ""
+            if jumps:
+                raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
             if not found.complete:
                 notes.append(_many_switches(one, found.open_from))
         watched = view.watched()

@@ -123,3 +123,24 @@ def test_compiled_code_sees_pulses_as_the_loop_does() -> None:
     model = mstmm.compile(on_a_rail("where(sin(t) > 0.9999, 100, 0)"), engine="fused")
     result = model.simulate(10.0)
     assert result.u[-1, 0] == pytest.approx(400 * np.arccos(0.9999), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("drive", "jumps"),
+    [
+        ("where(sin(3*t) > 0.5, 0.1, 0)", "jumps in position at t = 0.174533 s, from 0 to 0.1"),
+        ("abs(sin(t - 0.5))", "jumps in speed at t = 0.5 s, from -1 to 1"),
+        ("abs(sin(t - 0.5))^3", ""),
+        ("where(sin(3*t) > 0.5, (sin(3*t) - 0.5)^3, 0)", ""),
+    ],
+)
+def test_a_drive_that_jumps_on_the_way_is_refused(drive: str, jumps: str) -> None:
+    """Found where the run is known; before the jump there is a motion."""
+    scene = mstmm.Scene(gravity=(0, 0, 0), body=[MASS], hinge=[RAIL | {"drive": drive}])
+    model = mstmm.compile(scene, engine="looped")
+    assert model.simulate(0.1).success
+    if jumps:
+        with pytest.raises(mstmm.SceneError, match=f'drive of hinge "h": .* {jumps}'):
+            model.simulate(1.0)
+    else:
+        assert model.simulate(1.0, certify=True).trusted
