@@ -5,9 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -19,7 +16,7 @@ from numpy.typing import NDArray
 
 from mstmm.errors import EnvironmentFailure, SceneError
 
-from .files import refuse_special, replacing
+from .files import read_arrays, refuse_special, replacing
 from .integrate import Samples
 from .provenance import kernels_hash
 from .settings import Settings
@@ -36,12 +33,6 @@ _ROWS = ("t", "y", "memory", "event")
 #: Name, kind of numbers and axes of what a file holds.
 _STATE = (("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0))
 _SAMPLES = (("t", "f", 1), ("y", "f", 2), ("memory", "f", 2), ("event", "i", 1))
-
-#: What numpy raises for files that are cut, overwritten or no archives.
-UNREADABLE = (
-    OSError, ValueError, KeyError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError,
-    SyntaxError, RuntimeError, MemoryError, struct.error, OverflowError,
-)  # fmt: skip
 
 
 class Checkpoint:
@@ -80,9 +71,8 @@ class Checkpoint:
         """
         refuse_special(self.path, "checkpoint")
         try:
-            with self.path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                data = {name: file[name] for name in file.files}
-        except UNREADABLE as error:
+            data = read_arrays(self.path)
+        except (FileNotFoundError, ValueError) as error:
             raise SceneError(f'checkpoint "{self.path}" cannot be read: {error}') from None
         if str(data.get("format")) != _FORMAT:
             raise SceneError(f'checkpoint "{self.path}" is not one of this version of mstmm')

@@ -7,6 +7,7 @@ import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from mstmm.errors import EnvironmentFailure, SceneError
 
@@ -20,6 +21,22 @@ def refuse_special(path: Path, where: str) -> None:
     """
     if os.path.exists(path) and not os.path.isfile(path):  # False where a folder is closed to us
         raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
+
+
+def read_arrays(path: Path) -> dict[str, Any]:
+    """All arrays of an .npz file by name.
+
+    Raises FileNotFoundError, and ValueError with a reason for what is no such file or damaged.
+    """
+    import numpy as np
+
+    try:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # of a dozen kinds, for bytes that nobody wrote
+        raise ValueError(str(error) or type(error).__name__) from error
 
 
 #: What is being written lies beside its place, PART, with a LOCK that ends with the writer.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -240,6 +242,28 @@ def test_a_file_with_changed_bytes(tmp_path: Path, rng: np.random.Generator) -> 
             bar.body(bar.from_arrays(matrices=str(path)))
         except SceneError as error:
             assert str(error).startswith('elastic "bar"')
+
+
+def test_an_archive_whose_header_is_no_text(tmp_path: Path) -> None:
+    """Python 3.12 has an exception of its own for it."""
+    path, header = tmp_path / "bar.npz", io.BytesIO()
+    np.save(header, np.ones(3))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mass.npy", header.getvalue().replace(b"'descr':", b"'descr'\x0f"))
+    with pytest.raises(SceneError, match="is no file of arrays"):
+        bar.body(bar.from_arrays(matrices=str(path)))
+
+
+def test_whatever_a_reader_makes_of_damage_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stumble(*_: object, **__: object) -> None:
+        raise LookupError
+
+    (tmp_path / "bar.npz").write_bytes(b"PK")
+    monkeypatch.setattr(np, "load", stumble)
+    with pytest.raises(SceneError, match=r"is no file of arrays \(.npz\): LookupError"):
+        bar.body(bar.from_arrays(matrices=str(tmp_path / "bar.npz")))
 
 
 FACE = [[0, -1, -1], [0, 1, 1]]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import zlib
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.errors import SceneError
 from mstmm.scene_errors import near
 
-from ...files import refuse_special
+from ...files import read_arrays, refuse_special
 from .model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -21,11 +19,6 @@ Array = NDArray[np.float64]
 _MATRICES = ("mass", "stiffness", "scalar_mass")
 _PARTS = ("data", "indices", "indptr")
 _KEYS = (*_MATRICES, *(f"{m}_{p}" for m in _MATRICES for p in _PARTS), "nodes", "order")
-#: What numpy and the archive below it raise for files that are damaged or of another kind.
-_UNREADABLE = (
-    OSError, ValueError, TypeError, AttributeError, KeyError, EOFError, MemoryError,
-    NotImplementedError, BadZipFile, zlib.error,
-)  # fmt: skip
 _ORDERS = ("node", "component")
 
 
@@ -89,11 +82,10 @@ def _arrays(path: Path, where: str) -> dict[str, Any]:
     way_out = "write it with mstmm.runtime.flexible.elastic.save_matrices"
     refuse_special(path, where)
     try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            return {key: file[key] for key in file.files}
+        return read_arrays(path)
     except FileNotFoundError:
         raise SceneError(f"{where}: there is no file {path}; {way_out}") from None
-    except _UNREADABLE as error:
+    except ValueError as error:
         raise SceneError(
             f"{where}: {path} is no file of arrays (.npz): {error}; {way_out}"
         ) from None
