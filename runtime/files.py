@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import secrets
 from collections.abc import Iterator
@@ -38,6 +39,43 @@ def read_arrays(path: Path) -> dict[str, Any]:
     except Exception as error:  # of a dozen kinds, for bytes that nobody wrote
         raise ValueError(str(error) or type(error).__name__) from error
 
+
+#: How the seal of a file begins; the hash of all before it follows.
+_SEAL = b"\nmstmm sha256 "
+_SEALED = len(_SEAL) + 64
+
+
+def seal(path: Path) -> None:
+    """Append the hash of a file to it.  Readers of formats that know where they end ignore it."""
+    with path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    with path.open("ab") as file:
+        file.write(_SEAL + found.encode())
+
+
+def seal_is_broken(path: Path) -> bool:
+    """True if a file ends with a seal and is not what was sealed; False also without a seal.
+
+    Libraries that read binary formats may crash or hang on damaged files, and cannot be caught.
+    """
+    size = path.stat().st_size - _SEALED
+    if size < 0:
+        return False
+    found = hashlib.sha256()
+    with path.open("rb") as file:
+        file.seek(size)
+        end = file.read()
+        if not end.startswith(_SEAL):
+            return False
+        file.seek(0)
+        while size > 0 and (part := file.read(min(size, _PART_OF_FILE))):
+            found.update(part)
+            size -= len(part)
+    return end[len(_SEAL) :] != found.hexdigest().encode()
+
+
+#: Bytes read at a time.
+_PART_OF_FILE = 2**20
 
 #: What is being written lies beside its place, PART, with a LOCK that ends with the writer.
 _MARK, _LOCK, _PART = ".mstmm-", ".lock", ".part"

@@ -19,7 +19,7 @@ from mstmm.scene import Scene
 
 from . import provenance, store
 from .dataset import MOST_SPEEDS, dataset, extra
-from .files import refuse_special, replacing
+from .files import refuse_special, replacing, seal, seal_is_broken
 from .stability import check_step
 from .steppers import get
 
@@ -48,6 +48,7 @@ def _netcdf(result: Result, path: Path) -> None:
         raise extra("io", "a NetCDF file", error) from None
     _room_for(int(data.nbytes) + _OVERHEAD, path)
     data.to_netcdf(path, engine="h5netcdf")
+    seal(path)
 
 
 #: Bytes of a NetCDF file beside its arrays, generously.
@@ -91,6 +92,11 @@ def load(path: Path) -> Result:
         raise extra("io", "a NetCDF file", error) from None
     if not path.is_file():
         raise SceneError(f'result file "{path}": there is no such file')
+    if seal_is_broken(path):  # before HDF5, which such a file may crash or occupy for ever
+        raise SceneError(
+            f'result file "{path}": it is damaged, or was changed since it was written; make it '
+            "again, or write what you changed to another file"
+        )
     data = _read(xarray, path)
     if data.attrs.get("format") != "mstmm result" or "scene" not in data:
         raise SceneError(f'result file "{path}": not a result of mstmm')

@@ -218,6 +218,21 @@ for path in sys.argv[1:]:
 """
 
 
+def test_changed_bytes_never_reach_the_library(
+    run: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """HDF5 1.14 crashes the process on some of them, and 2.0 never comes back."""
+    path = run.save(tmp_path / "run.nc")
+    whole = path.read_bytes()
+    with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+        np.testing.assert_array_equal(file["q"], run.q)  # others read it as it is
+    monkeypatch.delattr("mstmm.runtime.storage._read")
+    for place in (0, 600, len(whole) // 2, len(whole) - 100):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(mstmm.SceneError, match="damaged, or was changed since it was written"):
+            mstmm.load_result(path)
+
+
 def test_damaged_files_are_refused_without_noise(run: Result, tmp_path: Path) -> None:
     """In a process of its own: what objects of h5py complain of as they go shows on its stderr."""
     whole = run.save(tmp_path / "run.nc").read_bytes()
@@ -239,4 +254,4 @@ def test_damaged_files_are_refused_without_noise(run: Result, tmp_path: Path) ->
     )
     assert done.returncode == 0 and done.stderr == ""
     said = done.stdout.splitlines()
-    assert len(said) == 24 and set(said) <= {"read", "refused"} and said.count("refused") > 8
+    assert said == ["refused"] * 24
