@@ -69,8 +69,12 @@ def motion_at(drive: Expression, t: float) -> tuple[float, float, float]:
 
     An entry is nan or infinite where the mathematics has no finite value.
     """
-    q, u, a = (value(node, lambda _: t) for node in motion(drive, Graph().element("t")))
+    q, u, a = (_at(node, t) for node in motion(drive, Graph().element("t")))
     return q, u, a
+
+
+def _at(node: Node, t: float) -> float:
+    return value(node, lambda _: t)
 
 
 #: A drive may jump by no more than this share of its own size, in position and in speed.
@@ -86,7 +90,7 @@ def jump(drive: Expression, gaps: Iterable[tuple[float, float]]) -> str:
     nodes = motion(drive, Graph().element("t"))[:2]
     for gap in gaps:
         for what, node in zip(("position", "speed"), nodes, strict=True):
-            a, b = (value(node, lambda _, t=t: t) for t in gap)  # type: ignore[misc]
+            a, b = (_at(node, t) for t in gap)
             if abs(b - a) > _CONTINUOUS * max(1.0, abs(a), abs(b)):
                 return (
                     f"jumps in {what} at t = {gap[0]:g} s, from {a:g} to {b:g}; "
