@@ -6,17 +6,18 @@ Floating-frame description with the shapes of a finite-element model (Rui, Wang,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.scene_rules import GROUND, split
 
+from ...apart import apart
 from ..computable import computed
 from ..definiteness import stays_definite
 from ..modal_body import ModalBody, ModalPort
@@ -39,11 +40,15 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Fixed-interface modes where the scene leaves their number open.
 AUTO_MODES = 4
 #: Bodies whose numbers are kept.
 KEPT = 8
+#: Unknowns, about, from which numbers are found by a process that can be interrupted: some tenths
+#: of a second of factorisation.
+LONG = 6000
 #: Entries below this part of the largest of their kind are rounding, and become exact zeros.
 _ROUNDING = 1e-10
 
@@ -99,7 +104,25 @@ class _Source:
 @lru_cache(maxsize=KEPT)
 def _made(source: _Source, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
     elastic = source.elastic
-    return computed(f'elastic "{elastic.name}"', lambda: _reduced(elastic, held, used, frame, why))
+    where = f'elastic "{elastic.name}"'
+    return computed(where, lambda: _maybe_apart(_reduced, elastic, held, used, frame, why))
+
+
+def _maybe_apart(work: Callable[..., T], elastic: Elastic, *arguments: Any) -> T:
+    """work(elastic, *arguments), by a process of its own where that may take long."""
+    if _unknowns(elastic) < LONG:
+        return work(elastic, *arguments)
+    return apart(f'elastic "{elastic.name}"', work, elastic, *arguments)
+
+
+def _unknowns(elastic: Elastic) -> float:
+    """Unknowns of a body, roughly and before anything is read or made."""
+    if elastic.box is not None:
+        return 12.0 * prod(elastic.box.divisions)
+    if elastic.arrays is not None:
+        return float(np.shape(elastic.arrays.nodes)[0] * 3)
+    path = Path(elastic.matrices or elastic.mesh or "")
+    return path.stat().st_size / 50 if path.is_file() else 0.0
 
 
 def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
@@ -119,10 +142,15 @@ def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why:
     )  # fmt: skip
 
 
-def rigid_of(elastic: Elastic) -> tuple[ElasticModel, dict[str, Port]]:
-    """Mass and ends of an [[elastic]] table, without any shapes."""
+def rigid_of(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
+    """(6, 6) inertia about the origin and the ends of an [[elastic]] table, without any shapes."""
+    return _maybe_apart(_rigid, elastic)
+
+
+def _rigid(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
     model = model_of(elastic)
-    return model, {name: port(model, name, end, False) for name, end in elastic.ends.items()}
+    ends = {name: port(model, name, end, False) for name, end in elastic.ends.items()}
+    return model.inertia, ends
 
 
 def model_of(elastic: Elastic) -> ElasticModel:

@@ -213,8 +213,7 @@ def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     if modal is not None:
         turning = np.trace(modal.second) * np.eye(3) - modal.second
         return _rigid_body(body.name, modal.mass, modal.first, turning, modal.ports)
-    model, ports = rigid_of(body)
-    j = model.inertia
+    j, ports = rigid_of(body)
     first = np.array([j[5, 1], j[3, 2], j[4, 0]])
     return _rigid_body(body.name, float(j[0, 0]), first, j[3:, 3:], ports)
 
