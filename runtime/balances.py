@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene import Hinge, Scene
 
 from .flexible.results.observe_momentum import undeformed
@@ -18,7 +18,6 @@ from .flexible.results.observe_momentum import undeformed
 if TYPE_CHECKING:
     from .result import Result
 
-Array = NDArray[np.float64]
 
 #: A hinge load counts as zero below this part of the largest one.
 _ZERO = 1e-9

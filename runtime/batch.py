@@ -14,16 +14,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array, threads_of
 from mstmm.errors import NumericalFailure
 
-from .arrays import threads_of
 from .engine import Engine
 from .fused import FusedLibrary
 from .fusing import Fusing
-
-Array = NDArray[np.float64]
 
 #: A thread is worth starting for about 0.2 ms of work; in states times speeds.
 _LEAST_LANES, _LEAST_LOOPED = 20000, 2000

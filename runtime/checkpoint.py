@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, SceneError
 
 from .files import read_arrays, refuse_special, replacing
@@ -24,7 +24,6 @@ from .settings import Settings
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 State = Mapping[str, Any]
 
 _FORMAT = "mstmm checkpoint 3"

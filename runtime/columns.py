@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.columns_abi import ABI, SYMBOL
 from mstmm.errors import EnvironmentFailure
-
-Array = NDArray[np.float64]
 
 
 class _Call(ctypes.Structure):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene import Hinge
 
 from . import prebuilt
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from .model import Model
     from .simulate import Trajectory
 
-Array = NDArray[np.float64]
 
 #: Samples of a run at which the pivots are looked at.
 SAMPLES = 12

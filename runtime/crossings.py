@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mstmm.arrays import Array
 
 #: Crossings in a row in hardly any time, as part of the run, after which a switch is left alone.
 _MOST, _AT_ONCE = 50, 2.0**-42

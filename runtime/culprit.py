@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.drive import motion_at
 from mstmm.errors import NumericalFailure
 from mstmm.expression import Expression, Name
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from .engine import Engine
 
-Array = NDArray[np.float64]
 
 #: States looked at past the last good one lie this many times farther ahead each, up to this part
 #: of the time: a run ends within rounding of the place where an expression stops being a number.

@@ -6,12 +6,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from .quantities import Quantity
 
-Array = NDArray[np.float64]
 
 #: Runs with at least this many samples are drawn as they are; others get this many points.
 POINTS = 600

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.hinge_types import HINGE_TYPES
 
-from .arrays import batch
 from .pack import pack
 from .seeded import slopes
 from .structure import structure_of
@@ -27,7 +27,6 @@ from .tangents import Tangents
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 
 #: More bodies than this are not differentiated: work and results grow with their square.
 MOST_BODIES = 1000

@@ -6,15 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mstmm.expression import Expression
 from mstmm.expression_parser import Term
 
 from . import intervals as iv
 from .intervals import EVERYTHING, Interval, point
-
-Array = NDArray[np.float64]
 
 _ONE, _NONE = point(1.0), point(0.0)
 

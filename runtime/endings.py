@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .culprit import culprit_ahead
 from .integrate import Run, Status
@@ -14,7 +15,6 @@ from .run_notes import endless
 if TYPE_CHECKING:
     from .simulate import SceneSystem
 
-Array = NDArray[np.float64]
 
 #: What a run ends with where call-backs of the scene fail; their code says how.
 _EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED)

@@ -9,14 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
 from .culprit import culprit
 from .pack import Packed
-
-Array = NDArray[np.float64]
 
 UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT, _SECTION, _MODES = range(1, 9)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.hinge_types import HINGE_TYPES
 
@@ -17,7 +18,6 @@ from .sizes import speed_sizes
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 
 #: Coordinates that a message lists.
 _LISTED = 3

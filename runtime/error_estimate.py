@@ -17,13 +17,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .layout import Layout
 from .settings import Settings
 from .simulate import Trajectory
-
-Array = NDArray[np.float64]
 
 #: The estimate is this many times the difference of the two runs.
 SAFETY = 2.0

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import MstmmError, SceneError
 
 from . import compiled_run, second_opinion
@@ -32,7 +32,6 @@ from .steppers import get
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: Seconds of wall time between checkpoints.

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure
 from mstmm.fused_abi import ABI, SYMBOL
 
 from . import prebuilt
 
-Array = NDArray[np.float64]
 Codes = NDArray[np.int32]
 
 

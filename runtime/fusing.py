@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from .columns import ColumnsLibrary
     from .fused import FusedLibrary
-
-Array = NDArray[np.float64]
 
 
 class Fusing(Protocol):

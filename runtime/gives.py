@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from mstmm.scene import Spring
 
     from .result import Result
 
-Array = NDArray[np.float64]
 
 #: Springs of a scene up to which they are looked at.
 _MOST = 200

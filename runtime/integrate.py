@@ -14,15 +14,13 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 
 from .steppers import Tableau
 from .tableau_in_c import c_tableau
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _SAMPLE_DOUBLES = 2**19  # of one buffer, about 4 MB
 _ARGUMENTS = {

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import ElementError, EnvironmentFailure
 from mstmm.tangent import PREFIX, tangent
 
@@ -25,7 +25,6 @@ from .tape_kernel import TapeKernel
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 Rates = Callable[[float, Array], Array]
 
 #: More bodies than this are differenced: writing the tangent kernel would take many seconds.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from .engine import Engine
@@ -19,8 +19,6 @@ from .simulate import SLICE, SceneSystem
 from .steppers import get
 from .tableau_in_c import c_tableau
 from .threads import on_threads
-
-Array = NDArray[np.float64]
 
 
 @dataclass

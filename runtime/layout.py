@@ -9,13 +9,10 @@ from functools import cached_property
 from typing import overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Integers
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-
-Integers = NDArray[np.int64]
-
 
 #: Speeds up to which dense matrices are made: 3 GB a matrix.
 _DENSE = 20_000

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array, batch, one, pair, real
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
 from . import parameters as named_parameters
-from .arrays import batch, one, pair, real
 from .engine import Engine
 from .fusing import Fusing, NotFused
 from .layout import Layout, refuse_dense
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from .flexible.modal_body import ModalBody
     from .result import Result
     from .simulate_batch import BatchResult
-
-Array = NDArray[np.float64]
 
 
 class Model:

@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, split
 from mstmm.scene_errors import near
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from .model import Model
     from .simulate import Trajectory
 
-Array = NDArray[np.float64]
 
 #: Numbers of one batch, about 130 MB.
 _BATCH = 2**24

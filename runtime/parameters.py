@@ -12,10 +12,9 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from mstmm.arrays import by_name, real
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-
-from .arrays import by_name, real
 
 TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")

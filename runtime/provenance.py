@@ -11,9 +11,9 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import mstmm
+from mstmm.arrays import Array
 
 from .error_estimate import ErrorEstimate
 from .integrate import Statistics, Status
@@ -31,7 +31,6 @@ FORMAT = 1
 
 _ERROR = ("horizon", "tenfold", "reference", "moved")
 
-Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 

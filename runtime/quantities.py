@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.hinge_types import effort_unit
 from mstmm.scene_errors import near
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from .flexible.results.results import FlexibleResults
     from .observed import Observed
 
-Array = NDArray[np.float64]
 
 Values = Callable[[], Array]
 

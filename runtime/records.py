@@ -8,10 +8,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Integers
 from mstmm.errors import SceneError
 from mstmm.scene_members import Members
-
-Integers = NDArray[np.int64]
 
 _WHOLE = {"int": np.int32, "int64_t": np.int64}
 

@@ -11,11 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
-
-Array = NDArray[np.float64]
 
 _LONGEST = 0.5  # step, in sizes of the coordinates
 _SOFT = 1e-8  # scaled stiffness below which a direction counts as slack

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene_flexible_checks import short_beams
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from .certificate import Certificate
     from .model import Model
 
-Array = NDArray[np.float64]
 
 #: States below this have finite energies in any scene that stands for something.
 _MODEST = 1e60

@@ -15,8 +15,8 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from .crossings import Crossings, Sight, dip, just_before
@@ -31,7 +31,6 @@ from .simulate import SceneSystem, Trajectory, split, tolerances
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 
 #: Method of `simulate` -> name of SciPy's class.
 METHODS = {f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")}

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from mstmm.arrays import Array
 from mstmm.dual import Dual, Marks, value_of
 from mstmm.errors import SceneError
 from mstmm.expression import Expression, number
@@ -27,7 +27,6 @@ from . import parameters
 from .pack import Known, pack
 from .structure import structure_of
 
-Array = NDArray[np.float64]
 Change = Callable[[float], Any]
 
 #: Largest difference that another order of a sum of three products makes, relative above 1.

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mstmm.arrays import numbers, real, whole
 from mstmm.errors import SceneError
-
-from .arrays import numbers, real, whole
 
 #: Absolute tolerances below this are this: squares of errors against them must not overflow.
 _LEAST = 1e-100

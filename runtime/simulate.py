@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.tape import Tape
 
@@ -24,8 +25,6 @@ from .run_notes import unseen
 from .settings import Settings
 from .steppers import get
 from .switches import MOST
-
-Array = NDArray[np.float64]
 
 #: Seconds between looks at progress, interrupts and checkpoints.
 SLICE = 0.1

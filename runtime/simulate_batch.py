@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mstmm.arrays import Array, batch, by_name, numbers, pair, threads_of
 from mstmm.errors import MstmmError, SceneError
 
-from .arrays import batch, by_name, numbers, pair, threads_of
 from .integrate import Failure, Run, Status, failure_text
 from .lanes_run import Lanes, run_lanes
 from .settings import Settings, checked
@@ -33,8 +33,6 @@ from .threads import on_threads
 if TYPE_CHECKING:
     from .fused import FusedLibrary
     from .model import Model
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

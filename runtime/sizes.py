@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from .flexible.modal_body import ModalBody
     from .model import Model
-
-Array = NDArray[np.float64]
 
 
 def speed_sizes(model: Model) -> Array:

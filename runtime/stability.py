@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from .engine import Engine
@@ -22,7 +22,6 @@ from .steppers import Tableau
 if TYPE_CHECKING:
     from .settings import Settings
 
-Array = NDArray[np.float64]
 
 #: h |lambda| above which a fixed step of an explicit method is not trusted.
 LIMIT = 2.5

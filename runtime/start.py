@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import Hinge, Scene
 
@@ -15,8 +15,6 @@ from .layout import HingeSlots, Layout
 
 if TYPE_CHECKING:
     from .flexible.modal_body import ModalBody
-
-Array = NDArray[np.float64]
 
 
 def start_values(

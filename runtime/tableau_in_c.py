@@ -7,11 +7,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .steppers import Tableau
-
-Array = NDArray[np.float64]
 
 
 @cache

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure
 from mstmm.ir import Constant, KernelIR, Store
 from mstmm.structure import Structure
@@ -17,8 +17,6 @@ from mstmm.tangent import PREFIX, tangent
 from .columns import ColumnsLibrary
 from .fusing import Fusing
 from .tape_kernel import TapeKernel
-
-Array = NDArray[np.float64]
 
 #: Inputs of the kernel "accelerations", in its order.
 INPUTS = ("p", "t", "q", "u", "memory", "efforts")

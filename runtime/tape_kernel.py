@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.ir import KernelIR
 from mstmm.tape import compile_tape
 
 from . import prebuilt
 from .values import c_tape
-
-Array = NDArray[np.float64]
 
 
 class TapeKernel:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.drive import jump
 from mstmm.errors import SceneError
 from mstmm.expression_parser import Term
@@ -23,8 +23,6 @@ from .enclosures import Enclosure, enclose, of_time
 from .intervals import EVERYTHING, Interval, cos
 from .time_pace import Pace, Watched, pace
 from .time_roots import Margin, roots
-
-Array = NDArray[np.float64]
 
 #: Part of the run within which two times are one at its ends.
 _ROUNDING = 1e-15

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
+
 from .enclosures import Enclosure
 from .intervals import Interval
-
-Array = NDArray[np.float64]
 
 #: A function changes over a cell by no more than this part of its change over the run.
 PART = 0.25

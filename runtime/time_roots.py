@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
+
 from .enclosures import Enclosure
 from .intervals import Interval, point
 
-Array = NDArray[np.float64]
 Margin = Callable[[Interval], Enclosure]
 
 #: Cells at the start, and the smallest one as part of the span.

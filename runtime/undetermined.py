@@ -11,16 +11,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
 
 if TYPE_CHECKING:
     from .engine import Engine
     from .model import Model
 
-Array = NDArray[np.float64]
 
 #: Hinges that are looked for, and that are named, at most.
 _MOST, _NAMED = 50, 8

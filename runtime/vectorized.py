@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.ir import (
     LOOP_INDEX,
@@ -28,8 +29,6 @@ from mstmm.ir import (
     Sum,
     Temporary,
 )
-
-Array = NDArray[np.float64]
 
 
 def evaluate(kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int = 0) -> dict[str, Array]:

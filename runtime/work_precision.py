@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from . import compiled_run
@@ -23,7 +23,6 @@ from .simulate import SceneSystem, make_run
 if TYPE_CHECKING:
     from .model import Model
 
-Array = NDArray[np.float64]
 
 METHODS = ("dop853", "pirk13")
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(10, 27))

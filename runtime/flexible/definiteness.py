@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
+
 from ..sizes import modal_sizes
 from ..vectorized import evaluate
 from .parts import slices
@@ -23,9 +25,9 @@ from .support import ANY, Support, Supports
 
 if TYPE_CHECKING:
     from ..pack import Packed
-    from .modal_body import ModalBody, ModalPort
+    from .modal_body import ModalBody
+    from .modal_port import ModalPort
 
-Array = NDArray[np.float64]
 
 #: Largest rotation of a section against the frame for which a model is made, rad, and the margin
 #: over it: deflections are drawn, and the worst is not among them.

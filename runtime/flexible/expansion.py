@@ -17,7 +17,8 @@ from mstmm.rotations import rows, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split
 from mstmm.scene_parts import End, Load
 
-from .modal_body import MassPoint, ModalBody, ModalPort
+from .modal_body import ModalBody
+from .modal_port import MassPoint, ModalPort
 from .one_way.rigidified import Rigidified
 
 HELD, POINT = "held", "point"

@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .modal_body import ModalBody, ModalPort, Moments
+from mstmm.arrays import Array
 
-Array = NDArray[np.float64]
+from .modal_body import ModalBody
+from .modal_port import ModalPort
+from .moments import Moments
 
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 #: (a, b) with eps_iab = 1, by i.

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..layout import HingeSlots
 from ..rest import Rest, Undetermined, Unsettled, at_rest
 from ..sizes import modal_sizes
 from .modal_body import ModalBody
-
-Array = NDArray[np.float64]
 
 #: (q, u, udot) -> efforts (nu,) that these accelerations need.
 InverseDynamics = Callable[[Array, Array, Array], Array]

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene_flexible_checks import free_axes
 from mstmm.scene_rules import GROUND
 
 if TYPE_CHECKING:
     from mstmm.scene import Body, Hinge, Scene
 
-Array = NDArray[np.float64]
 
 #: Hinges whose free motions are rotations about the axes of their outboard end alone.
 _TURNING = ("pin", "universal", "ball", "gimbal")

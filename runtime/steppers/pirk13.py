@@ -28,7 +28,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .tableau import Array, Tableau, from_monomials, frozen
+from mstmm.arrays import Array
+
+from .tableau import Tableau, from_monomials, frozen
 
 _ITERATIONS = 12
 _COMPARED = 9  # the error estimate: what three iterations less give

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from mstmm.arrays import Array
 
 #: Stages of a block that C evaluates side by side, at most.
 LANES = 8

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.runtime.flexible.modal_body import ModalBody, ModalPort
+from mstmm.runtime.flexible.modal_body import ModalBody
+from mstmm.runtime.flexible.modal_port import ModalPort
 
 Array = NDArray[np.float64]
 

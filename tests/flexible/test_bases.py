@@ -10,7 +10,8 @@ from flexible.beam_scenes import FREE, HELD, PIN, body_of
 from flexible.linear import frequencies, held, joined
 
 from mstmm.errors import SceneError
-from mstmm.runtime.flexible.beam.frames import Frame, in_frame
+from mstmm.runtime.flexible.beam.frame import Frame
+from mstmm.runtime.flexible.beam.frames import in_frame
 from mstmm.runtime.flexible.beam.shapes import Piecewise
 from mstmm.runtime.flexible.modal_body import ModalBody
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene_parts import Load
 
 from ..computable import computed
 from ..definiteness import stays_definite
-from ..modal_body import Array, ModalBody
+from ..modal_body import ModalBody
 from ..support import Support, Supports
 from .bases import shapes_of
-from .beam_shapes import DIRECTIONS, BeamShapes, Mode
+from .beam_shapes import BeamShapes
 from .choices import BENDING, Choice, choices, in_the_mean, may_change_frame, warnings
 from .data import BeamData, beam_data
 from .frames import in_frame
@@ -23,6 +24,7 @@ from .holding import Holding, Surroundings, holding
 from .moments import drag_moments, mass_moments, stiffness
 from .planar import Planar
 from .quadrature import mass_points
+from .shape_fields import DIRECTIONS, Mode
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene

@@ -33,7 +33,7 @@ import numpy as np
 from .bases import CLAMPED_FREE, FREE_FREE, GIVEN, SIMPLY_SUPPORTED, STATIC, Basis, static_count
 from .data import BeamData
 from .expression_shapes import ExpressionShape
-from .frames import Frame
+from .frame import Frame
 from .holding import Holding
 from .static_shapes import stiffness_of
 

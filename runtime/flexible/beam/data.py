@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..modal_body import Array
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from mstmm.scene_beam import Beam

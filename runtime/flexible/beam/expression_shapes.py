@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.expression import Expression, Name
 from mstmm.graph import Graph, Node
 from mstmm.tangent import derivative
-
-from ..modal_body import Array
 
 #: Operations that numpy has under another name than the expressions' own meaning.
 _VECTORISED: dict[str, Any] = {

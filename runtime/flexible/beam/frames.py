@@ -11,16 +11,15 @@ The same conditions hold for what bending and twist displace and turn to second 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ..modal_body import Array
-from .beam_shapes import Mode
 from .data import BeamData
+from .frame import Frame
 from .gauss import density_of, gauss_between
+from .shape_fields import Mode
 from .shapes import Moved, Shape
 
 #: What is left of a shape without its rigid part, or without the shapes before it, as a share of
@@ -28,19 +27,6 @@ from .shapes import Moved, Shape
 NOTHING_LEFT = 1e-9
 #: Largest condition number of the shapes' mass matrix, each shape scaled to one.
 WORST_CONDITION = 1e11
-
-
-@dataclass(frozen=True)
-class Frame:
-    """Where the floating frame of one direction is: "tangent" at `x` (m), "chord" or "mean"."""
-
-    kind: str
-    x: float = 0.0
-
-    @property
-    def origin(self) -> float | None:
-        """Section that does not move along the beam or about it, None for the mean."""
-        return {"tangent": self.x, "chord": 0.0, "mean": None}[self.kind]
 
 
 def in_frame(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..modal_body import Array
+from mstmm.arrays import Array
 
 if TYPE_CHECKING:
     from .shapes import Shape

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.scene_flexible_checks import free_axes
 from mstmm.scene_parts import Load, Spring
 from mstmm.scene_rules import split
 
-from ..modal_body import Array
 from .data import BeamData
 from .static_shapes import stiffness_of
 

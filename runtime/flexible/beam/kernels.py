@@ -8,11 +8,11 @@ from importlib.resources import files
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.ir import KernelIR
 from mstmm.stored import element_from_json
 
 from ... import vectorized
-from ..modal_body import Array
 
 
 @cache

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..modal_body import Array, Moments
+from mstmm.arrays import Array
+
+from ..moments import Moments
 from . import kernels as beam_kernels
 from .beam_shapes import BeamShapes, without_noise
 from .multilinear import Row, Term, Terms, add_products, known, rows_of, terms

@@ -15,7 +15,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..modal_body import Array
+from mstmm.arrays import Array
+
 from ..parts import slices
 from . import kernels
 

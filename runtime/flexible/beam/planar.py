@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.scene_rules import GROUND, split
-
-from ..modal_body import Array
 
 if TYPE_CHECKING:
     from mstmm.expression import Expression

@@ -6,11 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ..modal_body import Array, MassPoint
-from .beam_shapes import DIRECTIONS, BeamShapes
+from ..modal_port import MassPoint
+from .beam_shapes import BeamShapes
 from .gauss import gauss
+from .shape_fields import DIRECTIONS
 
 #: Most numbers of second order that the sections of all points may hold together: a quarter of a
 #: gigabyte, which every evaluation of the accelerations reads.

@@ -6,23 +6,20 @@ The rate of the displacement contains the rotation, which is an integral itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..modal_body import Array
+from mstmm.arrays import Array
+
 from . import kernels
 from .gauss import Antiderivatives
 from .multilinear import Row, Term, Terms, add_products, rows_of, terms
-
-if TYPE_CHECKING:
-    from .beam_shapes import BeamShapes
+from .shape_fields import ShapeFields
 
 
 class Rates:
     """The fields of a beam that rates of second order are made of, at points along it."""
 
-    def __init__(self, shapes: BeamShapes) -> None:
+    def __init__(self, shapes: ShapeFields) -> None:
         self._n, self._length = shapes.n, shapes.length
         self._integrals = Antiderivatives(shapes.pieces, shapes.density)
         values, slopes, bends = (shapes.rows(self.points, d) for d in range(3))

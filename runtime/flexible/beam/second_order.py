@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..modal_body import Array
+from mstmm.arrays import Array
+
 from ..parts import slices
 from .rates import Rates
 
 if TYPE_CHECKING:
-    from .beam_shapes import BeamShapes
-    from .frames import Frame
+    from .frame import Frame
+    from .shape_fields import ShapeFields
 
 
 class SecondOrder:
@@ -32,7 +33,7 @@ class SecondOrder:
     inertia, else the twist and what the frame's choice turned back.
     """
 
-    def __init__(self, shapes: BeamShapes, frames: Mapping[str, Frame]) -> None:
+    def __init__(self, shapes: ShapeFields, frames: Mapping[str, Frame]) -> None:
         self.shapes, self._frames = shapes, frames
 
     @cached_property

@@ -22,7 +22,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..modal_body import Array
+from mstmm.arrays import Array
 
 _SQRT2 = math.sqrt(2.0)
 

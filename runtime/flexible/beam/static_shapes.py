@@ -12,7 +12,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..modal_body import Array
+from mstmm.arrays import Array
+
 from .data import BeamData
 from .shapes import Piecewise
 

@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene_rules import GROUND, split
 
 from ...apart import apart
 from ..computable import computed
 from ..definiteness import stays_definite
-from ..modal_body import ModalBody, ModalPort
+from ..modal_body import ModalBody
+from ..modal_port import ModalPort
 from ..support import Supports
 from .checks import checked
 from .craig_bampton import Reduction, reduce
@@ -39,7 +40,6 @@ __all__ = [
     "elastic_bodies", "elastic_body", "modal_body", "model_of", "rigid_of", "save_matrices",
 ]  # fmt: skip
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Fixed-interface modes where the scene leaves their number open.

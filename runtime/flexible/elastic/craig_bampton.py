@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .model import ElasticModel
 from .ports import Port
 from .sections import Clamped, Sections
-
-Array = NDArray[np.float64]
 
 FRAMES = ("tangent", "mean")
 

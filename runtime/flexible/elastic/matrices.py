@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene_errors import near
 
 from ...files import read_arrays, refuse_special
 from .model import ElasticModel
-
-Array = NDArray[np.float64]
 
 _MATRICES = ("mass", "stiffness", "scalar_mass")
 _PARTS = ("data", "indices", "indptr")

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ...dataset import extra
 from ...files import refuse_special
 from .mesh_references import refuse_outside
 from .model import ElasticModel
-
-Array = NDArray[np.float64]
 
 #: Cells of solids as meshio calls them, and the mesh that scikit-fem makes of them.
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")

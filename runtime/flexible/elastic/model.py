@@ -12,12 +12,9 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class StressStiffness(Protocol):

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .model import ElasticModel
-
-Array = NDArray[np.float64]
 
 #: Difference, of the largest entry, up to which a mass matrix is the same along x, y and z.
 _SAME = 1e-9

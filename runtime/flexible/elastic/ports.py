@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array, Integers
 from mstmm.rotations import from_orientation
 from mstmm.scene_errors import near
 
 from .model import ElasticModel, rigid_columns
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Lengths below this part of the body's are the same place.
 SAME = 1e-8

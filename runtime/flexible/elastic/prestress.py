@@ -21,12 +21,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .craig_bampton import Reduction
 from .ports import Port
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

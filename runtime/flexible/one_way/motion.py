@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene import split
 
 from .response import Response, rigidity, split_node
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 
     from ...model import Model
     from ...observed import Observed
-    from ..modal_body import ModalPort
+    from ..modal_port import ModalPort
 
-Array = NDArray[np.float64]
 
 #: Hinges whose outboard side may turn about their axis alone, about any axis, and may go anywhere.
 _ABOUT_AXIS = ("pin", "screw", "cylindrical", "planar")

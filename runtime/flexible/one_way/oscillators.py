@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mstmm.arrays import Array
 
 #: Points at which a load is known in each cell: a polynomial of degree 5.
 POINTS = 6

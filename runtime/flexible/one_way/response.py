@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from ..modal_body import ModalBody
     from .rigidified import Rigidified
 
-Array = NDArray[np.float64]
 
 #: Steps of the loads' polynomials at smooth edges, of the largest load, that end the refinement.
 TOLERANCE = 1e-7

@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import split
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from ...model import Model
     from ...simulate import Trajectory
     from ...stability import StepCheck
-
-Array = NDArray[np.float64]
 
 
 #: Share of the inertia at a hinge above which a one-way response errs by about 0.3 of itself:

@@ -13,15 +13,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression import Expression, parse
 from mstmm.rotations import Matrix, to_quaternion
 from mstmm.scene import Body, End, Hinge, Load, Scene, Spring, split
 from mstmm.scene_skeleton import rigid_beam
 
-from ..modal_body import ModalBody, ModalPort
+from ..modal_body import ModalBody
+from ..modal_port import ModalPort
 
 if TYPE_CHECKING:
     from mstmm.scene_beam import Beam
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
     from ..elastic.ports import Port
 
-Array = NDArray[np.float64]
 
 #: What `compile(flexibility=)` takes, and the `model` it gives every flexible body.
 LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}

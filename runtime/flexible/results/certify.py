@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.scene_lines import lines
 
 from ..parts import slices
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from .observe import Motion
     from .observe_bodies import FlexibleBodies
 
-Array = NDArray[np.float64]
 
 #: What brings a warning: slope, load ratio of a linear beam and spin in first frequencies, bending
 #: energy that the shapes miss, shear, rotation of a section (rad), buckling, strain.

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ...model import Model
     from .observe_bodies import FlexibleBodies
 
-Array = NDArray[np.float64]
 
 #: Speeds of a scene up to which its mass matrix is formed for this.
 LARGEST = 300

@@ -11,7 +11,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from ..beam.moments import second_moments
 from .observe import Motion, tilde, turns, values_at
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ..beam.beam_shapes import BeamShapes
     from ..modal_body import ModalBody
 
-Array = NDArray[np.float64]
 
 #: Sections of a beam that are looked at.
 SECTIONS = 33

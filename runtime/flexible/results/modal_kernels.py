@@ -7,8 +7,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.ir import KernelIR
 from mstmm.stored import kernel_from_json
 
@@ -18,7 +18,6 @@ from ..records import moments_of
 if TYPE_CHECKING:
     from .observe import Motion
 
-Array = NDArray[np.float64]
 
 #: Numbers of one batch of samples, about 30 MB an array.
 _BATCH = 2**22

@@ -9,9 +9,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mstmm.scene import split
 
 from ...kinds import Kind
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
     from ...quantities import Table
     from .results import FlexibleResults
 
-Array = NDArray[np.float64]
 
 _XYZ = ("x", "y", "z")
 

@@ -13,17 +13,16 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array, numbers
 from mstmm.errors import SceneError
 
-from ...arrays import numbers
-
 if TYPE_CHECKING:
-    from ..beam.beam_shapes import BeamShapes, ShapeValues
+    from ..beam.beam_shapes import BeamShapes
+    from ..beam.shape_fields import ShapeValues
     from ..modal_body import ModalBody
 
-Array = NDArray[np.float64]
 
 #: A section may lie this part of the length beyond the ends: rounding of the user's numbers.
 _BEYOND = 1e-9

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
 from mstmm.scene_errors import near
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ...model import Model
     from ...observed import Observed
     from ..modal_body import ModalBody
-
-Array = NDArray[np.float64]
 
 
 class FlexibleBodies:

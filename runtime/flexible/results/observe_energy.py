@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .observe import Motion
 
 if TYPE_CHECKING:
     from ..modal_body import ModalBody
-
-Array = NDArray[np.float64]
 
 
 def modal_mass(body: ModalBody) -> Array:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from .observe import (
     Motion,
@@ -26,8 +27,6 @@ from .observe import (
     turns,
     values_at,
 )  # fmt: skip
-
-Array = NDArray[np.float64]
 
 #: Gauss points of a panel and fewest panels of a beam: exact for products of cubics at a panel's
 #: size, and fine enough for the shapes that can be told apart.

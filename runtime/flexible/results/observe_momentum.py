@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from . import modal_kernels
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from .observe import Motion
     from .observe_bodies import FlexibleBodies
 
-Array = NDArray[np.float64]
 
 #: Part of the largest moment of inertia below which there is none.
 _NO_INERTIA = 1e-12

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
 
@@ -28,7 +29,6 @@ from .plot_shapes import (
 if TYPE_CHECKING:
     from ...result import Result
 
-Array = NDArray[np.float64]
 
 #: Points along a beam in a picture.
 _FINE = 61

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arrays import Array
+
 if TYPE_CHECKING:
     from ...pack import Packed
-
-Array = NDArray[np.float64]
 
 
 class ModalPivots:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mstmm.arrays import Array
 
 #: Shapes of a strip, and the colour map of their times: dark to bright, readable in grey.
 SHAPES, _COLOURS = 12, "viridis"

@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from . import observe, observe_energy
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from ...observed import Observed
     from .observe import Motion
 
-Array = NDArray[np.float64]
 
 #: Where bending moments and axial forces come from.
 SOURCES = ("equilibrium", "shapes")

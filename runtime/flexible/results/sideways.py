@@ -10,14 +10,13 @@ Stability, 2nd ed., sections 2.8 and 6.3).  Both are one question, with phi = 0 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mstmm.arrays import Array
 
 from ..beam.beam_shapes import BeamShapes
 from ..beam.gauss import gauss_between
 from ..modal_body import ModalBody
 from .estimators import bends
-
-Array = NDArray[np.float64]
 
 #: Quarter waves of phi on either side of the held section.
 _WAVES = 6
