@@ -30,8 +30,9 @@ from .errors import (
 if TYPE_CHECKING:
     from .compilation import compile_scene as compile
     from .compilation import generate_file, register
+    from .runtime.loading import load_result
     from .runtime.model import Model
-    from .runtime.result import Result, load_result
+    from .runtime.result import Result
     from .scene import Scene
     from .scene_file import load_scene
 
@@ -46,7 +47,7 @@ _LAZY = {
     "generate_file": (".compilation", "generate_file"),
     "Model": (".runtime.model", "Model"),
     "Result": (".runtime.result", "Result"),
-    "load_result": (".runtime.result", "load_result"),
+    "load_result": (".runtime.loading", "load_result"),
 }
 
 __all__ = [

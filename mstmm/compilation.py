@@ -14,8 +14,9 @@ from .spec import ElementSpec
 
 if TYPE_CHECKING:
     from .derive.registry import Element
+    from .runtime.bodies import Known
     from .runtime.model import Model
-    from .runtime.pack import Known, Packed
+    from .runtime.packed import Packed
 
 ENGINES = ("auto", "fused", "looped")
 SWEEPS = ("riccati", "product")

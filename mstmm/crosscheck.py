@@ -334,7 +334,7 @@ def _interpret(
 ) -> tuple[int, dict[str, list[float]]]:
     """The hinge kernel of an element without a library, as the engine interprets it."""
     from .runtime import prebuilt
-    from .runtime.values import c_tape
+    from .runtime.tape_kernel import c_tape
 
     ffi, lib = prebuilt.module()
     kept: list[Any] = []

@@ -27,7 +27,8 @@ from .structure import BodyStructure, Key, Structure
 
 if TYPE_CHECKING:
     from .derive.fuse import Fused
-    from .runtime.pack import Known, Packed
+    from .runtime.bodies import Known
+    from .runtime.packed import Packed
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
 #: asks for it: the compiler's time grows with their square while the advantage shrinks.

@@ -5,19 +5,14 @@ Neither is the error of the motion, but both find wrong steps and wrong laws.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene import Hinge, Scene
 
+from .evidence import Drift
 from .flexible.results.observe_momentum import undeformed
-
-if TYPE_CHECKING:
-    from .result import Result
-
+from .record import Record
 
 #: A hinge load counts as zero below this part of the largest one.
 _ZERO = 1e-9
@@ -27,37 +22,6 @@ _AT_REST = 1e-8
 
 #: Bodies that are looked at to learn how far a scene reaches.
 _SOME = 30
-
-
-@dataclass(frozen=True)
-class Drift:
-    """Largest change of a quantity that should not change, beside the scale it is judged by."""
-
-    name: str
-    unit: str
-    largest: float
-    scale: float
-    of_what: str
-
-    @property
-    def relative(self) -> float:
-        """largest / scale; 0 where both vanish; nan where the quantity is not finite."""
-        if not self.known:
-            return np.nan
-        if self.scale > 0:
-            return self.largest / self.scale
-        return np.inf if self.largest > 0 else 0.0
-
-    @property
-    def known(self) -> bool:
-        """False where the quantity is beyond what numbers hold, or no sample gives it."""
-        return bool(np.isfinite(self.largest) and np.isfinite(self.scale))
-
-    def __str__(self) -> str:
-        if not self.known:
-            return f"not determined: no finite {self.unit} in every sample that can be evaluated"
-        text = f"{self.largest:.1e} {self.unit} of {self.scale:.3g} {self.unit} {self.of_what}"
-        return f"{text} ({self.relative:.1e})"
 
 
 def _largest(values: Array) -> float:
@@ -76,7 +40,7 @@ def _change(values: Array) -> float:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-def energy(result: Result) -> Drift:
+def energy(result: Record) -> Drift:
     """T + V - W against the largest sum of what was exchanged: T, changes of V, W.
 
     At rest under load nothing is exchanged: then against a part of what is stored.
@@ -97,7 +61,7 @@ def energy(result: Result) -> Drift:
 # --- momentum -------------------------------------------------------------------------------------
 
 
-def momentum(result: Result) -> list[Drift]:
+def momentum(result: Record) -> list[Drift]:
     """Drift of the components of momentum that nothing outside the scene changes.
 
     Components that are zero throughout are left out.  Angular momentum is taken about the origin,
@@ -165,7 +129,7 @@ def _passive(hinge: Hinge) -> bool:
     return not acts and hinge.drive is None and hinge.release is None
 
 
-def _pivot(result: Result, reach: float) -> tuple[Array, str]:
+def _pivot(result: Record, reach: float) -> tuple[Array, str]:
     """The point (3,) about which angular momentum is taken, and how its name says so.
 
     The point of the only hinge on the ground, where it stays; else the origin.
@@ -184,7 +148,7 @@ _FREE = ("free", "elastic")
 
 
 def _support(
-    result: Result, reach: float, kinetic: float, pivot: Array
+    result: Record, reach: float, kinetic: float, pivot: Array
 ) -> tuple[list[bool], list[bool]]:
     """Which components of force, and of moment about the pivot, the ground never passes on.
 

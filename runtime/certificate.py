@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from . import gives
-from .balances import Drift, energy, momentum
-from .conditioning import LARGEST, PivotLoss, SingularDistance, pivot_loss, singular_distance
-from .error_estimate import ANGLE, PART, SAFETY, ErrorEstimate
+from .conditioning import LARGEST, PivotLoss, SingularDistance
+from .error_estimate import ANGLE, PART, ErrorEstimate
+from .evidence import Drift, Give
 from .flexible.results import certify
 from .flexible.results.certify import Flexibility
-from .gives import Give
 from .stability import StepCheck
-from .verdict import ACCURACY, DRIFT, Verdict, verdict
-
-if TYPE_CHECKING:
-    from .result import Result
+from .verdict import ACCURACY, DRIFT, Verdict
 
 #: Pivot loss and singular measure that bring a warning; of drifts see `verdict`.
 LOSS, SINGULAR = 1e8, 1e-3
@@ -72,7 +64,7 @@ class Certificate:
     def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
         angles as a part of how far they went) and `balance` (relative, of energy and momentum)."""
-        return verdict(self, accuracy, balance)
+        return _verdict(self, accuracy, balance)
 
     @property
     def trusted(self) -> bool:
@@ -126,29 +118,47 @@ class Certificate:
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
 
 
-def certificate(result: Result, error: ErrorEstimate | None, step: StepCheck | None) -> Certificate:
-    """The certificate of a result; `error` and `step` are what only the run itself could tell."""
-    run, statistics = result.trajectory, result.statistics
-    return Certificate(
-        energy=energy(result),
-        momentum=tuple(momentum(result)),
-        quaternion_residual=run.norm_residual,
-        pivot=pivot_loss(result.model, run),
-        singular=singular_distance(result.model, run),
-        step=step,
-        stability_limited=statistics is not None and statistics.stability_limited,
-        sum_of_local_errors=None if statistics is None else statistics.sum_local_error,
-        error=error,
-        finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
-        end=result.message,
-        too_large=len(result.model.scene.bodies) > LARGEST,
-        samples=len(result.t),
-        flexible=certify.flexibilities(result._flexible),
-        give=gives.stiffest(result),
-        failures=() if result.success else (result.message,),
-        models=result._outside(),
-        unseen=result.trajectory.unseen,
-    )
+# --- verdict --------------------------------------------------------------------------------------
+
+
+def _verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:
+    """The verdict within bounds: `accuracy` of the error in rad, of coordinates that are no angles
+    as a part of how far they went; `balance` of energy and momentum, relative."""
+    against = list(c.failures) + [
+        f"{d.name} changes by {d}, more than the {balance:g} asked for"
+        for d in (c.energy, *c.momentum)
+        if balance < d.relative <= DRIFT
+    ]
+    missing = []
+    if c.samples < 2:
+        missing.append("one sample tells nothing of energy and momentum")
+    if c.error is None:
+        missing.append("no second run has told its error (certify=True)")
+    else:
+        against += _inaccurate(c, accuracy)
+    against += c.doubts
+    words = f"{accuracy:g} rad or {accuracy:.3g} of the motion"
+    return Verdict(
+        tuple(dict.fromkeys(against)), tuple(missing),
+        f"errors within {words}, balances within {balance:g}",
+    )  # fmt: skip
+
+
+def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
+    """Units of coordinates whose estimated error, over the whole run, exceeds what was asked."""
+    assert c.error is not None
+    found = []
+    for unit, values in c.error.q.items():
+        worst = float(values.max(initial=0.0))
+        limit = accuracy if unit == "rad" else accuracy * c.error.moved.get(unit, 0.0)
+        if worst > limit > 0:
+            part = "" if unit == "rad" else f" of {c.error.moved[unit]:.2g} {unit} of motion"
+            found.append(f"the error of q may be {worst:.1e} {unit or '1'}{part}{_until(c.error)}")
+    return found
+
+
+def _until(error: ErrorEstimate) -> str:
+    return "" if error.horizon is None else f" (predictable until {error.horizon:.4g} s)"
 
 
 # --- words ----------------------------------------------------------------------------------------
@@ -231,6 +241,3 @@ def _covered(c: Certificate) -> str:
             f"{c.give.spring}, by up to {c.give.largest:.1e} m"
         )
     return "; ".join(parts)
-
-
-__all__ = ["SAFETY", "Certificate", "Drift", "certificate"]

@@ -17,12 +17,12 @@ from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, SceneError
 
 from .files import read_arrays, refuse_special, replacing
+from .identity import kernels_hash
 from .integrate import Samples
-from .provenance import kernels_hash
 from .settings import Settings
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 State = Mapping[str, Any]
 
@@ -40,7 +40,7 @@ class Checkpoint:
     Raises EnvironmentFailure at once if its folder cannot be written.
     """
 
-    def __init__(self, path: Path, model: Model, settings: Settings, q: Array, u: Array) -> None:
+    def __init__(self, path: Path, model: Compiled, settings: Settings, q: Array, u: Array) -> None:
         self.path = path
         folder = path.absolute().parent
         if not folder.is_dir() or not os.access(folder, os.W_OK):

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import EnvironmentFailure, SceneError
 
-from .simulate import Compiled
 from .steppers import get
+from .system import SceneCode
 
 if TYPE_CHECKING:
+    from .compiled import Compiled
     from .fused import FusedLibrary
     from .integrate import Run
-    from .model import Model
     from .settings import Settings
 
 #: Evaluations after which the length of a run is foretold.
@@ -27,8 +27,8 @@ _LOOK_AFTER = 2000
 LOOPED, FUSED = "looped", "fused"
 
 
-def at_once(model: Model, settings: Settings, recorded: str | None) -> Compiled | None:
-    """Compiled code for a run that starts now; None for the looped engine.
+def at_once(model: Compiled, settings: Settings, recorded: str | None) -> SceneCode | None:
+    """SceneCode code for a run that starts now; None for the looped engine.
 
     Args:
         model: the model.
@@ -51,15 +51,15 @@ def at_once(model: Model, settings: Settings, recorded: str | None) -> Compiled 
     return None if library is None else _compiled(model, settings, library, math.inf)
 
 
-def look_after(model: Model, settings: Settings) -> int:
+def look_after(model: Compiled, settings: Settings) -> int:
     """Steps of a looped run after which `worth_compiling` is to be asked; 0 for never."""
     if model.fusion.obstacle:
         return 0
     return math.ceil(_LOOK_AFTER / get(settings.method).n_stages)
 
 
-def worth_compiling(model: Model, settings: Settings, run: Run) -> Compiled | None:
-    """Compiled code if a looped run that has come so far is worth it."""
+def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode | None:
+    """SceneCode code if a looped run that has come so far is worth it."""
     gone = run.t - settings.t_start
     if not gone > 0.0:
         return None
@@ -69,9 +69,9 @@ def worth_compiling(model: Model, settings: Settings, run: Run) -> Compiled | No
 
 
 def _compiled(
-    model: Model, settings: Settings, library: FusedLibrary, evaluations: float
-) -> Compiled:
+    model: Compiled, settings: Settings, library: FusedLibrary, evaluations: float
+) -> SceneCode:
     """Lanes only for methods that have use for them."""
     iterated = get(settings.method).iterated is not None
     lanes = model.fusion.ready_lanes(evaluations) if iterated else None
-    return Compiled(library, lanes, model.fusion.numbers)
+    return SceneCode(library, lanes, model.fusion.numbers)

@@ -19,12 +19,13 @@ from mstmm.arrays import Array
 from mstmm.scene import Hinge
 
 from . import prebuilt
+from .bodies import kernel_type
 from .flexible.results.pivots import ModalPivots
-from .pack import Packed, kernel_type
+from .packed import Packed
 
 if TYPE_CHECKING:
-    from .model import Model
-    from .simulate import Trajectory
+    from .compiled import Compiled
+    from .trajectory import Trajectory
 
 
 #: Samples of a run at which the pivots are looked at.
@@ -60,7 +61,7 @@ class SingularDistance:
 # --- pivots ---------------------------------------------------------------------------------------
 
 
-def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
+def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
     """The worst of some samples spread over the run; None where nothing moves freely, and for
     scenes of more than LARGEST bodies."""
     if not len(run.t) or not model.nu or len(model.scene.bodies) > LARGEST:
@@ -69,18 +70,18 @@ def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
     count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
         one = slice(k, k + 1)
-        seen = model._engine.observe(
+        seen = model.looped.observe(
             run.t[one], run.q[one], run.u[one], run.memory[one], parts=("udot",)
         )
         if seen.failures:
             continue
         try:
-            ratios = pivots.ratios(model._engine.workspace_array(), run.memory[k])
+            ratios = pivots.ratios(model.looped.workspace_array(), run.memory[k])
         except np.linalg.LinAlgError:  # numbers that overflow in products, or underflow
             continue
         place = int(ratios.argmax())
         if ratios[place] > worst.ratio:
-            hinge = model._engine.hinge_name(place)
+            hinge = model.looped.hinge_name(place)
             worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]))
     return worst if worst.hinge else None
 
@@ -88,8 +89,8 @@ def pivot_loss(model: Model, run: Trajectory) -> PivotLoss | None:
 class _Pivots:
     """Where the engine keeps inertias and motion subspaces of all n bodies."""
 
-    def __init__(self, model: Model) -> None:
-        packed, lib = model._engine.packed, model._engine.lib
+    def __init__(self, model: Compiled) -> None:
+        packed, lib = model.packed, model.looped.lib
         records = packed.records
         self.parents = records.column("parent").astype(np.int64)
         count = len(self.parents)
@@ -164,7 +165,7 @@ def _carried_motion(turn: Array, shift: Array) -> Array:
 # --- coordinates that fail ------------------------------------------------------------------------
 
 
-def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
+def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | None:
     """The smallest measure over all samples and hinges that have one; None without such hinges.
 
     A change of sign between two samples counts as zero: the coordinates failed in between.
@@ -172,7 +173,7 @@ def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
     found: list[SingularDistance] = []
     for group in model.layout.groups:
         for k in range(min(group.count, len(group.hinges))):
-            function = _measure(model, model._engine.packed.scene.hinges[group.first + k])
+            function = _measure(model, model.packed.scene.hinges[group.first + k])
             if function is None:
                 continue
             for number in range(group.first + k, group.first + group.count, len(group.hinges)):
@@ -182,16 +183,16 @@ def singular_distance(model: Model, run: Trajectory) -> SingularDistance | None:
     return min(found, key=lambda one: one.measure, default=None)
 
 
-def _smallest(model: Model, run: Trajectory, number: int, measures: Array) -> SingularDistance:
+def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) -> SingularDistance:
     k = int(np.abs(measures).argmin())
     changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
     k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
-    return SingularDistance(value, model._engine.packed.scene.hinges.name(number), float(run.t[k]))
+    return SingularDistance(value, model.packed.scene.hinges.name(number), float(run.t[k]))
 
 
-def _measure(model: Model, hinge: Hinge) -> Any:
+def _measure(model: Compiled, hinge: Hinge) -> Any:
     """The kernel `singularity` of a hinge's type, None if it has none."""
-    packed = model._engine.packed
+    packed = model.packed
     key = ("hinge", kernel_type(hinge, packed.releases))
     element = (model.known or {}).get(key) or prebuilt.elements().get(key)
     function = None if element is None else element.functions.get("singularity")
@@ -200,9 +201,9 @@ def _measure(model: Model, hinge: Hinge) -> Any:
     return packed.ffi.cast("int (*)(const double *, const double *, double *)", function)
 
 
-def _measures(model: Model, run: Trajectory, number: int, call: Any) -> Array:
+def _measures(model: Compiled, run: Trajectory, number: int, call: Any) -> Array:
     """The measure of one hinge at every sample."""
-    packed = model._engine.packed
+    packed = model.packed
     ffi, slots = packed.ffi, packed.layout.slots(number)
     p = packed.model.bodies[packed.topology.place_of_hinge(number)].hinge_p
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])

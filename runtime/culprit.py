@@ -11,22 +11,16 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.drive import motion_at
-from mstmm.errors import NumericalFailure
 from mstmm.expression import Expression, Name
+
+from .calls import Calls, Probe
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
     from mstmm.scene_parts import Spring
 
-    from .engine import Engine
 
-
-#: States looked at past the last good one lie this many times farther ahead each, up to this part
-#: of the time: a run ends within rounding of the place where an expression stops being a number.
-_FARTHER, _FARTHEST = 4.0, 1e-9
-
-
-def culprit(engine: Engine, t: float, q: Array, u: Array) -> str:
+def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
     """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
 
     q (nq,) and u (nu,) of one state.  A quaternion without length is named as well.
@@ -54,26 +48,6 @@ def culprit(engine: Engine, t: float, q: Array, u: Array) -> str:
             if not math.isfinite(number):
                 return _sentence(f'spring "{spring.name}": law.effort', effort, number, t)
     return ""
-
-
-def culprit_ahead(
-    engine: Engine, t: float, q: Array, u: Array, memory: Array, failed_at: float
-) -> str:
-    """The same at the last good state of a run, or where its rates lead from there; `failed_at` is
-    the time of the trial that failed."""
-    found = culprit(engine, t, q, u)
-    if found:
-        return found
-    try:
-        qdot, udot = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
-    except NumericalFailure:
-        return ""
-    ahead = max(failed_at - t, 4 * math.ulp(t))
-    farthest = max(2 * ahead, _FARTHEST * max(1.0, abs(t)))
-    while ahead <= farthest and not found:
-        found = culprit(engine, t + ahead, q + ahead * qdot[0], u + ahead * udot[0])
-        ahead *= _FARTHER
-    return found
 
 
 def _sentence(where: str, expression: Expression, number: float, t: float) -> str:
@@ -116,7 +90,7 @@ def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge
 class _State:
     """The numbers that names of expressions stand for at one state."""
 
-    def __init__(self, engine: Engine, t: float, q: Array, u: Array) -> None:
+    def __init__(self, engine: Calls, t: float, q: Array, u: Array) -> None:
         self.engine, self.t, self.q, self.u = engine, t, q, u
 
     def of(self, name: Name, own: Hinge | None) -> float:
@@ -139,8 +113,6 @@ class _State:
 
     def _length(self, spring: Spring) -> tuple[float, float]:
         """Length in m and its rate in m/s; nan where the ends coincide."""
-        from .engine import Probe
-
         bare, probes = self.engine.inertia_alone, []
         for reference in (spring.from_, spring.to):
             body, axes, offset = self.engine.packed.end(reference)

@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 
 if TYPE_CHECKING:
-    from .quantities import Quantity
+    from .names_of import Quantity
 
 
 #: Runs with at least this many samples are drawn as they are; others get this many points.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.errors import EnvironmentFailure
+from mstmm.extras import missing
 from mstmm.hinge_types import effort_unit
 
 from . import provenance
@@ -14,7 +14,7 @@ from .flexible.results import dataset as flexible
 from .quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
 
 if TYPE_CHECKING:
-    from .result import Result
+    from .record import Record
 
 
 #: Speeds of a scene up to which everything about every body and hinge is written out.
@@ -22,15 +22,7 @@ MOST_SPEEDS = 5000
 _EVERYTHING = ("body", "hinge", "flexible", "mode")
 
 
-def extra(name: str, what: str, error: ImportError) -> EnvironmentFailure:
-    """A package of an extra is missing: which one, what for, and how to get it."""
-    return EnvironmentFailure(
-        f"{what} needs the package {error.name or 'of an extra'}, which is not installed; "
-        f"install it with: pip install 'mstmm[{name}]'"
-    )
-
-
-def dataset(result: Result) -> Any:
+def dataset(result: Record) -> Any:
     """`xarray.Dataset` with dimensions time, coordinate, speed, hinge, body, axis, component.
 
     `body` holds bodies and their ends ("rod1", "rod1.tip"), `coordinate` and `speed` the entries of
@@ -41,7 +33,7 @@ def dataset(result: Result) -> Any:
     try:
         import xarray
     except ImportError as error:
-        raise extra("io", "an xarray Dataset", error) from None
+        raise missing("io", "an xarray Dataset", error) from None
     variables, labels = _states(result), _labels(result)
     if result.model.nu <= MOST_SPEEDS:
         variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
@@ -67,7 +59,7 @@ def _common(units: list[str]) -> str:
     return (units[0] or "1") if len(set(units)) == 1 else "see the units beside the labels"
 
 
-def _labels(result: Result) -> dict[str, Variable]:
+def _labels(result: Record) -> dict[str, Variable]:
     layout = result.model.layout
     owners = list(layout.owners)
     q_units = [unit or "1" for h in owners for unit in h.q_units]
@@ -92,7 +84,7 @@ def _labels(result: Result) -> dict[str, Variable]:
     return found
 
 
-def _states(result: Result) -> dict[str, Variable]:
+def _states(result: Record) -> dict[str, Variable]:
     owners = list(result.model.layout.owners)
     q_units = [unit for h in owners for unit in h.q_units]
     u_units = [unit for h in owners for unit in h.u_units]
@@ -107,7 +99,7 @@ def _states(result: Result) -> dict[str, Variable]:
     }
 
 
-def _bodies(result: Result) -> dict[str, Variable]:
+def _bodies(result: Record) -> dict[str, Variable]:
     names = result._observed.references
     found: dict[str, Variable] = {}
     for kind, about in BODY.items():
@@ -118,7 +110,7 @@ def _bodies(result: Result) -> dict[str, Variable]:
     return found
 
 
-def _hinges(result: Result) -> dict[str, Variable]:
+def _hinges(result: Record) -> dict[str, Variable]:
     names = list(result.model.layout.hinges)
     found: dict[str, Variable] = {}
     for kind, about in HINGE.items():
@@ -129,7 +121,7 @@ def _hinges(result: Result) -> dict[str, Variable]:
     return found
 
 
-def _sums(result: Result) -> dict[str, Variable]:
+def _sums(result: Record) -> dict[str, Variable]:
     found: dict[str, Variable] = {}
     for name, (unit, long_name, _) in SUMS.items():
         values = result._quantities.sum(name)

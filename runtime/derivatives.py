@@ -25,7 +25,7 @@ from .structure import structure_of
 from .tangents import Tangents
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 
 #: More bodies than this are not differentiated: work and results grow with their square.
@@ -62,7 +62,7 @@ class Derivatives:
 class Differentiation:
     """Derivatives of one model with one set of parameters; kernels are made when asked for."""
 
-    def __init__(self, model: Model, names: Sequence[str]) -> None:
+    def __init__(self, model: Compiled, names: Sequence[str]) -> None:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
@@ -135,9 +135,9 @@ class Differentiation:
         return rate_q, rate_u
 
 
-def _refuse(model: Model) -> None:
+def _refuse(model: Compiled) -> None:
     """SceneError for a scene whose accelerations are no single smooth function."""
-    packed = model._engine.packed
+    packed = model.packed
     if packed.releases:
         names = ", ".join(f'"{name}"' for name in packed.releases)
         raise SceneError(
@@ -152,20 +152,20 @@ def _refuse(model: Model) -> None:
 
 
 def derivatives(
-    model: Model,
+    model: Compiled,
     differentiation: Differentiation,
     q: ArrayLike,
     u: ArrayLike,
     t: ArrayLike,
     efforts: ArrayLike | None,
+    udot: Array,
 ) -> Derivatives:
-    """`Model.derivatives` of all states of a batch."""
+    """`Model.derivatives` of all states of a batch, whose accelerations are known."""
     nu = model.nu
     lead, (coordinates, speeds, times, extra) = batch(
         ("q", q, model.nq), ("u", u, nu), ("t", t, None),
         ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
     )  # fmt: skip
-    udot = model.accelerations(q, u, t, efforts)  # refuses states that have no accelerations
     found = differentiation.at(times[:, None], coordinates, speeds, extra)
 
     def shaped(name: str, *shape: int) -> Array:

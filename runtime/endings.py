@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
 
-from .culprit import culprit_ahead
+from .culprit import culprit
+from .engine import Engine
+from .flexible.definiteness import is_definite_at
+from .flexible.support import Supports
 from .integrate import Run, Status
+from .packed import Packed
 from .run_notes import endless
 
 if TYPE_CHECKING:
-    from .simulate import SceneSystem
+    from .system import SceneSystem
 
 
 #: What a run ends with where call-backs of the scene fail; their code says how.
 _EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED)
+
+
+#: States looked at past the last good one lie this many times farther ahead each, up to this part
+#: of the time: a run ends within rounding of the place where an expression stops being a number.
+_FARTHER, _FARTHEST = 4.0, 1e-9
 
 
 def message_of(system: SceneSystem, run: Run) -> str:
@@ -43,7 +54,27 @@ def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at:
         return ""
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
-    return culprit_ahead(engine, t, q, u, system.memory, failed_at)
+    return _culprit_ahead(engine, t, q, u, system.memory, failed_at)
+
+
+def _culprit_ahead(
+    engine: Engine, t: float, q: Array, u: Array, memory: Array, failed_at: float
+) -> str:
+    """The same at the last good state of a run, or where its rates lead from there; `failed_at` is
+    the time of the trial that failed."""
+    found = culprit(engine, t, q, u)
+    if found:
+        return found
+    try:
+        qdot, udot = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
+    except NumericalFailure:
+        return ""
+    ahead = max(failed_at - t, 4 * math.ulp(t))
+    farthest = max(2 * ahead, _FARTHEST * max(1.0, abs(t)))
+    while ahead <= farthest and not found:
+        found = culprit(engine, t + ahead, q + ahead * qdot[0], u + ahead * udot[0])
+        ahead *= _FARTHER
+    return found
 
 
 def _indefinite(system: SceneSystem, y: Array) -> str:
@@ -51,9 +82,7 @@ def _indefinite(system: SceneSystem, y: Array) -> str:
     packed = system.engine.packed
     if not packed.flexible:
         return ""
-    from .flexible.definiteness import indefinite_bodies
-
-    lost = indefinite_bodies(packed, y[: system.engine.nq])
+    lost = _indefinite_bodies(packed, y[: system.engine.nq])
     names = ", ".join(f'"{name}"' for name in lost[:3]) + (", ..." if len(lost) > 3 else "")
     return (
         f"; the mass matrix of flexible body {names} is not positive definite at its deflection: "
@@ -61,6 +90,19 @@ def _indefinite(system: SceneSystem, y: Array) -> str:
         if lost
         else ""
     )
+
+
+def _indefinite_bodies(packed: Packed, q: Array) -> list[str]:
+    """Names of the flexible bodies whose mass matrix is not positive definite at q (nq,)."""
+    expanded, supports = packed.expanded, Supports(packed.described)
+    return [
+        name
+        for name, body in packed.flexible.items()
+        if expanded is not None and not body.points and not is_definite_at(
+            body, body.ports[expanded.held[name]], supports.of(name),
+            q[packed.layout.modal[name].q_slice][None],
+        )
+    ]  # fmt: skip
 
 
 def busiest(system: SceneSystem, t: float, y: Array) -> str:

@@ -14,9 +14,10 @@ from mstmm.hinge_types import HINGE_TYPES
 from .layout import refuse_dense
 from .rest import Rest, Undetermined, Unsettled, at_rest
 from .sizes import speed_sizes
+from .system import SceneSystem
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 
 #: Coordinates that a message lists.
@@ -36,7 +37,7 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
         self.residuals = {}
 
 
-def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Equilibrium:
+def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
     refuse_dense(model.nu, "the stiffness matrix")
     free = free_speeds(model)
@@ -61,10 +62,10 @@ def equilibrium(model: Model, q: Array, t: float, tolerance: float) -> Equilibri
     return result
 
 
-def free_speeds(model: Model) -> list[int]:
+def free_speeds(model: Compiled) -> list[int]:
     """Speeds that no drive prescribes."""
     free = []
-    for number, hinge in enumerate(model._engine.packed.scene.hinges):
+    for number, hinge in enumerate(model.packed.scene.hinges):
         slots = model.layout.slots(number)
         drive = hinge.drive or (None,) * slots.nu
         held = hinge.type == "fixed"
@@ -74,8 +75,8 @@ def free_speeds(model: Model) -> list[int]:
     return free
 
 
-def _problem(model: Model, t: float, free: list[int]) -> Rest:
-    engine, still = model._engine, np.zeros(model.nu)
+def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
+    engine, still = model.looped, np.zeros(model.nu)
     memory, quaternions = engine.start_memory(), model.layout.quaternions
     straight = _straight_places(model, free)
 
@@ -98,7 +99,7 @@ def _problem(model: Model, t: float, free: list[int]) -> Rest:
     return Rest(needed, moved, speed_sizes(model)[free])
 
 
-def _straight_places(model: Model, free: list[int]) -> NDArray[np.int64] | None:
+def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:
     """Places in q whose rates are the free speeds; None where a hinge has others."""
     places = np.zeros(model.nu, dtype=np.int64)
     for slots in model.layout.hinges.values():
@@ -111,11 +112,9 @@ def _straight_places(model: Model, free: list[int]) -> NDArray[np.int64] | None:
     return np.asarray(places[free])
 
 
-def _with_drives(model: Model, q: Array, t: float) -> Array:
+def _with_drives(model: Compiled, q: Array, t: float) -> Array:
     """q with driven coordinates where their drives have them."""
-    from .simulate import SceneSystem
-
-    return SceneSystem(model._engine).start(t, q, np.zeros(model.nu))[: model.nq]
+    return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
 def _some(names: list[str]) -> str:
@@ -124,7 +123,7 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _largest(model: Model, free: list[int], residual: Array, sizes: Array) -> str:
+def _largest(model: Compiled, free: list[int], residual: Array, sizes: Array) -> str:
     """The largest efforts by name, counted by their work over a motion of order one."""
     order = np.argsort(-np.abs(residual * sizes))[:_LISTED]
     listed = [f"{residual[k]:.3g} along {model.layout.u_name(int(free[k]))}" for k in order]

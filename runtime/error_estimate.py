@@ -22,7 +22,7 @@ from mstmm.arrays import Array
 
 from .layout import Layout
 from .settings import Settings
-from .simulate import Trajectory
+from .trajectory import Trajectory
 
 #: The estimate is this many times the difference of the two runs.
 SAFETY = 2.0

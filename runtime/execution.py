@@ -18,19 +18,14 @@ from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .integrate import Run, Samples, Status
 from .interruptible import interruptible
 from .settings import Settings
-from .simulate import (
-    SceneSystem,
-    Trajectory,
-    advance,
-    make_run,
-    said,
-    trajectory,
-)
+from .simulate import advance, make_run, said, trajectory
 from .stability import StepCheck, check_step
 from .steppers import get
+from .system import SceneSystem
+from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 Progress = Callable[[float, float], None]
 
@@ -89,7 +84,7 @@ def _joined(earlier: Samples | None, samples: Samples) -> Samples:
 
 
 def first_run(
-    model: Model, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
+    model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
 ) -> tuple[Trajectory, StepCheck | None]:
     """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
     if settings.method in second_opinion.METHODS:
@@ -98,7 +93,7 @@ def first_run(
         return second_opinion.integrate(model, settings, q, u, watch.tell), None
     state, earlier = _continued(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
-    engine, compiled = model._engine, compiled_run.at_once(model, settings, recorded)
+    engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
     system = SceneSystem(engine, compiled)
     start = system.start(settings.t_start, q, u)
     step = check_step(engine, get(settings.method), settings, start, system.memory)
@@ -157,10 +152,10 @@ def _continued(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | N
 
 
 def second_run(
-    model: Model, first: Trajectory, q: Array, u: Array, watch: Watch
+    model: Compiled, first: Trajectory, q: Array, u: Array, watch: Watch
 ) -> ErrorEstimate | None:
     """Error of `first` by a more accurate run; None, with a note, if that leads nowhere."""
-    known = model._engine.packed.time_map(first.settings.t_start, first.settings.t_end)
+    known = model.packed.time_map(first.settings.t_start, first.settings.t_end)
     settings, reference = tighter(first, known.breaks.tolist())
     watch.run = 1
     second, _ = first_run(model, settings, q, u, watch)

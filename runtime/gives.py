@@ -6,39 +6,24 @@ that what it gives by is part of their solution, however accurate the run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
 
+from .evidence import Give
+from .record import Record
+
 if TYPE_CHECKING:
     from mstmm.scene import Spring
-
-    from .result import Result
 
 
 #: Springs of a scene up to which they are looked at.
 _MOST = 200
 
 
-@dataclass(frozen=True)
-class Give:
-    """The stiffest spring of a scene: how far its ends were from its rest length, at most.
-
-    Attributes:
-        spring: in words, 'spring "loop"' or 'hinge "mount"'.
-        stiffness: N/m.
-        largest: m, over the samples.
-    """
-
-    spring: str
-    stiffness: float
-    largest: float
-
-
-def stiffest(result: Result) -> Give | None:
+def stiffest(result: Record) -> Give | None:
     """Of the springs between ends and the elastic hinges; None where there is none, where nothing
     was sampled, and for scenes of very many."""
     scene = result.model.scene
@@ -60,7 +45,7 @@ def stiffest(result: Result) -> Give | None:
     return max(found, key=lambda give: give.stiffness, default=None)
 
 
-def _stretch(result: Result, spring: Spring) -> float:
+def _stretch(result: Record, spring: Spring) -> float:
     """Largest |length - rest| in m."""
     ends = [
         np.array(spring.position) if end == "ground" else result.position(end)

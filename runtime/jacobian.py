@@ -23,7 +23,7 @@ from .structure import structure_of
 from .tape_kernel import TapeKernel
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 Rates = Callable[[float, Array], Array]
 
@@ -41,7 +41,7 @@ class Jacobian:
     read anew every time.  `exact` says which kind it is.
     """
 
-    def __init__(self, model: Model, with_work: bool, memory: Array, rates: Rates) -> None:
+    def __init__(self, model: Compiled, with_work: bool, memory: Array, rates: Rates) -> None:
         self._rates, self._memory, self._nq = rates, memory, model.nq
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
         self._tape = _tape(model, self._outputs)
@@ -84,9 +84,9 @@ class Jacobian:
         return np.array(columns).T
 
 
-def _tape(model: Model, outputs: list[str]) -> TapeKernel | None:
+def _tape(model: Compiled, outputs: list[str]) -> TapeKernel | None:
     """The tangent of the equations with respect to q and u; None where there is none."""
-    packed, known = model._engine.packed, model.known or {}
+    packed, known = model.packed, model.known or {}
     if packed.releases or packed.model.n_bodies > MOST_BODIES:
         return None
     structure, numbers = structure_of(pack(model.scene, known), known)

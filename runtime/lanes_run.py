@@ -15,8 +15,9 @@ from .engine import Engine
 from .fused import FusedLibrary
 from .integrate import Status
 from .settings import Settings
-from .simulate import SLICE, SceneSystem
+from .simulate import SLICE
 from .steppers import get
+from .system import SceneSystem
 from .tableau_in_c import c_tableau
 from .threads import on_threads
 

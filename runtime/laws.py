@@ -19,7 +19,7 @@ from .records import Records
 from .values import Values
 
 if TYPE_CHECKING:
-    from .pack import Packed
+    from .packed import Packed
 
 Array = NDArray[Any]
 

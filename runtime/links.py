@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .pack import Packed
+    from .packed import Packed
 
 
 def attach_runs(packed: Packed) -> None:

@@ -14,23 +14,21 @@ from mstmm.arrays import Array, batch, one, pair, real
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
-from . import parameters as named_parameters
-from .engine import Engine
-from .fusing import Fusing, NotFused
-from .layout import Layout, refuse_dense
-from .pack import Known, Packed, pack
+from .bodies import Known
+from .compiled import Compiled
+from .fusing import Fusing
+from .layout import refuse_dense
+from .packed import Packed
 from .settings import Settings, checked, times_of
-from .start import start_values
 
 if TYPE_CHECKING:
     from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
-    from .flexible.modal_body import ModalBody
     from .result import Result
     from .simulate_batch import BatchResult
 
 
-class Model:
+class Model(Compiled):
     """A scene ready to compute.  Made by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
@@ -44,44 +42,8 @@ class Model:
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
     ) -> None:
-        self.scene, self.known = scene, known
-        self._fusing, self._product_accuracy = fusing, product_accuracy
-        self._engine = Engine(pack(scene, known, product_accuracy))
-        self.fusion: Fusing = fusing(self._engine.packed, known or {}) if fusing else NotFused()
+        super().__init__(scene, known, fusing, product_accuracy)
         self._differentiations: dict[tuple[str, ...], Differentiation] = {}
-
-    @property
-    def engine(self) -> str:
-        """The engine in use: "fused" or "looped"."""
-        return "looped" if self.fusion.library is None else "fused"
-
-    @property
-    def engine_choice(self) -> str:
-        """The engine in use and why, in words."""
-        f = self.fusion
-        if f.library is not None:
-            return f"fused: {f.note}"
-        if f.obstacle:
-            return f"looped: {f.obstacle}"
-        return "looped: fused code of this scene is not compiled yet; a long run or batch builds it"
-
-    @property
-    def layout(self) -> Layout:
-        """Places of hinges in q and u."""
-        return self._engine.packed.layout
-
-    @property
-    def flexible(self) -> Mapping[str, ModalBody]:
-        """Numbers of the flexible bodies by their names: modes, moments, stiffness, ports."""
-        return self._engine.packed.flexible
-
-    @property
-    def nq(self) -> int:
-        return self._engine.nq
-
-    @property
-    def nu(self) -> int:
-        return self._engine.nu
 
     def initial_state(self) -> tuple[Array, Array]:
         """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
@@ -91,34 +53,15 @@ class Model:
     @cached_property
     def _start(self) -> tuple[Array, Array]:
         """What `initial_state` gives, computed once: a scene does not change."""
-        from .simulate import SceneSystem
+        from .start import initial_state
 
-        packed = self._engine.packed
-        q, u = start_values(packed.scene, self.layout, packed.flexible)
-        y = SceneSystem(self._engine).start(0.0, q, u)
-        q, u = y[: self.nq], y[self.nq : self.nq + self.nu]
-        described = (*packed.described.beam, *packed.described.elastic)
-        still = [b.name for b in described if b.name in packed.flexible and b.initial.static]
-        return (self._settled(q, u, still), u) if still else (q, u)
-
-    def _settled(self, q: Array, u: Array, names: Sequence[str]) -> Array:
-        """q with these flexible bodies in their static shapes under the loads at t = 0."""
-        from .flexible.static_start import settle
-
-        engine, memory = self._engine, self._engine.start_memory()
-        return settle(
-            lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
-            q, u, {name: self.flexible[name] for name in names}, self.layout.modal,
-        )  # fmt: skip
+        return initial_state(self)
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
         from .undetermined import refuse_undetermined_start
 
-        refuse_undetermined_start(self)
-
-    def _memory(self, n: int) -> Array:
-        return np.ascontiguousarray(np.tile(self._engine.start_memory(), (n, 1)))
+        refuse_undetermined_start(self, *self.initial_state())
 
     def accelerations(
         self,
@@ -144,7 +87,7 @@ class Model:
         extra = () if efforts is None else (("efforts", efforts, self.nu),)
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
         states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
-        return accelerations(self._engine, self.fusion, states, threads).reshape(*lead, self.nu)
+        return accelerations(self.looped, self.fusion, states, threads).reshape(*lead, self.nu)
 
     def inverse_dynamics(
         self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: ArrayLike = 0.0
@@ -155,7 +98,7 @@ class Model:
         Newton-Euler inverse dynamics over the tree, O(bodies).  Raises SceneError for a shape that
         does not fit.
         """
-        engine = self._engine
+        engine = self.looped
         memory, nu = engine.start_memory(), self.nu
         lead, (times, coordinates, speeds, rates) = batch(
             ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
@@ -171,19 +114,8 @@ class Model:
         as if free.  Raises SceneError for a shape that does not fit."""
         refuse_dense(self.nu, "the mass matrix")
         lead, (states,) = batch(("q", q, self.nq))
-        matrices = [self._mass_matrix(one_state) for one_state in states]
+        matrices = [self.looped.mass_matrix(one_state) for one_state in states]
         return np.array(matrices).reshape(*lead, self.nu, self.nu)
-
-    def _mass_matrix(self, q: Array) -> Array:
-        engine, still = self._engine.inertia_alone, np.zeros(self.nu)
-        memory = engine.start_memory()
-        strained = engine.inverse_dynamics(0.0, q, still, still, memory)
-        columns = [
-            engine.inverse_dynamics(0.0, q, still, unit, memory) - strained
-            for unit in np.eye(self.nu)
-        ]
-        matrix = np.array(columns).reshape(self.nu, self.nu).T
-        return np.asarray((matrix + matrix.T) / 2)
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
@@ -225,27 +157,8 @@ class Model:
         names = tuple(parameters)
         if names not in self._differentiations:
             self._differentiations[names] = Differentiation(self, names)
-        return derivatives(self, self._differentiations[names], q, u, t, efforts)
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Every number of the scene that has a name, such as "rod1.mass"."""
-        return named_parameters.read(self.scene)
-
-    def with_parameters(self, changes: Mapping[str, float]) -> Model:
-        """The same scene with other numbers.
-
-        Nothing is compiled again, but where the model is fused and a number that was exactly zero
-        (or an axis along a coordinate axis) changes; then other code is compiled or found.
-
-        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
-        """
-        changed = Model(
-            named_parameters.changed(self.scene, changes), self.known, self._fusing,
-            self._product_accuracy,
-        )  # fmt: skip
-        changed.fusion.follow(self.fusion)
-        return changed
+        udot = self.accelerations(q, u, t, efforts)  # refuses states that have none
+        return derivatives(self, self._differentiations[names], q, u, t, efforts, udot)
 
     def simulate(
         self,
@@ -284,7 +197,7 @@ class Model:
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for settings that make no sense.
         """
-        from .result import simulate
+        from .results import simulate
 
         settings = checked(
             Settings(

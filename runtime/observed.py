@@ -17,12 +17,12 @@ from mstmm.scene import Scene, split
 from mstmm.scene_errors import near
 from mstmm.scene_parts import BodyTable
 
-from .engine import PARTS, Probe
+from .calls import PARTS, Probe
 
 if TYPE_CHECKING:
+    from .compiled import Compiled
     from .layout import Layout
-    from .model import Model
-    from .simulate import Trajectory
+    from .trajectory import Trajectory
 
 
 #: Numbers of one batch, about 130 MB.
@@ -38,8 +38,8 @@ class Observed:
     `failures` holds one sentence for each such row, as far as they have been met.
     """
 
-    def __init__(self, model: Model, run: Trajectory) -> None:
-        self.engine, self.run = model._engine, run
+    def __init__(self, model: Compiled, run: Trajectory) -> None:
+        self.engine, self.run = model.looped, run
         self.failures: tuple[str, ...] = ()
         self.references = References(model.scene.skeleton)
         self._points: dict[str, Array] = {}

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mstmm.errors import SceneError
+from mstmm.extras import missing
 from mstmm.printable import printable
 
 from .curves import curve
-from .dataset import extra
 from .files import replacing
 from .flexible.results.pictures import Picture, picture
 from .table import default_names, default_pictures
 
 if TYPE_CHECKING:
-    from .quantities import Quantity
-    from .result import Result
+    from .names_of import Quantity
+    from .record import Record
 
 #: Colours that stay apart in grey and for colour-blind readers (Okabe and Ito, 2008).
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442")
@@ -60,7 +60,7 @@ _UNIT_TEXT = {
 }
 
 
-def plot(result: Result, names: Sequence[str], path: Path | None, title: str | None) -> Any:
+def plot(result: Record, names: Sequence[str], path: Path | None, title: str | None) -> Any:
     """`matplotlib.figure.Figure`; see `Result.plot`.
 
     Raises SceneError for an unknown name or file type, EnvironmentFailure without the extra.
@@ -69,7 +69,7 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise extra("plot", "a picture", error) from None
+        raise missing("plot", "a picture", error) from None
     if not len(result.t):
         raise SceneError("there is nothing to plot: the run has no sample; ask for other times")
     panels = _panels(result, names)
@@ -94,7 +94,7 @@ def plot(result: Result, names: Sequence[str], path: Path | None, title: str | N
     return figure
 
 
-def _panels(result: Result, names: Sequence[str]) -> list[Picture]:
+def _panels(result: Record, names: Sequence[str]) -> list[Picture]:
     """Pictures, then quantities of one unit together, in the order of their first ones."""
     wanted = list(dict.fromkeys(names)) or [*default_pictures(result), *default_names(result)]
     found = {name: picture(result, name) for name in wanted}
@@ -119,11 +119,11 @@ def _fill(part: Any, group: Sequence[Picture]) -> None:
         axes[-1].set_xlabel("time in s")
 
 
-def _curves(result: Result, panel: Sequence[Quantity], figure: Any, axis: Any) -> None:
+def _curves(result: Record, panel: Sequence[Quantity], figure: Any, axis: Any) -> None:
     _draw(axis, result, panel)
 
 
-def _draw(axis: Any, result: Result, panel: Sequence[Quantity]) -> None:
+def _draw(axis: Any, result: Record, panel: Sequence[Quantity]) -> None:
     """The curves of one panel, broken where an event makes them jump."""
     axis.set_prop_cycle(color=_COLOURS)
     lines = 0

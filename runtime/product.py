@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
-    from .pack import Packed
+    from .packed import Packed
 
 #: Hinge type -> kind of the C engine; a hinge and its successor must be of one kind.
 _KINDS = {"pin": "PIN", "ball": "BALL", "elastic": "ACCELERATION", "free": "ACCELERATION"}

@@ -6,8 +6,6 @@ import hashlib
 import json
 import platform
 from dataclasses import asdict, fields
-from functools import cache
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,15 +14,15 @@ import mstmm
 from mstmm.arrays import Array
 
 from .error_estimate import ErrorEstimate
+from .identity import kernels_hash
 from .integrate import Statistics, Status
 from .second_opinion import METHODS
 from .settings import Settings
-from .simulate import Trajectory
 from .steppers import get
+from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .model import Model
-    from .result import Result
+    from .record import Record
 
 #: Version of the layout of a saved result.
 FORMAT = 1
@@ -34,22 +32,7 @@ _ERROR = ("horizon", "tenfold", "reference", "moved")
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
-@cache
-def _manifest() -> bytes:
-    return files("mstmm.generated").joinpath("manifest.json").read_bytes()
-
-
-def kernels_hash(model: Model) -> str:
-    """SHA-256 of the hashes of all generated kernels, and of the elements that are not prebuilt."""
-    found, ffi = hashlib.sha256(_manifest()), model._engine.ffi
-    for (kind, name), element in sorted((model.known or {}).items()):
-        text = element.descriptor.hash
-        own = "" if text == ffi.NULL else ffi.string(text).decode()
-        found.update(f"{kind} {name} {own}\n".encode())
-    return found.hexdigest()
-
-
-def scene_hash(result: Result) -> str:
+def scene_hash(result: Record) -> str:
     """SHA-256 of the scene's text with every default filled in."""
     return hashlib.sha256(result.model.scene.to_toml().encode()).hexdigest()
 
@@ -64,7 +47,7 @@ def versions() -> dict[str, str]:
     }  # fmt: skip
 
 
-def attributes(result: Result) -> dict[str, Any]:
+def attributes(result: Record) -> dict[str, Any]:
     """Attributes of the file: text, so that any reader of NetCDF shows them."""
     run = result.trajectory
     settings = asdict(run.settings)
@@ -89,7 +72,7 @@ def attributes(result: Result) -> dict[str, Any]:
     }
 
 
-def variables(result: Result) -> dict[str, Variable]:
+def variables(result: Record) -> dict[str, Variable]:
     """What is too long for an attribute, or has a dimension of its own."""
     run = result.trajectory
     scene = {"long_name": "scene as TOML, defaults filled in"}

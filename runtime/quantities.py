@@ -6,7 +6,7 @@ Every name gives values over time with their unit and one label per column.  Axe
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +16,10 @@ from mstmm.errors import SceneError
 from mstmm.hinge_types import effort_unit
 from mstmm.scene_errors import near
 
+from .flexible.results.names import add_body
 from .kinds import Kind
 from .layout import HingeSlots
+from .names_of import Quantity, Table, Values
 from .observed import quaternions
 
 if TYPE_CHECKING:
@@ -25,24 +27,7 @@ if TYPE_CHECKING:
     from .observed import Observed
 
 
-Values = Callable[[], Array]
-
 _XYZ, _WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Values (n,) or (n, k) over time; `labels` has one entry per column.
-
-    `rates` are their time derivatives where these are quantities themselves.
-    """
-
-    name: str
-    values: Array
-    unit: str
-    long_name: str
-    labels: tuple[str, ...] = ()
-    rates: Callable[[], Array] | None = field(default=None, compare=False)
 
 
 #: Quantities of a body or an end, in the order of `Observation.points`.
@@ -206,8 +191,6 @@ class Quantities:
             )  # fmt: skip
         if reference in self.layout.modal:
             self._modal(table, self.layout.modal[reference])
-        from .flexible.results.names import add_body
-
         add_body(table, self._flexible, reference)
 
     def _modal(self, table: Table, body: HingeSlots) -> None:
@@ -273,44 +256,6 @@ class Quantities:
 
 
 @dataclass
-class Table:
-    """Names of one owner: how to get each quantity, and one name for every number."""
-
-    entries: dict[str, Callable[[], Quantity]]
-    scalars: list[str]
-
-    def scalar(
-        self, name: str, unit: str, long_name: str, get: Values, k: int | None = None,
-        rates: Values | None = None, listed: bool = True,
-    ) -> None:  # fmt: skip
-        """One number, column k of what `get` gives."""
-        slope = None if rates is None else (lambda: _pick(rates(), k))
-        self.entries[name] = lambda: Quantity(name, _pick(get(), k), unit, long_name, rates=slope)
-        if listed:
-            self.scalars.append(name)
-
-    def vector(
-        self, name: str, owner: str, about: Kind, get: Values, rates: Values | None = None,
-        listed: bool = True,
-    ) -> None:  # fmt: skip
-        """The vector under its name, each component under name.x, and short as in rod1.tip.vx.
-
-        What is not `listed` has names but no column in a wide table.
-        """
-        long_name = f"{about.long_name} of {owner}"
-        self.entries[name] = lambda: Quantity(
-            name, get(), about.unit, long_name, about.labels, rates
-        )
-        for k, label in enumerate(about.labels):
-            text = f"{long_name}, {label}"
-            short = f"{owner}.{about.short[k]}" if about.short else ""
-            taken = not short or short in self.entries
-            self.scalar(f"{name}.{label}", about.unit, text, get, k, rates, listed and taken)
-            if not taken:
-                self.scalar(short, about.unit, text, get, k, rates, listed)
-
-
-@dataclass
 class _Group:
     """Columns of one hinge under their own names and by number: shoulder.angle, shoulder.q[0]."""
 
@@ -329,10 +274,6 @@ class _Group:
             self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
         if len(names) == 1 and names[0] != short:
             self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]
-
-
-def _pick(values: Array, k: int | None) -> Array:
-    return values if k is None else values[:, k]
 
 
 def acceleration_name(speed: str) -> str:

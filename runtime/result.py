@@ -1,41 +1,16 @@
-"""Result of a run: named, labelled quantities over time, with units, and what vouches for them."""
+"""Result of a run: its quantities, what vouches for them, and the ways out of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
-from mstmm.arrays import Array
-from mstmm.hinge_types import HINGE_TYPES
-from mstmm.scene_flexible_checks import short_beams
-
-from .checkpoint import Checkpoint
-from .error_estimate import ErrorEstimate
-from .execution import Watch, first_run, second_run
-from .flexible.results.results import FlexibleResults
-from .integrate import Statistics, Status
-from .layout import HingeSlots
-from .observed import Observed
-from .quantities import Quantities, Quantity
-from .settings import Settings
-from .simulate import Trajectory
-from .stability import StepCheck
-
-if TYPE_CHECKING:
-    from .certificate import Certificate
-    from .model import Model
+from .certificate import Certificate
+from .record import Record
 
 
-#: States below this have finite energies in any scene that stands for something.
-_MODEST = 1e60
-
-
-class Result(FlexibleResults):
+class Result(Record):
     """What a run gave: states, and everything that follows from them, over the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
@@ -55,36 +30,6 @@ class Result(FlexibleResults):
         checkpoint: the file that keeps the run until its result is saved; None without one.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        run: Trajectory,
-        error: ErrorEstimate | None = None,
-        step: StepCheck | None = None,
-    ) -> None:
-        self.model, self.trajectory = model, run
-        self._error, self._step = error, step
-        self.checkpoint: Checkpoint | None = None
-        self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
-        self.status = run.status
-        self.statistics: Statistics | None = run.statistics
-        self.settings: Settings = run.settings
-        self._observed = Observed(model, run)
-        self._quantities = Quantities(self._observed, HINGE_TYPES, self)
-
-    @property
-    def success(self) -> bool:
-        """True if the run reached its end or was stopped by an event, with finite numbers: states,
-        energies and momenta of every sample.  It does not say that they are right: see `trusted`.
-        """
-        return self.trajectory.success and not self._unusable
-
-    @property
-    def message(self) -> str:
-        """Why the run ended, as a sentence; and which of its samples cannot be used."""
-        text, unusable = self.trajectory.message, self._unusable
-        return f"{text}, but {unusable}" if unusable and self.trajectory.success else text
-
     @property
     def trusted(self) -> bool:
         """True where nothing speaks against the numbers: a success whose balances and estimated
@@ -95,139 +40,11 @@ class Result(FlexibleResults):
         return self.certificate.trusted
 
     @cached_property
-    def _unusable(self) -> str:
-        """What cannot be computed of finite states; "" if everything can."""
-        run = self.trajectory
-        if not self.model.flexible and max(_size(run.q), _size(run.u), _size(run.work)) < _MODEST:
-            return ""
-        sums = self._observed.part("sums")
-        failing = np.isnan(sums).any(axis=1)
-        if self._observed.failures and failing.any():
-            count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
-            return f"{count}: {self._observed.failures[0]}"
-        finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
-        return "" if finite else "its energies or momenta are beyond what numbers hold"
-
-    @property
-    def last_state(self) -> tuple[float, Array, Array]:
-        """(t, q, u) of the last good state: the end, or what a failure left."""
-        kept = self.trajectory.last
-        return (float(self.t[-1]), self.q[-1], self.u[-1]) if kept is None else kept
-
-    @cached_property
     def certificate(self) -> Certificate:
         """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
-        from .certificate import certificate
+        from .certify import certificate
 
         return certificate(self, self._error, self._step)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is worth knowing before the numbers are used, one sentence each."""
-        scene, found = self.model.scene.warnings, self.certificate.warnings
-        notes, failures = self.trajectory.notes, self._observed.failures
-        return tuple(dict.fromkeys((*scene, *notes, *found, *failures)))
-
-    def _outside(self) -> tuple[str, ...]:
-        """Models of the scene that are outside their range whatever the run."""
-        return tuple(short_beams(self.model.scene))
-
-    # --- bodies and ends ------------------------------------------------------------------------
-
-    def position(self, reference: str) -> Array:
-        """Position (n, 3) in m of "rod1" (its origin) or "rod1.tip".
-
-        Here and below: SceneError, with the nearest name, for one that is not in the scene.
-        """
-        return self._quantities.of_body(reference, "position")
-
-    def velocity(self, reference: str) -> Array:
-        """Velocity (n, 3) in m/s."""
-        return self._quantities.of_body(reference, "velocity")
-
-    def acceleration(self, reference: str) -> Array:
-        """Acceleration (n, 3) in m/s2, gravity not subtracted."""
-        return self._quantities.of_body(reference, "acceleration")
-
-    def orientation(self, reference: str) -> Array:
-        """Unit quaternion (n, 4), w, x, y, z, of the user's axes to inertial axes.
-
-        Its sign is continuous over time and w >= 0 in the first sample.
-        """
-        return self._quantities.of_body(reference, "orientation")
-
-    def angular_velocity(self, reference: str) -> Array:
-        """Angular velocity (n, 3) in rad/s."""
-        return self._quantities.of_body(reference, "angular_velocity")
-
-    def angular_acceleration(self, reference: str) -> Array:
-        """Angular acceleration (n, 3) in rad/s2."""
-        return self._quantities.of_body(reference, "angular_acceleration")
-
-    # --- hinges ---------------------------------------------------------------------------------
-
-    def coordinate(self, hinge: str) -> Array:
-        """Coordinates (n, nq) of one hinge; of a flexible body the modal ones."""
-        return self.q[:, self._quantities.slots(hinge).q_slice]
-
-    def speed(self, hinge: str) -> Array:
-        """Speeds (n, nu) of one hinge; of a flexible body the modal ones."""
-        return self.u[:, self._quantities.slots(hinge).u_slice]
-
-    def force(self, hinge: str) -> Array:
-        """Force (n, 3) in N of the inboard on the outboard side of a hinge, inertial axes."""
-        return self._quantities.of_hinge(hinge, "force")
-
-    def moment(self, hinge: str) -> Array:
-        """Moment (n, 3) in N*m of the inboard on the outboard side about P, inertial axes."""
-        return self._quantities.of_hinge(hinge, "moment")
-
-    def effort(self, hinge: str) -> Array:
-        """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
-        return self._quantities.effort(hinge)
-
-    def layout(self, hinge: str) -> HingeSlots:
-        """Names, units and places of a hinge's coordinates and speeds."""
-        return self._quantities.slots(hinge)
-
-    @property
-    def udot(self) -> Array:
-        """Accelerations (n, nu) of the hinge speeds, m/s2, rad/s2."""
-        return self._observed.part("udot")
-
-    # --- sums -----------------------------------------------------------------------------------
-
-    def energy(self) -> Array:
-        """Total energy (n,) in J: kinetic, gravity (zero at the inertial origin), springs."""
-        return self._quantities.sum("energy")
-
-    def energies(self) -> dict[str, Array]:
-        """The three parts of the energy, (n,) each in J: kinetic, gravity, springs."""
-        names = ("kinetic", "gravity", "springs")
-        return {name: self._quantities.sum(f"energy.{name}") for name in names}
-
-    def power(self) -> Array:
-        """Power (n,) in W of everything that is not stored: dampers, efforts, loads, drives."""
-        return self._quantities.sum("power")
-
-    @property
-    def work(self) -> Array:
-        """Integral (n,) of `power` in J from the start."""
-        return self.trajectory.work
-
-    def momentum(self) -> Array:
-        """Linear momentum (n, 3) in kg*m/s of the whole scene."""
-        return self._quantities.sum("momentum")
-
-    def angular_momentum(self) -> Array:
-        """Angular momentum (n, 3) in kg*m2/s of the whole scene about the inertial origin."""
-        return self._quantities.sum("angular_momentum")
-
-    # --- by name --------------------------------------------------------------------------------
-
-    def names(self) -> tuple[str, ...]:
-        """Every name that `quantity`, `plot` and `table` take."""
-        return tuple(self._quantities.names())
 
     def pictures(self) -> tuple[str, ...]:
         """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
@@ -235,10 +52,6 @@ class Result(FlexibleResults):
         from .flexible.results.pictures import names
 
         return tuple(names(self))
-
-    def quantity(self, name: str) -> Quantity:
-        """Values with unit by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy"."""
-        return self._quantities.get(name)
 
     # --- out ------------------------------------------------------------------------------------
 
@@ -280,61 +93,3 @@ class Result(FlexibleResults):
 
     def __repr__(self) -> str:
         return f"<Result: {self.trajectory.message}; {len(self.t)} samples>"
-
-
-def _size(values: Array) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
-
-
-def result_of(
-    model: Model,
-    run: Trajectory,
-    error: ErrorEstimate | None = None,
-    step: StepCheck | None = None,
-) -> Result:
-    """The result of a run: with elastic responses where the model has one-way bodies."""
-    expanded = model._engine.packed.expanded
-    rigid = None if expanded is None else expanded.rigidified
-    if rigid is None or not rigid.one_way:
-        return Result(model, run, error, step)
-    from .flexible.one_way.result import OneWayResult
-
-    return OneWayResult(model, run, error, step)
-
-
-def simulate(
-    model: Model,
-    settings: Settings,
-    q: Array,
-    u: Array,
-    *,
-    certify: bool,
-    progress: Callable[[float, float], None] | None,
-    checkpoint: str | Path | None,
-    resume: bool,
-) -> Result:
-    """One run, and a second one where its error is asked for; see `Model.simulate`."""
-    watch = Watch(progress, settings, runs=2 if certify else 1)
-    if checkpoint is not None:
-        watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
-    run, step = first_run(model, settings, q, u, watch, resume)
-    run = replace(run, start=(q, u))
-    error = second_run(model, run, q, u, watch) if certify and run.success else None
-    if watch.notes:
-        run = replace(run, notes=(*run.notes, *watch.notes))
-    result = result_of(model, run, error, step)
-    result.checkpoint = watch.checkpoint
-    return result
-
-
-def load_result(path: str | Path) -> Result:
-    """A result saved as NetCDF, with its scene compiled again, so that every quantity is there.
-
-    Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
-    """
-    from .storage import load
-
-    return load(Path(path))
-
-
-__all__ = ["Quantity", "Result", "Status", "load_result", "simulate"]

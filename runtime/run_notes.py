@@ -8,7 +8,7 @@ from .switches import MOST
 
 if TYPE_CHECKING:
     from .settings import Settings
-    from .simulate import SceneSystem
+    from .system import SceneSystem
 
 
 def unseen(

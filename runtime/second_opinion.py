@@ -26,10 +26,12 @@ from .interruptible import interruptible
 from .jacobian import Jacobian
 from .run_notes import endless, unseen
 from .settings import Settings
-from .simulate import SceneSystem, Trajectory, split, tolerances
+from .simulate import split, tolerances
+from .system import SceneSystem
+from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .compiled import Compiled
 
 
 #: Method of `simulate` -> name of SciPy's class.
@@ -63,8 +65,8 @@ class _Ended(Exception):
 class Equations:
     """The call-backs of a model, taken from the C structure and called from Python."""
 
-    def __init__(self, model: Model) -> None:
-        self.engine = model._engine
+    def __init__(self, model: Compiled) -> None:
+        self.engine = model.looped
         self.scene = SceneSystem(self.engine)
         self.calls = self.scene.system
         self.ffi = self.engine.ffi
@@ -121,7 +123,7 @@ class Equations:
 
 
 def integrate(
-    model: Model, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
+    model: Compiled, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
 ) -> Trajectory:
     """One run by SciPy.
 
@@ -139,7 +141,7 @@ def integrate(
 class _Loop:
     """Steps, breaks, events and samples of one run."""
 
-    def __init__(self, model: Model, settings: Settings, tell: Callable[[float], None]) -> None:
+    def __init__(self, model: Compiled, settings: Settings, tell: Callable[[float], None]) -> None:
         self.system, self.settings, self.tell = Equations(model), settings, tell
         self.rows: list[tuple[float, Array, Array, int]] = []
         self.outputs = None if settings.output_times is None else deque(settings.output_times)

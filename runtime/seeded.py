@@ -24,7 +24,8 @@ from mstmm.scene import Hinge, Scene
 from mstmm.structure import Structure
 
 from . import parameters
-from .pack import Known, pack
+from .bodies import Known
+from .pack import pack
 from .structure import structure_of
 
 Change = Callable[[float], Any]

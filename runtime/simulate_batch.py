@@ -25,14 +25,15 @@ from mstmm.errors import MstmmError, SceneError
 from .integrate import Failure, Run, Status, failure_text
 from .lanes_run import Lanes, run_lanes
 from .settings import Settings, checked
-from .simulate import Compiled, SceneSystem, advance, make_run, said, settled, trajectory
+from .simulate import advance, make_run, said, settled, trajectory
 from .steppers import get
 from .switches import has_switches
+from .system import SceneCode, SceneSystem
 from .threads import on_threads
 
 if TYPE_CHECKING:
+    from .compiled import Compiled
     from .fused import FusedLibrary
-    from .model import Model
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class _Rows:
 
 
 def simulate_batch(
-    model: Model,
+    model: Compiled,
     settings: Settings,
     q: Array,
     u: Array,
@@ -102,7 +103,7 @@ def simulate_batch(
     )  # fmt: skip
 
 
-def _models(model: Model, parameters: Mapping[str, ArrayLike], n: int) -> list[Model]:
+def _models(model: Compiled, parameters: Mapping[str, ArrayLike], n: int) -> list[Compiled]:
     """The model of each trajectory; equal numbers share one.
 
     Raises SceneError for a name or a value that the scene refuses, naming the trajectory.
@@ -115,7 +116,7 @@ def _models(model: Model, parameters: Mapping[str, ArrayLike], n: int) -> list[M
         if column.shape not in ((), (n,)):
             raise SceneError(f'parameter "{name}" has shape {column.shape}, expected ({n},)')
         columns[name] = np.broadcast_to(column, (n,))
-    made: dict[tuple[float, ...], Model] = {}
+    made: dict[tuple[float, ...], Compiled] = {}
     found = []
     for i in range(n):
         row = tuple(float(column[i]) for column in columns.values())
@@ -128,9 +129,9 @@ def _models(model: Model, parameters: Mapping[str, ArrayLike], n: int) -> list[M
     return found
 
 
-def _lanes(model: Model) -> FusedLibrary | None:
+def _lanes(model: Compiled) -> FusedLibrary | None:
     """Code for several states side by side, where trajectories can be run on it."""
-    packed = model._engine.packed
+    packed = model.packed
     if has_switches(packed.scene):
         return None
     if packed.n_memory or packed.scene.event or packed.releases or packed.model.n_drives:
@@ -139,10 +140,10 @@ def _lanes(model: Model) -> FusedLibrary | None:
 
 
 def _side_by_side(
-    model: Model, library: FusedLibrary, models: list[Model], settings: Settings,
+    model: Compiled, library: FusedLibrary, models: list[Compiled], settings: Settings,
     q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
-    engine = model._engine
+    engine = model.looped
     systems = [SceneSystem(engine, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
     start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
@@ -160,15 +161,17 @@ def _side_by_side(
     rows.samples[which] = flat.reshape(len(which), -1, model.nq + model.nu)
 
 
-def _lanes_message(model: Model, library: FusedLibrary, system: SceneSystem, outcome: Any) -> str:
+def _lanes_message(
+    model: Compiled, library: FusedLibrary, system: SceneSystem, outcome: Any
+) -> str:
     status = Status(outcome.status)
     if status is Status.FINISHED:
         return f"finished at t = {outcome.t:.9g} s"
     last = f"; last good state at t = {outcome.t:.9g} s"
     if status is Status.RHS_FAILED:
         reason, element, code = library.failures[outcome.code - 1]
-        failure = model._engine.ffi.new("mstmm_failure *", [reason, element, code])
-        return model._engine.failure_text(failure, outcome.fail_time) + last
+        failure = model.looped.ffi.new("mstmm_failure *", [reason, element, code])
+        return model.looped.failure_text(failure, outcome.fail_time) + last
     component = None if outcome.component < 0 else int(outcome.component)
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
     way_out = "simulate this one alone to learn the cause" if status is Status.NOT_FINITE else ""
@@ -176,7 +179,7 @@ def _lanes_message(model: Model, library: FusedLibrary, system: SceneSystem, out
 
 
 def _one_by_one(
-    models: list[Model], settings: Settings, q: Array, u: Array,
+    models: list[Compiled], settings: Settings, q: Array, u: Array,
     which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
     compiled = {id(m): _scalar(m) for m in models}
@@ -201,16 +204,16 @@ class _Stopped(Exception):
     """The batch has ended."""
 
 
-def _scalar(model: Model) -> Compiled | None:
+def _scalar(model: Compiled) -> SceneCode | None:
     library = model.fusion.ready(math.inf)
-    return None if library is None else Compiled(library, None, model.fusion.numbers)
+    return None if library is None else SceneCode(library, None, model.fusion.numbers)
 
 
 def _alone(
-    model: Model, compiled: Compiled | None, settings: Settings, q: Array, u: Array,
+    model: Compiled, compiled: SceneCode | None, settings: Settings, q: Array, u: Array,
     i: int, rows: _Rows, look: Callable[[Run], None],
 ) -> None:  # fmt: skip
-    system = SceneSystem(model._engine, compiled, with_power=False)
+    system = SceneSystem(model.looped, compiled, with_power=False)
     run = make_run(system, settings, q, u)
     status = advance(run, look)
     found = trajectory(system, run, settings, status, said(system, run, status))
@@ -221,7 +224,7 @@ def _alone(
 
 
 def prepared(
-    model: Model, settings: Settings, initial: tuple[ArrayLike, ArrayLike]
+    model: Compiled, settings: Settings, initial: tuple[ArrayLike, ArrayLike]
 ) -> tuple[Settings, Array, Array]:
     """(settings with output times, q (n, nq), u (n, nu)) of a batch; SceneError for a misfit."""
     settings = checked(settings)

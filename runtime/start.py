@@ -1,57 +1,29 @@
-"""The state in which a scene begins, as its hinges say it."""
+"""The state in which a compiled scene begins: as its hinges say it, drives and static shapes taken
+in."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-import numpy as np
-
 from mstmm.arrays import Array
-from mstmm.hinge_types import HINGE_TYPES
-from mstmm.scene import Hinge, Scene
 
-from .layout import HingeSlots, Layout
-
-if TYPE_CHECKING:
-    from .flexible.modal_body import ModalBody
+from .compiled import Compiled
+from .flexible.static_start import settle
+from .start_values import start_values
+from .system import SceneSystem
 
 
-def start_values(
-    scene: Scene, layout: Layout, flexible: Mapping[str, ModalBody] | None = None
-) -> tuple[Array, Array]:
-    """(q, u) of the scene; driven coordinates still as `initial` has them."""
-    q, u = np.zeros(layout.nq), np.zeros(layout.nu)
-    for group in layout.groups:
-        for k, slots in enumerate(group.hinges):
-            one_q, one_u = _values(scene.hinges[group.first + k], slots)
-            if group.count == 1:
-                q[slots.q_slice], u[slots.u_slice] = one_q, one_u
-                continue
-            for target, first, values in (
-                (q, group.q_places(), one_q), (u, group.u_places(), one_u)
-            ):  # fmt: skip
-                if len(values):
-                    mine = first[k :: len(group.hinges)]
-                    target[mine[:, None] + np.arange(len(values))] = values
-    for name, body in (flexible or {}).items():
-        slots = layout.modal[name]
-        if len(body.eta):
-            q[slots.q_slice] = body.eta
-        if len(body.etad):
-            u[slots.u_slice] = body.etad
-    return q, u
-
-
-def _values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
-    """q and u of one hinge."""
-    q, u = np.zeros(slots.nq), np.zeros(slots.nu)
-    held = slots.quaternion is not None and hinge.type == "fixed"
-    kind = HINGE_TYPES.get("free" if held else hinge.type)
-    if kind is not None and slots.nq:
-        q[:] = kind.start
-    if hinge.initial is not None and hinge.initial.q:
-        q[:] = hinge.initial.q
-    if hinge.initial is not None and hinge.initial.u:
-        u[:] = hinge.initial.u
+def initial_state(compiled: Compiled) -> tuple[Array, Array]:
+    """(q, u) at t = 0.  Raises NumericalFailure where a static shape is not found."""
+    packed, engine = compiled.packed, compiled.looped
+    q, u = start_values(packed.scene, compiled.layout, packed.flexible)
+    y = SceneSystem(engine).start(0.0, q, u)
+    q, u = y[: compiled.nq], y[compiled.nq : compiled.nq + compiled.nu]
+    described = (*packed.described.beam, *packed.described.elastic)
+    still = [b.name for b in described if b.name in packed.flexible and b.initial.static]
+    if not still:
+        return q, u
+    memory = engine.start_memory()
+    q = settle(
+        lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
+        q, u, {name: compiled.flexible[name] for name in still}, compiled.layout.modal,
+    )  # fmt: skip
     return q, u

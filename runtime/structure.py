@@ -36,8 +36,8 @@ from mstmm.structure import (
 )
 
 from . import prebuilt
-from .bodies import kernel_type
-from .pack import Known, Packed
+from .bodies import Known, kernel_type
+from .packed import Packed
 from .prebuilt import Element
 
 #: Numbers behind the parameters of a user's body: internal frame in its own (rotation, origin).

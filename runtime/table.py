@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .quantities import Quantity
-    from .result import Result
+    from .names_of import Quantity
+    from .record import Record
 
 #: Columns of a table nobody chose the columns of.
 _DEFAULT_COLUMNS = 6
@@ -22,7 +22,7 @@ _HELD = 1e-9
 _LOOKED_AT = 10_000
 
 
-def default_names(result: Result, most: int = _DEFAULT_COLUMNS) -> list[str]:
+def default_names(result: Record, most: int = _DEFAULT_COLUMNS) -> list[str]:
     """The first hinge coordinates, without quaternions, and deflections of the last end of the
     first flexible bodies."""
     layout, bent = result.model.layout, list(_deflections(result, most // 2))
@@ -35,12 +35,12 @@ def default_names(result: Result, most: int = _DEFAULT_COLUMNS) -> list[str]:
     return [*islice(names, most - len(bent)), *bent]
 
 
-def default_pictures(result: Result) -> list[str]:
+def default_pictures(result: Record) -> list[str]:
     """What is drawn above the curves if nobody chose: the shapes of flexible bodies."""
     return ["shape"] if result.model.flexible else []
 
 
-def _deflections(result: Result, most: int) -> Iterator[str]:
+def _deflections(result: Record, most: int) -> Iterator[str]:
     """The larger deflection of the tip of each beam, or the first modal coordinate of a body whose
     frame follows its tip or that is no beam."""
     for name, body in islice(result.model.flexible.items(), most):
@@ -69,7 +69,7 @@ def flat(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:
     return columns
 
 
-def table(result: Result, names: Sequence[str], rows: int) -> str:
+def table(result: Record, names: Sequence[str], rows: int) -> str:
     """Aligned columns with a line of units; `rows` samples spread evenly over time."""
     chosen = list(names) or [*default_names(result), "energy"]
     columns = [("t", "s", result.t), *flat([result.quantity(name) for name in chosen])]

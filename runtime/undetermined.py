@@ -15,19 +15,18 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
 
 if TYPE_CHECKING:
+    from .compiled import Compiled
     from .engine import Engine
-    from .model import Model
 
 
 #: Hinges that are looked for, and that are named, at most.
 _MOST, _NAMED = 50, 8
 
 
-def refuse_undetermined_start(model: Model) -> None:
+def refuse_undetermined_start(model: Compiled, q: Array, u: Array) -> None:
     """SceneError naming the hinges if the masses leave motions of the start undetermined."""
-    q, u = model.initial_state()
-    start = (q[None].copy(), u[None].copy(), model._memory(1))
-    engine = model._engine
+    engine = model.looped
+    start = (q[None].copy(), u[None].copy(), engine.start_memory()[None].copy())
     try:
         engine.accelerations(0.0, *start)
     except UndeterminedMotion as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from mstmm.drive import motion
 from mstmm.errors import SceneError
@@ -130,22 +129,4 @@ def event_tape(
     return compile_tape(_kernel(graph, "events", inputs, [*nodes, *margins]))
 
 
-def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
-    """`mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
-    arrays = {
-        "input_lengths": ffi.new("int[]", list(tape.input_lengths) or [0]),
-        "constants": ffi.new("real[]", list(tape.constants) or [0.0]),
-        "instructions": ffi.new("int[]", list(tape.instructions) or [0]),
-        "outputs": ffi.new("int[]", list(tape.outputs) or [0]),
-    }
-    result = ffi.new("mstmm_tape *", arrays)
-    result.n_inputs = len(tape.input_lengths)
-    result.n_constants = len(tape.constants)
-    result.n_slots = tape.slots
-    result.n_instructions = len(tape.instructions) // 5
-    result.n_outputs = len(tape.outputs) // 4
-    kept += [result, arrays]
-    return result
-
-
-__all__ = ["Values", "c_tape", "drive_kernel", "effort_kernel", "event_tape"]
+__all__ = ["Values", "drive_kernel", "effort_kernel", "event_tape"]

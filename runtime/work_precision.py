@@ -18,7 +18,8 @@ from mstmm.errors import NumericalFailure
 
 from . import compiled_run
 from .settings import Settings
-from .simulate import SceneSystem, make_run
+from .simulate import make_run
+from .system import SceneSystem
 
 if TYPE_CHECKING:
     from .model import Model
@@ -53,7 +54,7 @@ def run_once(model: Model, settings: Settings) -> tuple[Array, int, float]:
     """
     q, u = model.initial_state()
     code = compiled_run.at_once(model, settings, None)
-    system = SceneSystem(model._engine, code, with_power=False)
+    system = SceneSystem(model.looped, code, with_power=False)
     run = make_run(system, settings, q, u)
     start = time.thread_time()
     run.advance(np.inf)

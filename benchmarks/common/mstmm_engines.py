@@ -21,7 +21,7 @@ class _Place(ctypes.Structure):
 
 def looped(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
     """The loop over element kernels."""
-    engine = model._engine
+    engine = model.looped
     ffi = engine.ffi
     source = (native.HERE / "mstmm_looped.c").read_text()
     opened = ctypes.CDLL(str(native.library("mstmm_looped", source, ["-O2", "-std=gnu17"])))
@@ -42,7 +42,7 @@ def fused(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
     ffi = library.ffi
     address = int(ffi.cast("intptr_t", library.descriptor.accelerations))
     return native.Subject(
-        address, np.asarray(model.fusion.numbers), q, u, memory=model._engine.start_memory(),
+        address, np.asarray(model.fusion.numbers), q, u, memory=model.looped.start_memory(),
         keep=model,
     )  # fmt: skip
 
@@ -57,7 +57,7 @@ class Lanes:
         self.codes = np.zeros(len(q), dtype=np.int32)
         self.arrays = {
             "p": native.aligned(model.fusion.numbers), "t": np.zeros(1), "q": native.aligned(q),
-            "u": native.aligned(u), "memory": model._engine.start_memory(), "udot": self.udot,
+            "u": native.aligned(u), "memory": model.looped.start_memory(), "udot": self.udot,
         }  # fmt: skip
         self.batch = ffi.new("mstmm_batch *")
         self.batch.n, self.batch.codes = len(q), ffi.from_buffer("int[]", self.codes)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .extras import install, missing, result_ending
 from .options import Json, output_file
 from .progress import bar
-from .simulate import certified, load_method
+from .simulate import load_method
 
 if TYPE_CHECKING:
     from mstmm.runtime.result import Result
@@ -101,6 +101,7 @@ def _simulate(text: str) -> tuple[Result, float]:
     import tomllib
 
     import mstmm
+    from mstmm.runtime.results import certified
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
     load_method("dop853")
@@ -109,6 +110,7 @@ def _simulate(text: str) -> tuple[Result, float]:
         begin = time.perf_counter()
         result = model.simulate(T_END, output_times=times, progress=progress)
         seconds = time.perf_counter() - begin
+        progress.label("estimating the error")
         result = certified(result, progress)
     return result, seconds
 

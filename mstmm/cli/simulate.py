@@ -278,6 +278,9 @@ def _saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
         from mstmm.runtime import storage
 
         storage.save(result, plan.output)
+        from mstmm.runtime.results import certified
+
+        progress.label("estimating the error")
         result = certified(result, progress)
     result.save(plan.output)
     return result
@@ -312,24 +315,6 @@ def _kept_if_it_fails(checkpoint: Path) -> Iterator[None]:
 
 def _kept(checkpoint: Path) -> str:
     return f"the run is kept in {checkpoint}; continue with the same command and --resume"
-
-
-def certified(result: Result, progress: Bar) -> Result:
-    """The same result with its error estimated by a second, more accurate run from the start."""
-    from dataclasses import replace
-
-    from mstmm.runtime.execution import Watch, second_run
-    from mstmm.runtime.result import result_of
-
-    progress.label("estimating the error")
-    watch = Watch(progress, result.settings, runs=2)
-    run = result.trajectory
-    error = second_run(result.model, run, *result.model.initial_state(), watch)
-    made = result_of(
-        result.model, replace(run, notes=(*run.notes, *watch.notes)), error, result.certificate.step
-    )
-    made.checkpoint = result.checkpoint
-    return made
 
 
 def load_method(name: str) -> None:

@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 
-from ..sizes import modal_sizes
 from ..vectorized import evaluate
+from .modal_kernels import kernel
 from .parts import slices
 from .records import moments_of, section_inputs
-from .results.modal_kernels import kernel
-from .support import ANY, Support, Supports
+from .sizes import modal_sizes
+from .support import ANY, Support
 
 if TYPE_CHECKING:
-    from ..pack import Packed
     from .modal_body import ModalBody
     from .modal_port import ModalPort
 
@@ -156,19 +155,3 @@ def _shifted(turn: Array, shift: Array) -> Array:
     cross = np.stack([o, z, -y, -z, o, x, y, -x, o], axis=-1).reshape(*x.shape, 3, 3)
     moved[..., :3, 3:] = back @ cross
     return moved
-
-
-# --- a run that stopped ---------------------------------------------------------------------------
-
-
-def indefinite_bodies(packed: Packed, q: Array) -> list[str]:
-    """Names of the flexible bodies whose mass matrix is not positive definite at q (nq,)."""
-    expanded, supports = packed.expanded, Supports(packed.described)
-    return [
-        name
-        for name, body in packed.flexible.items()
-        if expanded is not None and not body.points and not is_definite_at(
-            body, body.ports[expanded.held[name]], supports.of(name),
-            q[packed.layout.modal[name].q_slice][None],
-        )
-    ]  # fmt: skip

@@ -11,8 +11,8 @@ from mstmm.errors import NumericalFailure
 
 from ..layout import HingeSlots
 from ..rest import Rest, Undetermined, Unsettled, at_rest
-from ..sizes import modal_sizes
 from .modal_body import ModalBody
+from .sizes import modal_sizes
 
 #: (q, u, udot) -> efforts (nu,) that these accelerations need.
 InverseDynamics = Callable[[Array, Array, Array], Array]

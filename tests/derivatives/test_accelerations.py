@@ -41,7 +41,7 @@ def equations(model: mstmm.Model, q: Array, u: Array) -> tuple[KernelIR, Arrays]
 
 def tangent_of_q(model: mstmm.Model, q: Array, increment: Array) -> Array:
     """N(q) times the increment: qdot where the increment is the speed."""
-    engine = model._engine
+    engine = model.looped
     memory = engine.start_memory()[None].copy()
     return engine.accelerations(TIME, q[None].copy(), increment[None].copy(), memory)[0][0]
 

@@ -34,7 +34,7 @@ class Interpreted:
     """
 
     def __init__(self, model: mstmm.Model, q: Array, u: Array) -> None:
-        structure, p = structure_of(model._engine.packed, model.known or {})
+        structure, p = structure_of(model.packed, model.known or {})
         self.kernel: KernelIR = model.fusion.fused(structure).kernels["accelerations"]
         self.inputs: dict[str, Any] = {
             "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
@@ -139,8 +139,8 @@ def test_derivatives_are_those_of_the_complex_step(draw: int, rng: Generator) ->
     model = compiled(scene, "looped")
     fused, draws = Interpreted(model, q, u), rng.normal(size=model.nu)
     found = model.derivatives(q, u, TIME)
-    memory = model._engine.start_memory()[None].copy()
-    increment = model._engine.accelerations(TIME, q[None].copy(), draws[None].copy(), memory)[0][0]
+    memory = model.looped.start_memory()[None].copy()
+    increment = model.looped.accelerations(TIME, q[None].copy(), draws[None].copy(), memory)[0][0]
     for name, along, direction in (
         ("q", found.q @ draws, increment),
         ("u", found.u @ draws, draws),
@@ -221,7 +221,7 @@ def test_compiling_is_weighed_by_modes() -> None:
         model = compiled(
             {"gravity": [0, 0, 0], "beam": [beam], "body": [rod], "hinge": pins}, "looped"
         )
-        fusion = Fusion(model._engine.packed, {}, {})
+        fusion = Fusion(model.packed, {}, {})
         counts.append(sorted(modes_at(fusion.structure)))
         least.append(fusion._break_even() * sum(1 + 2 * n for n in counts[-1]))
     assert counts == [[0, 0, 1, 1], [0, 0, 8, 8]]  # held section, rod, frame, tip

@@ -11,9 +11,8 @@ from support.beam_motions import LENGTH, MASS, beam, moving
 
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.flexible.results import observe
-from mstmm.runtime.flexible.results.modal_kernels import momentum
 from mstmm.runtime.flexible.results.observe import Motion
-from mstmm.runtime.flexible.results.observe_momentum import equivalent, undeformed
+from mstmm.runtime.flexible.results.observe_momentum import equivalent, frame_momentum, undeformed
 
 Array = NDArray[np.float64]
 
@@ -62,7 +61,7 @@ def of_particles(body: ModalBody, given: dict[str, Any]) -> tuple[Array, Array, 
 
 
 def kernel_momentum(motion: Motion) -> Any:
-    linear, about_origin, first = momentum(motion)
+    linear, about_origin, first = frame_momentum(motion)
     return equivalent(motion, linear, about_origin, first / motion.body.mass)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
+from support.models import model_of
 
 import mstmm
 from mstmm.runtime.flexible.results.estimators import shear_error
@@ -126,7 +127,7 @@ def test_positions_that_are_no_numbers_are_no_success() -> None:
     assert f"but {len(lost)} of {len(result.t)} samples cannot be evaluated" in result.message
     (link,) = result.certificate.flexible
     assert link.slope > 1.5  # of all samples, these among them
-    assert result.model.simulate(0.2).success
+    assert model_of(result).simulate(0.2).success
 
 
 # --- slenderness ----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ import pytest
 from cli.commands import Command
 
 from mstmm import errors
-from mstmm.runtime import execution, interruptible, storage
+from mstmm.runtime import execution, interruptible, results, storage
 from mstmm.runtime.files import replacing
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
@@ -63,7 +63,7 @@ def test_an_interrupt_while_the_error_is_estimated(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(execution, "second_run", interrupt)
+        patch.setattr(results, "second_run", interrupt)
         done = mstmm(*RUN[:-1], "--certify", "--json")
     assert done.code == 130 and KEPT in json.loads(done.out)["error"]["message"]
     first = (folder / "a.csv").read_bytes()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.models import model_of
 from support.result_scenes import motor, pins, rod, tree
 from support.rod_scenes import chain, drawn_state, precise_accelerations
 
@@ -55,7 +56,7 @@ def test_momentum_of_a_free_scene_in_every_component() -> None:
     kinds = ("momentum", "angular momentum")
     assert names == [f"{kind} {axis}" for axis in "xyz" for kind in kinds]
     assert all(0 < d.relative < 1e-8 for d in run.certificate.momentum)
-    coarse = run.model.simulate(5.0, method="rk4", step=0.2)
+    coarse = model_of(run).simulate(5.0, method="rk4", step=0.2)
     assert any("momentum" in text and "not kept" in text for text in coarse.warnings)
 
 
@@ -107,7 +108,7 @@ def test_a_body_on_a_ball_keeps_its_angular_momentum() -> None:
     names = [d.name for d in run.certificate.momentum]
     assert names == [f"angular momentum {axis}" for axis in "xyz"]
     assert all(0 < d.relative < 1e-8 for d in run.certificate.momentum)
-    coarse = run.model.simulate(2.0, method="rk4", step=0.4)
+    coarse = model_of(run).simulate(2.0, method="rk4", step=0.4)
     assert any("angular momentum" in text and "not kept" in text for text in coarse.warnings)
 
 
@@ -157,7 +158,7 @@ def test_the_table_says_what_a_spring_for_a_constraint_gives_by() -> None:
     expected = np.linalg.norm(run.position("rod0.tip") - [1, 0.05, 0], axis=1).max()
     assert give.largest == pytest.approx(expected)
     assert f'the stiffest, spring "pin", by up to {expected:.1e} m' in str(run.certificate)
-    assert "what this covers" not in str(run.model.simulate(1.0).certificate)
+    assert "what this covers" not in str(model_of(run).simulate(1.0).certificate)
 
 
 def test_the_give_of_an_elastic_hinge_is_seen_too() -> None:
@@ -239,7 +240,7 @@ OMEGA = np.sqrt(1e4 / (1 / 3))  # of a rod on a pin with 1e4 N m/rad
 def test_the_fastest_motion_of_a_pin_with_a_law(
     stiffness: float, damping: float, rate: float
 ) -> None:
-    engine = mstmm.compile(motor("0", stiffness=stiffness, damping=damping))._engine
+    engine = mstmm.compile(motor("0", stiffness=stiffness, damping=damping)).looped
     value, _ = fastest(engine, 0.0, np.array([0.3, 0.0]), engine.start_memory())
     assert abs(value) == pytest.approx(rate, rel=1e-6)
 
@@ -247,7 +248,7 @@ def test_the_fastest_motion_of_a_pin_with_a_law(
 def test_the_fastest_motion_of_a_long_chain_is_found_without_a_dense_matrix() -> None:
     from mstmm.runtime import stability
 
-    engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4))._engine
+    engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4)).looped
     y = np.concatenate([np.tile([0.05, -0.1], 45), np.zeros(90)])
     dense = np.linalg.eigvals(
         stability._differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180)) / 1e-6
@@ -268,7 +269,7 @@ def test_rk4_is_warned_about_where_it_becomes_unstable(part: float) -> None:
     assert (check.amplification > 1.0) == (part > 1.0) == (abs(run.u[-1, 0]) > 1.0)
     assert any("too long for the fastest motion" in text for text in run.warnings)
     assert check.stable_step == pytest.approx(2.5 / 150.0, rel=1e-6)
-    fine = run.model.simulate(1.0, method="rk4", step=0.9 * check.stable_step)
+    fine = model_of(run).simulate(1.0, method="rk4", step=0.9 * check.stable_step)
     assert not any("too long" in text for text in fine.warnings)
 
 

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from support.models import model_of
 from support.result_scenes import motor, pins, tree
 
 import mstmm
 from mstmm.runtime.curves import curve
-from mstmm.runtime.quantities import Quantity
+from mstmm.runtime.names_of import Quantity
 from mstmm.runtime.result import Result
 
 
@@ -39,7 +40,7 @@ def test_curves_between_samples_follow_the_motion() -> None:
     angle = mstmm.compile(pins(1, [0.4])).simulate(3.0)
     assert len(angle.t) < 60
     t, values = curve(angle.t, angle.quantity("pin0.angle"))
-    exact = angle.model.simulate(3.0, rtol=1e-11, output_times=np.unique(t))
+    exact = model_of(angle).simulate(3.0, rtol=1e-11, output_times=np.unique(t))
     straight = np.interp(t, angle.t, angle.q[:, 0]) - exact.q[:, 0]
     smooth = values[:, 0] - exact.q[:, 0]
     assert np.abs(smooth).max() < 0.1 * np.abs(straight).max() < 0.1

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.models import model_of
 from support.result_scenes import motor, pins
 
 import mstmm
@@ -16,7 +17,7 @@ from mstmm.runtime.result import Result
 def true_error(run: Result) -> float:
     """Largest error of q against a run at 1e-12."""
     times, first = np.unique(run.t, return_index=True)
-    best = run.model.simulate(float(times[-1]), rtol=1e-12, atol=1e-14, output_times=times)
+    best = model_of(run).simulate(float(times[-1]), rtol=1e-12, atol=1e-14, output_times=times)
     return float(np.abs(run.q[first] - best.q).max())
 
 

@@ -10,7 +10,8 @@ import pytest
 import mstmm
 from mstmm.runtime.integrate import Samples, Status
 from mstmm.runtime.settings import Settings
-from mstmm.runtime.simulate import SceneSystem, make_run
+from mstmm.runtime.simulate import make_run
+from mstmm.runtime.system import SceneSystem
 
 METHODS = ("dopri5", "dop853", "pirk13", "scipy-RK45", "scipy-DOP853")
 
@@ -138,22 +139,22 @@ def test_scenes_that_do_not_switch_have_nothing_to_watch() -> None:
     model = mstmm.compile(scene("-3*q - 0.1*u*sin(t)"), engine="looped")
     result = model.simulate(2.0)
     assert result.statistics is not None and result.statistics.crossings == 0
-    assert SceneSystem(model._engine).run.n_switches == 0
+    assert SceneSystem(model.looped).run.n_switches == 0
 
 
 def test_a_run_is_cut_anywhere_bit_for_bit() -> None:
     model = mstmm.compile(scene("-sign(q)*where(q < 0.3, 1, 2) - 0.1*abs(u)*u"), engine="looped")
     settings = Settings(7.0, output_times=tuple(np.linspace(0, 7, 50).tolist()))
-    systems = [SceneSystem(model._engine)]
+    systems = [SceneSystem(model.looped)]
     whole = make_run(systems[0], settings, *model.initial_state())
     assert whole.advance(np.inf) is Status.FINISHED
-    systems.append(SceneSystem(model._engine))
+    systems.append(SceneSystem(model.looped))
     run = make_run(systems[1], settings, *model.initial_state())
     rows = []
     while run.advance(0.0) is Status.RUNNING:
         rows.append(run.take())
         state = run.state()
-        systems.append(SceneSystem(model._engine))
+        systems.append(SceneSystem(model.looped))
         run = make_run(systems[-1], settings, *model.initial_state())
         run.restore(state)
     assert whole.statistics.crossings > 5 and len(rows) > 50
@@ -169,7 +170,7 @@ def test_scipys_methods_end_where_a_motion_sticks() -> None:
 
 def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mstmm.runtime.switches.MOST", 1)
-    monkeypatch.setattr("mstmm.runtime.simulate.MOST", 1)
+    monkeypatch.setattr("mstmm.runtime.system.MOST", 1)
     monkeypatch.setattr("mstmm.runtime.run_notes.MOST", 1)
     result = moved("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
     assert any("more than 1 conditions depend on the motion" in text for text in result.warnings)

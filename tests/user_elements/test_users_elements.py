@@ -170,9 +170,9 @@ def check_derivatives(model: mstmm.Model, q: Array, u: Array) -> None:
     """Against differences of accelerations, and of models with other parameters."""
     names = [name for name in model.parameters if ".parameters." in name]
     found, step = model.derivatives(q, u, parameters=names), 1e-5
-    along = model._engine.accelerations
+    along, memory = model.looped.accelerations, model.looped.start_memory()[None].copy()
     for k, unit in enumerate(np.eye(model.nu)):
-        increment, _ = along(0.0, q[None].copy(), unit[None].copy(), model._memory(1))
+        increment, _ = along(0.0, q[None].copy(), unit[None].copy(), memory)
         for column, dq, du in ((found.q, increment[0], 0 * u), (found.u, 0 * q, unit)):
             ahead, behind = (
                 model.accelerations(q + sign * step * dq, u + sign * step * du) for sign in (1, -1)

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.extras import missing
 
-from ...dataset import extra
 from ...files import refuse_special
 from .mesh_references import refuse_outside
 from .model import ElasticModel
@@ -52,7 +52,7 @@ def _library(what: str) -> Any:
     try:
         import skfem
     except ImportError as error:
-        raise extra("fem", what, error) from None
+        raise missing("fem", what, error) from None
     return skfem
 
 
@@ -77,7 +77,7 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         import meshio
         from skfem.io.meshio import from_meshio
     except ImportError as error:
-        raise extra("fem", "a mesh", error) from None
+        raise missing("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
     refuse_outside(path, where)

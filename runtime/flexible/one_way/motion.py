@@ -22,7 +22,7 @@ from .response import Response, rigidity, split_node
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
 
-    from ...model import Model
+    from ...compiled import Compiled
     from ...observed import Observed
     from ..modal_port import ModalPort
 
@@ -76,7 +76,7 @@ class SmallMotion:
 class Superposition:
     """Small motions of all nodes of a tree, from the responses of its one-way bodies."""
 
-    def __init__(self, model: Model, rigid: Observed, responses: Mapping[str, Response]) -> None:
+    def __init__(self, model: Compiled, rigid: Observed, responses: Mapping[str, Response]) -> None:
         self.model, self.rigid, self.responses = model, rigid, responses
         self.known = rigidity(model)
         packed = rigid.engine.packed

@@ -11,7 +11,7 @@ on n oscillators per body, which are solved exactly for loads sampled from the r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,15 +20,16 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
+from ...execution import Watch, first_run
 from ...observed import Observed
 from ...vectorized import evaluate
+from ..modal_kernels import kernel
 from ..records import moments_of
-from ..results.modal_kernels import kernel
 from .oscillators import Cells, Oscillators
 
 if TYPE_CHECKING:
-    from ...model import Model
-    from ...simulate import Trajectory
+    from ...compiled import Compiled
+    from ...trajectory import Trajectory
     from ..modal_body import ModalBody
     from .rigidified import Rigidified
 
@@ -91,7 +92,7 @@ class OneWay:
         )
 
 
-def respond(model: Model, run: Trajectory) -> OneWay:
+def respond(model: Compiled, run: Trajectory) -> OneWay:
     """Responses of every one-way body at the samples of a run of the rigid bodies.
 
     The rigid run is repeated from its start with samples where the loads are wanted, twice as many
@@ -123,32 +124,30 @@ def respond(model: Model, run: Trajectory) -> OneWay:
     return OneWay(responses, Cost(spent, len(grid.samples), count, total, error))
 
 
-def rigidity(model: Model) -> Rigidified:
+def rigidity(model: Compiled) -> Rigidified:
     """What became of the bodies that are rigid in a model's runs."""
-    expanded = model._engine.packed.expanded
+    expanded = model.packed.expanded
     assert expanded is not None and expanded.rigidified is not None
     return expanded.rigidified
 
 
-def _times(model: Model, run: Trajectory) -> Array:
+def _times(model: Compiled, run: Trajectory) -> Array:
     """Times of the start and the last sample, and those between at which loads may jump
     or become narrow."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
-    known = model._engine.packed.time_map(first, last)
+    known = model.packed.time_map(first, last)
     between = [t for t in (*known.breaks, *known.starts, *events) if first < t < last]
     times = np.unique([first, *between, last])
     apart = np.diff(times) > _APART * (last - first)  # a time may lie between two breaks
     return np.append(times[:-1][apart], last)
 
 
-def _sampled(model: Model, run: Trajectory, grid: Cells) -> Trajectory:
+def _sampled(model: Compiled, run: Trajectory, grid: Cells) -> Trajectory:
     s, (t, q, u) = run.settings, run.first
-    result = model.simulate(
-        float(grid.samples[-1]), s.method, s.step, s.rtol, s.atol, grid.samples, t_start=t,
-        initial=(q, u), max_step=s.max_step, max_steps=s.max_steps,
-    )  # fmt: skip
-    repeated = result.trajectory  # its loads are judged, and nothing else of it is used
+    times = tuple(grid.samples.tolist())
+    settings = replace(s, t_start=t, t_end=times[-1], output_times=times, first_step=0.0)
+    repeated, _ = first_run(model, settings, q, u, Watch(None, settings))
     if not repeated.success:
         raise NumericalFailure(
             f"one-way response: the run could not be repeated: {repeated.message}"
@@ -158,8 +157,6 @@ def _sampled(model: Model, run: Trajectory, grid: Cells) -> Trajectory:
 
 def _without_events(run: Trajectory, grid: Cells) -> Trajectory:
     """A run's rows at the times asked for alone."""
-    from dataclasses import replace
-
     rows = np.searchsorted(run.t, grid.samples)
     keys = ("t", "q", "u", "memory", "work", "event")
     return replace(run, **{key: getattr(run, key)[rows] for key in keys})
@@ -173,7 +170,7 @@ def _error(body: ModalBody, grid: Cells, loads: Array) -> float:
     return float(np.max(grid.jumps(loads) / stiffness)) / whole if whole > 0 else 0.0
 
 
-def modal_loads(model: Model, body: ModalBody, observed: Observed) -> Array:
+def modal_loads(model: Compiled, body: ModalBody, observed: Observed) -> Array:
     """(n, modes) in N: what acts on the shapes of a body that moves rigidly, less its inertia."""
     rigid, packed = rigidity(model), observed.engine.packed
     points = observed.points(body.name)
@@ -216,29 +213,31 @@ def split_node(node: str) -> tuple[str, str]:
     return body, end
 
 
-def _held_by(model: Model, name: str) -> str | None:
+def _held_by(model: Compiled, name: str) -> str | None:
     hinges = model.scene.hinge
     return next((h.name for h in hinges if split(h.outboard)[0] == name), None)
 
 
-def _response(model: Model, body: ModalBody, grid: Cells, loads: Array, times: Array) -> Response:
+def _response(
+    model: Compiled, body: ModalBody, grid: Cells, loads: Array, times: Array
+) -> Response:
     oscillators = Oscillators(body.K, body.D, body.Mff)
     return Response(*oscillators.motion(grid, loads, _start(model, body, loads[0, 0]), times))
 
 
-def _start(model: Model, body: ModalBody, load: Array) -> tuple[Array, Array]:
+def _start(model: Compiled, body: ModalBody, load: Array) -> tuple[Array, Array]:
     """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
     if _starts_static(model, body.name):
         return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
     return body.eta, body.etad
 
 
-def _starts_static(model: Model, name: str) -> bool:
+def _starts_static(model: Compiled, name: str) -> bool:
     scene = model.scene
     return any(b.initial.static for b in (*scene.beam, *scene.elastic) if b.name == name)
 
 
-def _at_start(model: Model, run: Trajectory) -> dict[str, Response]:
+def _at_start(model: Compiled, run: Trajectory) -> dict[str, Response]:
     """Responses of a run whose samples, if there are any, all stand at its beginning."""
     found, observed = {}, Observed(model, run)
     for name, body in rigidity(model).one_way.items():

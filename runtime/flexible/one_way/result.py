@@ -12,10 +12,12 @@ from mstmm.errors import SceneError
 from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import split
 
+from ...compiled import Compiled
+from ...letting_go import releasable
 from ...observed import Observed
-from ...pack import releasable
 from ...quantities import Quantities
 from ...result import Result
+from ...start import initial_state
 from ..results.coupling import couplings
 from ..results.observe import Motion
 from ..results.observe_bodies import FlexibleBodies
@@ -25,9 +27,8 @@ from .rigidified import with_level
 
 if TYPE_CHECKING:
     from ...error_estimate import ErrorEstimate
-    from ...model import Model
-    from ...simulate import Trajectory
     from ...stability import StepCheck
+    from ...trajectory import Trajectory
 
 
 #: Share of the inertia at a hinge above which a one-way response errs by about 0.3 of itself:
@@ -44,7 +45,7 @@ def _too_coupled(share: tuple[str, float]) -> str:
     )
 
 
-def _let_go(model: Model) -> tuple[str, ...]:
+def _let_go(model: Compiled) -> tuple[str, ...]:
     """A sentence for each one-way body whose hinge releases it."""
     letting = set(releasable(model.scene))
     holders = {split(h.outboard)[0]: h.name for h in model.scene.hinge if h.name in letting}
@@ -66,7 +67,7 @@ class OneWayResult(Result):
 
     def __init__(
         self,
-        model: Model,
+        model: Compiled,
         run: Trajectory,
         error: ErrorEstimate | None = None,
         step: StepCheck | None = None,
@@ -143,13 +144,11 @@ class _OneWayBodies(FlexibleBodies):
         self._responding = rigidity(result.model).one_way
         self.known = {**self.known, **self._responding}
 
-    def coupled_start(self) -> tuple[Model, Array]:
+    def coupled_start(self) -> tuple[Compiled, Array]:
         """A model in which all of them are coupled, and its q at the start of the run."""
-        from ...model import Model
-
         model = self.model
-        coupled = Model(with_level(model.scene, "coupled"), model.known)
-        q, _ = coupled.initial_state()
+        coupled = Compiled(with_level(model.scene, "coupled"), model.known)
+        q, _ = initial_state(coupled)
         start = self.run.first[1]
         q[: len(start)] = start
         return coupled, q

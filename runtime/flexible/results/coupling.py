@@ -17,7 +17,7 @@ from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
 if TYPE_CHECKING:
-    from ...model import Model
+    from ...compiled import Compiled
     from .observe_bodies import FlexibleBodies
 
 
@@ -33,7 +33,7 @@ def couplings(flexible: FlexibleBodies) -> dict[str, Array]:
         return {}
     model, q = flexible.coupled_start()
     try:
-        inertia = model.mass_matrix(q)
+        inertia = model.looped.mass_matrix(q)
     except NumericalFailure:
         return {}
     found, tree = dict[str, Array](), _Tree(model)
@@ -73,7 +73,7 @@ def coupling(rows: Array, hinge: Array, modal: Array) -> Array:
 class _Tree:
     """Free speeds of the hinges, and what hangs on what."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Compiled) -> None:
         layout, scene = model.layout, model.scene
         self.speeds: dict[str, list[int]] = {}
         self.inboard: dict[str, str] = {}

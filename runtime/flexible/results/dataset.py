@@ -10,7 +10,7 @@ import numpy as np
 from .names import OF_BODY
 
 if TYPE_CHECKING:
-    from ...result import Result
+    from ...record import Record
     from ..modal_body import ModalBody
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
@@ -22,7 +22,7 @@ STATIONS = 41
 _WRITTEN = 40
 
 
-def labels(result: Result) -> dict[str, tuple[str, list[str], str]]:
+def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
     """Name -> (dimension, words, long name)."""
     known = result.model.flexible
     if not known:
@@ -34,7 +34,7 @@ def labels(result: Result) -> dict[str, tuple[str, list[str], str]]:
     }
 
 
-def variables(result: Result) -> dict[str, Variable]:
+def variables(result: Record) -> dict[str, Variable]:
     """Energies of modes, equivalent motions of flexible bodies, shapes of beams."""
     known = result.model.flexible
     if not known:

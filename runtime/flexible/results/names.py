@@ -14,7 +14,7 @@ from mstmm.scene import split
 from ...kinds import Kind
 
 if TYPE_CHECKING:
-    from ...quantities import Table
+    from ...names_of import Table
     from .results import FlexibleResults
 
 

@@ -19,7 +19,7 @@ from .observe_loads import LineLoad, PointLoad
 if TYPE_CHECKING:
     from mstmm.scene import Load
 
-    from ...model import Model
+    from ...compiled import Compiled
     from ...observed import Observed
     from ..modal_body import ModalBody
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class FlexibleBodies:
     """Motions of the flexible bodies over the samples of a run, made when they are asked for."""
 
-    def __init__(self, model: Model, observed: Observed) -> None:
+    def __init__(self, model: Compiled, observed: Observed) -> None:
         self.model, self.observed, self.run = model, observed, observed.run
         self.known: Mapping[str, ModalBody] = model.flexible
         self._motions: dict[str, Motion] = {}
@@ -58,7 +58,7 @@ class FlexibleBodies:
             )  # fmt: skip
         return self._motions[name]
 
-    def coupled_start(self) -> tuple[Model, Array]:
+    def coupled_start(self) -> tuple[Compiled, Array]:
         """A model in which all of them are coupled, and its q at the start of the run."""
         return self.model, self.run.first[1]
 

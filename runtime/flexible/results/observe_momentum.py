@@ -16,7 +16,9 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from . import modal_kernels
+from ...vectorized import evaluate
+from ..modal_kernels import kernel
+from ..records import moments_of
 from .observe import tilde
 
 if TYPE_CHECKING:
@@ -92,7 +94,7 @@ class Momenta:
         motion = self.flexible.motion(name)
         if motion.body.points:
             return self._of_points(motion)
-        linear, about_origin, first = modal_kernels.momentum(motion)
+        linear, about_origin, first = frame_momentum(motion)
         return equivalent(motion, linear, about_origin, first / motion.body.mass)
 
     def _of_points(self, motion: Motion) -> Momentum:
@@ -150,3 +152,33 @@ def undeformed(body: ModalBody) -> tuple[float, Array]:
     center = first / mass
     inner = second - mass * np.outer(center, center)
     return mass, np.trace(inner) * np.eye(3) - inner + own
+
+
+#: Numbers of one batch of samples, about 30 MB an array.
+_BATCH = 2**22
+
+
+def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
+    """Linear momentum in kg*m/s, moment of momentum about the frame's origin in kg*m2/s and first
+    moment of the mass in kg*m, (n, 3) each, frame axes; by the kernel `momentum`."""
+    body, parts = motion.body, []
+    rows = max(1, _BATCH // max(1, body.n**2 * 8))
+    for first in range(0, len(motion.t), rows):
+        some = slice(first, first + rows)
+        given = {
+            **moments_of(body), "eta": motion.eta[some], "etad": motion.etad[some],
+            "v": motion.frame_velocity[some], "w": motion.frame_spin[some],
+        }  # fmt: skip
+        found = evaluate(kernel("momentum"), given, body.n)
+        parts.append(np.concatenate([found["h"], found["S"]], axis=1))
+    whole = np.concatenate(parts) if parts else np.zeros((0, 27))
+    inertia = _inertia(whole[:, 6:])
+    moment = np.stack([inertia[:, 5, 1], inertia[:, 3, 2], inertia[:, 4, 0]], axis=1)
+    return whole[:, :3], whole[:, 3:6], moment
+
+
+def _inertia(upper: Array) -> Array:
+    """(n, 6, 6) symmetric matrices from their upper triangles (n, 21), row by row."""
+    full = np.zeros((len(upper), 6, 6))
+    full[:, *np.triu_indices(6)] = upper
+    return full + np.swapaxes(np.triu(full, 1), 1, 2)

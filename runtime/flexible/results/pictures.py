@@ -27,7 +27,7 @@ from .plot_shapes import (
 )
 
 if TYPE_CHECKING:
-    from ...result import Result
+    from ...record import Record
 
 
 #: Points along a beam in a picture.
@@ -46,7 +46,7 @@ class Picture:
     over_time: bool = False
 
 
-def names(result: Result) -> Iterator[str]:
+def names(result: Record) -> Iterator[str]:
     """Names of all pictures of a result."""
     known = result.model.flexible
     if known:
@@ -58,7 +58,7 @@ def names(result: Result) -> Iterator[str]:
         yield f"{name}.modal_energy"
 
 
-def picture(result: Result, name: str) -> Picture | None:
+def picture(result: Record, name: str) -> Picture | None:
     """The picture of this name, None if there is none."""
     if name not in names(result):
         return None
@@ -70,7 +70,7 @@ def picture(result: Result, name: str) -> Picture | None:
     return Picture(partial(_energies, result, body), 2.3, over_time=True)
 
 
-def _good(result: Result) -> NDArray[np.int64]:
+def _good(result: Record) -> NDArray[np.int64]:
     """Samples to draw; SceneError if there is none."""
     good = np.flatnonzero(np.isfinite(result.q).all(axis=1))
     if not len(good):
@@ -78,7 +78,7 @@ def _good(result: Result) -> NDArray[np.int64]:
     return good[instants(result.t[good], SHAPES)]
 
 
-def _shapes(result: Result, bodies: list[str] | None) -> Picture:
+def _shapes(result: Record, bodies: list[str] | None) -> Picture:
     known = list(result.model.flexible) if bodies is None else bodies
     some = _good(result)
     strips = [_strip(result, name, some) for name in known[:_BODIES]]
@@ -90,7 +90,7 @@ def _shapes(result: Result, bodies: list[str] | None) -> Picture:
     return Picture(lambda figure, axis: draw_strip(figure, axis, strips, rigid, marks), height)
 
 
-def _strip(result: Result, name: str, some: NDArray[np.int64]) -> Strip:
+def _strip(result: Record, name: str, some: NDArray[np.int64]) -> Strip:
     motion = result._flexible.motion(name).some(some)
     body = motion.body
     if body.shapes is not None:
@@ -106,7 +106,7 @@ def _strip(result: Result, name: str, some: NDArray[np.int64]) -> Strip:
     return Strip(name, motion.t, deflected, rest)
 
 
-def _rigid(result: Result, some: NDArray[np.int64]) -> list[Array]:
+def _rigid(result: Record, some: NDArray[np.int64]) -> list[Array]:
     """Lines (k, 2, 3) from the origins of rigid bodies to their ends."""
     found: list[Array] = []
     for body in result.model.scene.body[:_BODIES]:
@@ -116,7 +116,7 @@ def _rigid(result: Result, some: NDArray[np.int64]) -> list[Array]:
     return found
 
 
-def _deflections(result: Result, name: str, figure: Any, axis: Any) -> None:
+def _deflections(result: Record, name: str, figure: Any, axis: Any) -> None:
     motion = result._flexible.motion(name).some(_good(result))
     length = observe.shapes_of(motion.body, "deflection").length
     x = np.linspace(0.0, length, _FINE)
@@ -127,7 +127,7 @@ def _deflections(result: Result, name: str, figure: Any, axis: Any) -> None:
     )
 
 
-def _energies(result: Result, name: str, figure: Any, axis: Any) -> None:
+def _energies(result: Record, name: str, figure: Any, axis: Any) -> None:
     body = result.model.flexible[name]
     t, energies = curve(result.t, result.quantity(f"{name}.modal_energy"))
     draw_energies(axis, t, np.maximum(energies, 0.0), body.modes, name)

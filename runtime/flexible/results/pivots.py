@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 if TYPE_CHECKING:
-    from ...pack import Packed
+    from ...packed import Packed
 
 
 class ModalPivots:

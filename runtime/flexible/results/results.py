@@ -19,7 +19,7 @@ from .observe_momentum import Momenta
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ...model import Model
+    from ...compiled import Compiled
     from ...observed import Observed
     from .observe import Motion
 
@@ -36,7 +36,7 @@ class FlexibleResults:
     beam, a body that is not there, and a body that has no such quantity.
     """
 
-    model: Model
+    model: Compiled
     _observed: Observed
 
     @cached_property

@@ -1,0 +1,16 @@
+"""The generated kernels of flexible bodies, as numpy evaluates them."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+from mstmm.ir import KernelIR
+from mstmm.stored import kernel_from_json
+
+
+@cache
+def kernel(name: str) -> KernelIR:
+    """A kernel of the element "modal" by its name."""
+    text = files("mstmm.generated").joinpath("sweep_modal.json").read_text(encoding="utf-8")
+    return kernel_from_json(text, name)
