@@ -15,21 +15,12 @@ from __future__ import annotations
 
 import sympy as sp
 
+from .algebra import column, diagonal, symbol
 from .derivation import Derivation, Equation, Quantity, Solve
-from .sweep import (
-    SOURCES,
-    E,
-    S,
-    _column,
-    _count,
-    _gain,
-    _replace_rows,
-    _symbol,
-    unit_directions,
-)  # fmt: skip
+from .sweep import SOURCES, E, S, free_speeds, gains, replace_rows, unit_directions
 
-REDUCED_S = Quantity(_symbol("S_Q", 6, 6), "", "S behind the hinge, hinge axes", symmetric=True)
-REDUCED_E = Quantity(_symbol("e_Q", 6), "N, N*m", "e behind the hinge, hinge axes")
+REDUCED_S = Quantity(symbol("S_Q", 6, 6), "", "S behind the hinge, hinge axes", symmetric=True)
+REDUCED_E = Quantity(symbol("e_Q", 6), "N, N*m", "e behind the hinge, hinge axes")
 
 
 def eliminate(
@@ -39,51 +30,47 @@ def eliminate(
     name: str | None = None,
 ) -> Derivation:
     """G, g, S_Q, e_Q and the diagonal of D, for the speeds of `subspace` or of a given H with J."""
-    tau = Quantity(_symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
-    h_given = Quantity(_symbol("H", 6, nu), "", "motion subspace of the free coordinates")
-    rotor = Quantity(_symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    gain, offset = _gain(nu)
-    pivots = Quantity(_symbol("D_ii", nu), "kg*m2 or kg", "diagonal of D")
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    gain, offset = gains(nu)
+    pivots = Quantity(symbol("D_ii", nu), "kg*m2 or kg", "diagonal of D")
     h: sp.Basic = h_given.symbol if subspace is None else sp.ImmutableDenseMatrix(subspace)
     units = {} if subspace is None else unit_directions(subspace)
-    push, pivot, full = _symbol("U", 6, nu), _symbol("D", nu, nu), _symbol("G_full", nu, 6)
+    push, pivot, full = symbol("U", 6, nu), symbol("D", nu, nu), symbol("G_full", nu, 6)
     inertia = h.T * push
     if subspace is None:
-        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*_column(rotor.symbol)))
+        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
     zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
     equations = (
         Equation("U = S H", push, S.symbol * h),
         Equation("D = H^T U + J", pivot, inertia),
-        Equation("diagonal of D", pivots.symbol, _diagonal(pivot)),
+        Equation("diagonal of D", pivots.symbol, diagonal(pivot)),
         Equation("D^-1 U^T", full, Solve(pivot, push.T, symmetric=True)),
         Equation("G, with G H = 1", gain.symbol, with_unit_columns(full, units)),
-        Equation("surplus effort", _symbol("surplus", nu), tau.symbol - h.T * E.symbol),
+        Equation("surplus effort", symbol("surplus", nu), tau.symbol - h.T * E.symbol),
         Equation(
             "g = D^-1 (tau - H^T e)",
             offset.symbol,
-            Solve(pivot, _symbol("surplus", nu), symmetric=True),
+            Solve(pivot, symbol("surplus", nu), symmetric=True),
         ),
         Equation("S_Q = S - U G", REDUCED_S.symbol, S.symbol - push * gain.symbol, zeros=zeros),
         Equation(
             "e + G^T (tau - H^T e)",
-            _symbol("e_full", 6),
-            E.symbol + gain.symbol.T * _symbol("surplus", nu),
+            symbol("e_full", 6),
+            E.symbol + gain.symbol.T * symbol("surplus", nu),
         ),
-        Equation("e_Q", REDUCED_E.symbol, _replace_rows(_symbol("e_full", 6), tau.symbol, units)),
+        Equation("e_Q", REDUCED_E.symbol, replace_rows(symbol("e_full", 6), tau.symbol, units)),
     )
     given = inputs if subspace is not None else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
-        f"elimination of a hinge with {_count(nu)}",
+        f"elimination of a hinge with {free_speeds(nu)}",
         (*given, S, E, tau),
         (gain, offset, REDUCED_S, REDUCED_E, pivots),
         equations,
         sources=SOURCES,
     )
-
-
-def _diagonal(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
-    return sp.ImmutableDenseMatrix([matrix[i, i] for i in range(int(matrix.rows))])
 
 
 def with_unit_columns(full: sp.MatrixSymbol, units: dict[int, int]) -> sp.ImmutableDenseMatrix:

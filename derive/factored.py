@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from .algebra import column, diagonal, symbol
 from .derivation import Derivation, Equation, Factor, Quantity, Triangular
 from .eliminate import REDUCED_E, REDUCED_S
 from .sweep import (
@@ -27,21 +28,19 @@ from .sweep import (
     E,
     R,
     S,
-    _column,
-    _count,
-    _outboard_deviation,
-    _replace_rows,
-    _symbol,
+    free_speeds,
+    outboard_deviation,
+    replace_rows,
     unit_directions,
-)  # fmt: skip
+)
 
 
 def _gains(nu: int) -> tuple[Quantity, Quantity, Quantity, Quantity]:
     return (
-        Quantity(_symbol("F", nu, nu), "", "D = L diag(d) L^T: L, and 1 / d on the diagonal"),
-        Quantity(_symbol("Z", nu, 6), "", "diag(d)^-1 L^-1 U^T, zero along unit directions"),
-        Quantity(_symbol("z", nu), "", "diag(d)^-1 L^-1 (tau - H^T e)"),
-        Quantity(_symbol("W", nu, 6), "", "unit columns of H, transposed"),
+        Quantity(symbol("F", nu, nu), "", "D = L diag(d) L^T: L, and 1 / d on the diagonal"),
+        Quantity(symbol("Z", nu, 6), "", "diag(d)^-1 L^-1 U^T, zero along unit directions"),
+        Quantity(symbol("z", nu), "", "diag(d)^-1 L^-1 (tau - H^T e)"),
+        Quantity(symbol("W", nu, 6), "", "unit columns of H, transposed"),
     )
 
 
@@ -55,25 +54,25 @@ def eliminate_factored(
 
     With a given H no direction is known to be a unit one: W = 0.
     """
-    tau = Quantity(_symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
-    h_given = Quantity(_symbol("H", 6, nu), "", "motion subspace of the free coordinates")
-    rotor = Quantity(_symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    pivots = Quantity(_symbol("D_ii", nu), "kg*m2 or kg", "diagonal of D")
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    pivots = Quantity(symbol("D_ii", nu), "kg*m2 or kg", "diagonal of D")
     factor, gain, offset, through = _gains(nu)
     h: sp.Basic = h_given.symbol if subspace is None else sp.ImmutableDenseMatrix(subspace)
     units = {} if subspace is None else unit_directions(subspace)
-    push, pivot, full = _symbol("U", 6, nu), _symbol("D", nu, nu), _symbol("Y", nu, 6)
-    scaled, surplus = _symbol("Z_full", nu, 6), _symbol("y", nu)
+    push, pivot, full = symbol("U", 6, nu), symbol("D", nu, nu), symbol("Y", nu, 6)
+    scaled, surplus = symbol("Z_full", nu, 6), symbol("y", nu)
     inertia = h.T * push
     if subspace is None:
-        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*_column(rotor.symbol)))
+        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
     zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
     right = tau.symbol - h.T * E.symbol
-    e_full = _symbol("e_full", 6)
+    e_full = symbol("e_full", 6)
     equations = (
         Equation("U = S H", push, S.symbol * h),
         Equation("D = H^T U + J", pivot, inertia),
-        Equation("diagonal of D", pivots.symbol, _diagonal(pivot)),
+        Equation("diagonal of D", pivots.symbol, diagonal(pivot)),
         Equation("L and 1 / d of D = L diag(d) L^T", factor.symbol, Factor(pivot)),
         Equation("Y = L^-1 U^T", full, Triangular(factor.symbol, push.T)),
         Equation("diag(d)^-1 Y", scaled, _divided(full, factor.symbol)),
@@ -83,12 +82,12 @@ def eliminate_factored(
         Equation("diag(d)^-1 y", offset.symbol, _divided(surplus, factor.symbol)),
         Equation("S_Q = S - Y^T Z", REDUCED_S.symbol, S.symbol - full.T * scaled, zeros=zeros),
         Equation("e + Z^T y", e_full, E.symbol + scaled.T * surplus),
-        Equation("e_Q", REDUCED_E.symbol, _replace_rows(e_full, tau.symbol, units)),
+        Equation("e_Q", REDUCED_E.symbol, replace_rows(e_full, tau.symbol, units)),
     )
     given = inputs if subspace is not None else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
-        f"elimination of a hinge with {_count(nu)}",
+        f"elimination of a hinge with {free_speeds(nu)}",
         (*given, S, E, tau),
         (factor, gain, offset, through, REDUCED_S, REDUCED_E, pivots),
         equations,
@@ -102,12 +101,12 @@ def recover_factored(nu: int) -> Derivation:
     v = L^-T (z - Z X delta_I).  Along unit directions the deviation is v itself.
     """
     factor, gain, offset, through = _gains(nu)
-    h = Quantity(_symbol("H", 6, nu), "", "motion subspace of the free coordinates")
-    rates = Quantity(_symbol("udot", nu), "", "accelerations of the free coordinates")
-    carried, known, v = _symbol("delta_Q", 6), _symbol("a_W", nu), _symbol("v", nu)
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
+    carried, known, v = symbol("delta_Q", 6), symbol("a_W", nu), symbol("v", nu)
     rest = offset.symbol - gain.symbol * carried
     equations = (
-        Equation("X delta_I", carried, _outboard_deviation()),
+        Equation("X delta_I", carried, outboard_deviation()),
         Equation("W X delta_I", known, through.symbol * carried),
         Equation("v", v, Triangular(factor.symbol, rest, transposed=True)),
         Equation("udot = v - W X delta_I", rates.symbol, v - known),
@@ -119,16 +118,12 @@ def recover_factored(nu: int) -> Derivation:
     )
     return Derivation(
         f"generic{nu}",
-        f"accelerations recovered behind a factored hinge with {_count(nu)}",
+        f"accelerations recovered behind a factored hinge with {free_speeds(nu)}",
         (R, SHIFT, h, factor, gain, offset, through, PARENT_DELTA),
         (rates, DELTA),
         equations,
         sources=SOURCES,
     )
-
-
-def _diagonal(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
-    return sp.ImmutableDenseMatrix([matrix[i, i] for i in range(int(matrix.rows))])
 
 
 def _divided(full: sp.MatrixSymbol, factor: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:

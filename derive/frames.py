@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import sympy as sp
 
+from .algebra import column, part, stack, symbol
 from .derivation import Derivation, Equation, Quantity, tilde, vector
-from .sweep import FLOOR, MOTION, SHIFT, E, R, _column, _stack, _symbol, floor_of
+from .sweep import FLOOR, MOTION, SHIFT, E, R, floor_of
 
-A_PARENT = Quantity(_symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
-X_PARENT = Quantity(_symbol("x_I", 3), "m", "P of the parent, inertial axes")
-A = Quantity(_symbol("A", 3, 3), "", "rotation, body axes to inertial axes")
-X = Quantity(_symbol("x", 3), "m", "P of the body, inertial axes")
-V = Quantity(_symbol("v", 3), "m/s", "velocity of P, body axes")
-W = Quantity(_symbol("w", 3), "rad/s", "angular velocity, body axes")
-OFFSET = Quantity(_symbol("offset", 3), "m", "point of the body from P, body axes")
+A_PARENT = Quantity(symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
+X_PARENT = Quantity(symbol("x_I", 3), "m", "P of the parent, inertial axes")
+A = Quantity(symbol("A", 3, 3), "", "rotation, body axes to inertial axes")
+X = Quantity(symbol("x", 3), "m", "P of the body, inertial axes")
+V = Quantity(symbol("v", 3), "m/s", "velocity of P, body axes")
+W = Quantity(symbol("w", 3), "rad/s", "angular velocity, body axes")
+OFFSET = Quantity(symbol("offset", 3), "m", "point of the body from P, body axes")
 
 
 def pose() -> Derivation:
@@ -33,7 +34,7 @@ def pose() -> Derivation:
 def velocity() -> Derivation:
     """Velocity of P, from the parent's and the hinge's own (body axes)."""
     v_i, w_i, own = vector("v_I", 3), vector("w_I", 3), vector("v_rel", 3)
-    carried = R.symbol.T * (v_i + tilde(_column(w_i)) * SHIFT.symbol)
+    carried = R.symbol.T * (v_i + tilde(column(w_i)) * SHIFT.symbol)
     return Derivation(
         "frames",
         "velocity of a body's input end",
@@ -54,12 +55,12 @@ def point() -> Derivation:
 
     The swept motion carries gravity as an acceleration of the ground, which is put back here.
     """
-    at, rate, second = _symbol("x_K", 3), _symbol("v_K", 3), _symbol("a_K", 3)
-    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
-    gravity = Quantity(_symbol("gravity", 3), "m/s2", "inertial axes")
+    at, rate, second = symbol("x_K", 3), symbol("v_K", 3), symbol("a_K", 3)
+    delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
+    gravity = Quantity(symbol("gravity", 3), "m/s2", "inertial axes")
     lever, motion = OFFSET.symbol, MOTION.symbol
-    spin, turn = tilde(_rows(motion, 0)), tilde(_rows(motion, 3) + _rows(delta.symbol, 3))
-    linear = _rows(motion, 6) + _rows(delta.symbol, 0)
+    spin, turn = tilde(part(motion, 0)), tilde(part(motion, 3) + part(delta.symbol, 3))
+    linear = part(motion, 6) + part(delta.symbol, 0)
     return Derivation(
         "frames",
         "motion of a point of a body",
@@ -83,8 +84,8 @@ def point() -> Derivation:
 
 def turning() -> Derivation:
     """Angular velocity and acceleration of a body in inertial axes."""
-    rate, second = _symbol("w_K", 3), _symbol("alpha_K", 3)
-    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    rate, second = symbol("w_K", 3), symbol("alpha_K", 3)
+    delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
     motion = MOTION.symbol
     return Derivation(
         "frames",
@@ -95,11 +96,11 @@ def turning() -> Derivation:
             Quantity(second, "rad/s2", "angular acceleration, inertial axes"),
         ),
         (
-            Equation("angular velocity", rate, A.symbol * _rows(motion, 0)),
+            Equation("angular velocity", rate, A.symbol * part(motion, 0)),
             Equation(
                 "angular acceleration",
                 second,
-                A.symbol * (_rows(motion, 3) + _rows(delta.symbol, 3)),
+                A.symbol * (part(motion, 3) + part(delta.symbol, 3)),
             ),
         ),
     )
@@ -107,7 +108,7 @@ def turning() -> Derivation:
 
 def end_frame() -> Derivation:
     """Axes of an end of a body."""
-    own, axes = _symbol("R_end", 3, 3), _symbol("A_end", 3, 3)
+    own, axes = symbol("R_end", 3, 3), symbol("A_end", 3, 3)
     return Derivation(
         "frames",
         "axes of an end",
@@ -119,8 +120,8 @@ def end_frame() -> Derivation:
 
 def opposite() -> Derivation:
     """What the F end of a massless element feels when T feels F and M."""
-    x_f, x_t, force, moment = (_symbol(n, 3) for n in ("x_F", "x_T", "F", "M"))
-    back, turn = _symbol("F_back", 3), _symbol("M_back", 3)
+    x_f, x_t, force, moment = (symbol(n, 3) for n in ("x_F", "x_T", "F", "M"))
+    back, turn = symbol("F_back", 3), symbol("M_back", 3)
     return Derivation(
         "frames",
         "load on the other end of a force element",
@@ -128,15 +129,15 @@ def opposite() -> Derivation:
         (Quantity(back, "N", "force on F"), Quantity(turn, "N*m", "moment on F")),
         (
             Equation("force", back, -force),
-            Equation("moment", turn, -moment - tilde(_rows(x_t - x_f, 0)) * force),
+            Equation("moment", turn, -moment - tilde(part(x_t - x_f, 0)) * force),
         ),
     )
 
 
 def power() -> Derivation:
     """Power of a force and moment at a point, all in the load's axes."""
-    axes, force, moment = _symbol("A_F", 3, 3), _symbol("F", 3), _symbol("M", 3)
-    v_k, w_k, total = _symbol("v_K", 3), _symbol("w_K", 3), _symbol("P", 1)
+    axes, force, moment = symbol("A_F", 3, 3), symbol("F", 3), symbol("M", 3)
+    v_k, w_k, total = symbol("v_K", 3), symbol("w_K", 3), symbol("P", 1)
     return Derivation(
         "frames",
         "power of an applied load",
@@ -161,8 +162,8 @@ def power() -> Derivation:
 def carried_momentum() -> Derivation:
     """Momentum about P, body axes, carried to the inertial origin."""
     own = Quantity(vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about P, body axes")
-    push, turn = _symbol("p", 3), _symbol("L", 3)
-    moved = _symbol("p_0", 3)
+    push, turn = symbol("p", 3), symbol("L", 3)
+    moved = symbol("p_0", 3)
     return Derivation(
         "frames",
         "momentum about the inertial origin",
@@ -172,12 +173,12 @@ def carried_momentum() -> Derivation:
             Quantity(turn, "N*m*s", "angular momentum about the inertial origin", accumulate=True),
         ),
         (
-            Equation("momentum, inertial axes", moved, A.symbol * _rows(own.symbol, 0)),
+            Equation("momentum, inertial axes", moved, A.symbol * part(own.symbol, 0)),
             Equation("momentum", push, moved),
             Equation(
                 "angular momentum",
                 turn,
-                A.symbol * _rows(own.symbol, 3) + tilde(_rows(X.symbol, 0)) * moved,
+                A.symbol * part(own.symbol, 3) + tilde(part(X.symbol, 0)) * moved,
             ),
         ),
     )
@@ -185,9 +186,9 @@ def carried_momentum() -> Derivation:
 
 def gravity_energy() -> Derivation:
     """Potential of uniform gravity, zero at the inertial origin, from the body's mass matrix."""
-    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
-    gravity = Quantity(_symbol("gravity", 3), "m/s2", "inertial axes")
-    matrix, energy = mass_matrix.symbol, _symbol("V", 1)
+    mass_matrix = Quantity(symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    gravity = Quantity(symbol("gravity", 3), "m/s2", "inertial axes")
+    matrix, energy = mass_matrix.symbol, symbol("V", 1)
     moment = sp.ImmutableDenseMatrix([matrix[1, 5], matrix[2, 3], matrix[0, 4]])
     # The mixed block is -tilde(m c): entries (2,6), (3,4), (1,5) hold m c_x, m c_y, m c_z.
     return Derivation(
@@ -207,7 +208,7 @@ def gravity_energy() -> Derivation:
 
 def pivot_floor() -> Derivation:
     """What a pivot of the sweep must exceed, from the mass matrix of the body that it moves."""
-    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    mass_matrix = Quantity(symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
     return Derivation(
         "frames",
         "least inertia that is not rounding",
@@ -219,11 +220,11 @@ def pivot_floor() -> Derivation:
 
 def applied_load() -> Derivation:
     """External force and moment at a point, subtracted from e (f_I = S a + e - applied)."""
-    axes = Quantity(_symbol("A_F", 3, 3), "", "rotation, axes of the load to inertial axes")
-    force = Quantity(_symbol("F", 3), "N", "force, axes of the load")
-    moment = Quantity(_symbol("M", 3), "N*m", "moment, axes of the load")
+    axes = Quantity(symbol("A_F", 3, 3), "", "rotation, axes of the load to inertial axes")
+    force = Quantity(symbol("F", 3), "N", "force, axes of the load")
+    moment = Quantity(symbol("M", 3), "N*m", "moment, axes of the load")
     load = Quantity(E.symbol, "N, N*m", "contribution to e", accumulate=True)
-    local, turning = _symbol("F_b", 3), _symbol("M_b", 3)
+    local, turning = symbol("F_b", 3), symbol("M_b", 3)
     return Derivation(
         "frames",
         "load applied at a point of a body",
@@ -235,7 +236,7 @@ def applied_load() -> Derivation:
             Equation(
                 "e = -[F; offset x F + M]",
                 load.symbol,
-                _stack(-local, -(tilde(_column(OFFSET.symbol)) * local + turning)),
+                stack(-local, -(tilde(column(OFFSET.symbol)) * local + turning)),
             ),
         ),
     )
@@ -243,9 +244,9 @@ def applied_load() -> Derivation:
 
 def momentum() -> Derivation:
     """Momentum of a body and angular momentum about the inertial origin from S and its velocity."""
-    mass_matrix = Quantity(_symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
-    linear, angular = _symbol("L", 3), _symbol("K", 3)
-    local = _symbol("h", 6)
+    mass_matrix = Quantity(symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
+    linear, angular = symbol("L", 3), symbol("K", 3)
+    local = symbol("h", 6)
     return Derivation(
         "frames",
         "momentum of a body",
@@ -257,27 +258,22 @@ def momentum() -> Derivation:
             ),
         ),
         (
-            Equation("momentum at P", local, mass_matrix.symbol * _stack(V.symbol, W.symbol)),
-            Equation("momentum", linear, A.symbol * _rows(local, 0)),
+            Equation("momentum at P", local, mass_matrix.symbol * stack(V.symbol, W.symbol)),
+            Equation("momentum", linear, A.symbol * part(local, 0)),
             Equation(
                 "angular momentum",
                 angular,
-                A.symbol * _rows(local, 3)
-                + tilde(_column(X.symbol)) * (A.symbol * _rows(local, 0)),
+                A.symbol * part(local, 3) + tilde(column(X.symbol)) * (A.symbol * part(local, 0)),
             ),
         ),
     )
 
 
-def _rows(symbol: sp.MatrixSymbol, first: int) -> sp.ImmutableDenseMatrix:
-    return sp.ImmutableDenseMatrix([symbol[first + i, 0] for i in range(3)])
-
-
 def reaction() -> Derivation:
     """f = S delta + e at P, body axes, and its components in inertial axes."""
-    s = Quantity(_symbol("S", 6, 6), "", "f = S a + e of everything outboard", symmetric=True)
-    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
-    f, force, moment = _symbol("f", 6), _symbol("force", 3), _symbol("moment", 3)
+    s = Quantity(symbol("S", 6, 6), "", "f = S a + e of everything outboard", symmetric=True)
+    delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
+    f, force, moment = symbol("f", 6), symbol("force", 3), symbol("moment", 3)
     return Derivation(
         "frames",
         "load of the inboard on the outboard side at P",
@@ -289,15 +285,15 @@ def reaction() -> Derivation:
         ),
         (
             Equation("f = S delta + e", f, s.symbol * delta.symbol + E.symbol),
-            Equation("force", force, A.symbol * _rows(f, 0)),
-            Equation("moment", moment, A.symbol * _rows(f, 3)),
+            Equation("force", force, A.symbol * part(f, 0)),
+            Equation("moment", moment, A.symbol * part(f, 3)),
         ),
     )
 
 
 def moment_at() -> Derivation:
     """Moment of a load about another point of the body, inertial axes."""
-    f, moment = Quantity(_symbol("f", 6), "N, N*m", "load at P, body axes"), _symbol("moment", 3)
+    f, moment = Quantity(symbol("f", 6), "N, N*m", "load at P, body axes"), symbol("moment", 3)
     return Derivation(
         "frames",
         "moment about another point",
@@ -307,8 +303,7 @@ def moment_at() -> Derivation:
             Equation(
                 "moment - offset x force",
                 moment,
-                A.symbol
-                * (_rows(f.symbol, 3) - tilde(_column(OFFSET.symbol)) * _rows(f.symbol, 0)),
+                A.symbol * (part(f.symbol, 3) - tilde(column(OFFSET.symbol)) * part(f.symbol, 0)),
             ),
         ),
     )
@@ -316,21 +311,21 @@ def moment_at() -> Derivation:
 
 def transport() -> Derivation:
     """Load at P carried to P of the parent: what inverse dynamics sums up."""
-    load = Quantity(_symbol("e_I", 6), "N, N*m", "contribution to the parent", accumulate=True)
-    push = _symbol("push", 3)
+    load = Quantity(symbol("e_I", 6), "N, N*m", "contribution to the parent", accumulate=True)
+    push = symbol("push", 3)
     return Derivation(
         "frames",
         "load carried to the parent",
         (R, SHIFT, E),
         (load,),
         (
-            Equation("force, parent axes", push, R.symbol * _rows(E.symbol, 0)),
+            Equation("force, parent axes", push, R.symbol * part(E.symbol, 0)),
             Equation(
                 "X^T e",
                 load.symbol,
-                _stack(
+                stack(
                     push,
-                    R.symbol * _rows(E.symbol, 3) + tilde(_column(SHIFT.symbol)) * push,
+                    R.symbol * part(E.symbol, 3) + tilde(column(SHIFT.symbol)) * push,
                 ),
             ),
         ),
@@ -339,7 +334,7 @@ def transport() -> Derivation:
 
 def rotor_energy() -> Derivation:
     """Kinetic energy of a rotor whose inertia is reflected to one speed."""
-    inertia, speed, energy = _symbol("J", 1), _symbol("u", 1), _symbol("T", 1)
+    inertia, speed, energy = symbol("J", 1), symbol("u", 1), symbol("T", 1)
     return Derivation(
         "frames",
         "kinetic energy of a reflected rotor",
@@ -351,8 +346,8 @@ def rotor_energy() -> Derivation:
 
 def length() -> Derivation:
     """Distance of two points and its rate."""
-    x_f, v_f, x_t, v_t = (_symbol(n, 3) for n in ("x_F", "v_F", "x_T", "v_T"))
-    between, rate, value = _symbol("x_rel", 3), _symbol("v_rel", 3), _symbol("l", 2)
+    x_f, v_f, x_t, v_t = (symbol(n, 3) for n in ("x_F", "v_F", "x_T", "v_T"))
+    between, rate, value = symbol("x_rel", 3), symbol("v_rel", 3), symbol("l", 2)
     distance = sp.sqrt(sum(between[i, 0] ** 2 for i in range(3)))
     along = sum(between[i, 0] * rate[i, 0] for i in range(3)) / distance
     return Derivation(
@@ -370,7 +365,7 @@ def length() -> Derivation:
 
 def turned() -> Derivation:
     """A vector of a body in inertial axes."""
-    own, out = _symbol("b", 3), _symbol("b_0", 3)
+    own, out = symbol("b", 3), symbol("b_0", 3)
     return Derivation(
         "frames",
         "vector in inertial axes",
@@ -382,12 +377,12 @@ def turned() -> Derivation:
 
 def classical_body() -> Derivation:
     """What the classical matrix of a rigid body takes, in inertial axes, from the swept data."""
-    p = Quantity(_symbol("p", 10), "", "parameters of the rigid body")
-    load = Quantity(_symbol("load", 6), "N, N*m", "applied force and moment at P, body axes")
-    out = Quantity(_symbol("ro_n", 3), "m", "inboard point of the next hinge, body axes")
-    symbol = p.symbol
-    center = sp.ImmutableDenseMatrix([symbol[i, 0] / symbol[0, 0] for i in (1, 2, 3)])
-    entries = [symbol[i, 0] for i in range(4, 10)]
+    p = Quantity(symbol("p", 10), "", "parameters of the rigid body")
+    load = Quantity(symbol("load", 6), "N, N*m", "applied force and moment at P, body axes")
+    out = Quantity(symbol("ro_n", 3), "m", "inboard point of the next hinge, body axes")
+    numbers = p.symbol
+    center = sp.ImmutableDenseMatrix([numbers[i, 0] / numbers[0, 0] for i in (1, 2, 3)])
+    entries = [numbers[i, 0] for i in range(4, 10)]
     tensor = sp.ImmutableDenseMatrix(
         [
             [entries[0], entries[1], entries[2]],
@@ -396,9 +391,9 @@ def classical_body() -> Derivation:
         ]
     )
     names = (("M", 1, 1), ("r_IO", 3, 1), ("r_IC", 3, 1), ("J_I", 3, 3), ("omega", 3, 1))
-    mass, r_io, r_ic, inertia, omega = (_symbol(*name) for name in names)
-    force, moment = _symbol("f_C", 3), _symbol("m_C", 3)
-    push, turn = _rows(load.symbol, 0), _rows(load.symbol, 3)
+    mass, r_io, r_ic, inertia, omega = (symbol(*name) for name in names)
+    force, moment = symbol("f_C", 3), symbol("m_C", 3)
+    push, turn = part(load.symbol, 0), part(load.symbol, 3)
     return Derivation(
         "frames",
         "inputs of the classical body matrix",
@@ -413,11 +408,11 @@ def classical_body() -> Derivation:
             Quantity(moment, "N*m", "moment"),
         ),
         (
-            Equation("mass", mass, sp.ImmutableDenseMatrix([symbol[0, 0]])),
+            Equation("mass", mass, sp.ImmutableDenseMatrix([numbers[0, 0]])),
             Equation("output end", r_io, A.symbol * out.symbol),
             Equation("mass centre", r_ic, A.symbol * center),
             Equation("inertia", inertia, A.symbol * tensor * A.symbol.T),
-            Equation("angular velocity", omega, A.symbol * _rows(MOTION.symbol, 0)),
+            Equation("angular velocity", omega, A.symbol * part(MOTION.symbol, 0)),
             Equation("force", force, A.symbol * push),
             Equation("moment", moment, A.symbol * (turn - tilde(center) * push)),
         ),
@@ -426,8 +421,8 @@ def classical_body() -> Derivation:
 
 def state_deviation() -> Derivation:
     """Deviation of a body's acceleration from the bias motion, read from a classical state."""
-    state = Quantity(_symbol("z", 13), "", "[rdd; omegadot; m; q; 1] at P, inertial axes")
-    delta = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration")
+    state = Quantity(symbol("z", 13), "", "[rdd; omegadot; m; q; 1] at P, inertial axes")
+    delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
     z, motion = state.symbol, MOTION.symbol
     return Derivation(
         "frames",
@@ -438,9 +433,9 @@ def state_deviation() -> Derivation:
             Equation(
                 "deviation",
                 delta.symbol,
-                _stack(
-                    A.symbol.T * _rows(z, 0) - _rows(motion, 6),
-                    A.symbol.T * _rows(z, 3) - _rows(motion, 3),
+                stack(
+                    A.symbol.T * part(z, 0) - part(motion, 6),
+                    A.symbol.T * part(z, 3) - part(motion, 3),
                 ),
             ),
         ),

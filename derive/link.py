@@ -20,6 +20,7 @@ from __future__ import annotations
 import sympy as sp
 
 from . import body as body_kernels
+from .algebra import part, stack, symbol
 from .derivation import Derivation, Equation, Quantity, tilde
 from .element import Body
 from .eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
@@ -33,23 +34,20 @@ from .sweep import (
     SOURCES,
     E,
     S,
-    _gain,
-    _part,
-    _stack,
-    _symbol,
     floor_of,
+    gains,
     unit_directions,
 )
 
 LINK = Quantity(
-    _symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"
+    symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"
 )
-TURN = Quantity(_symbol("turn", 2), "", "cosine and sine of the angle about z")
-SHIFT = Quantity(_symbol("d", 1), "m", "shift along z")
-BODY = Quantity(_symbol("b", 10), "", "parameters of the rigid body, body axes")
-OWN_LOAD = Quantity(_symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
-OUTER_S = Quantity(_symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
-OUTER_E = Quantity(_symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
+TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle about z")
+SHIFT = Quantity(symbol("d", 1), "m", "shift along z")
+BODY = Quantity(symbol("b", 10), "", "parameters of the rigid body, body axes")
+OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
+OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
+OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
 
 
 def _about_x() -> Stage:
@@ -83,7 +81,7 @@ def _place(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
 
 def angle(motion: HingeMotion) -> Derivation:
     """Angle about z."""
-    theta = Quantity(_symbol("theta", 1), "rad", "angle about z")
+    theta = Quantity(symbol("theta", 1), "rad", "angle about z")
     value = _place(motion)[0] + LINK.symbol[3, 0]
     return Derivation(
         motion.hinge.name,
@@ -97,9 +95,9 @@ def angle(motion: HingeMotion) -> Derivation:
 def forward(motion: HingeMotion, body: Body) -> Derivation:
     """Shift along z, bias motion of the body, and the load that this motion needs."""
     _, shift = _place(motion)
-    link, rest = LINK.symbol, _symbol("motion_Q", 9)
-    between = _symbol("motion_x", 9)
-    rates = _symbol("qdot", motion.rates.rows)
+    link, rest = LINK.symbol, symbol("motion_Q", 9)
+    between = symbol("motion_x", 9)
+    rates = symbol("qdot", motion.rates.rows)
     return Derivation(
         motion.hinge.name,
         f"bias motion of a rigid body behind the {motion.hinge.title}",
@@ -119,11 +117,11 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
 
 def _moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
     """Motion of P from that of Q in P axes: the hinge's own velocity and acceleration added."""
-    w, wd, rdd = (_part(rest, n) for n in (0, 3, 6))
+    w, wd, rdd = (part(rest, n) for n in (0, 3, 6))
     v_own, w_own = motion.in_arrays(motion.velocity), motion.in_arrays(motion.spin)
     c = motion.in_arrays(motion.bias)
     c_v, c_w = sp.ImmutableDenseMatrix(c[:3, :]), sp.ImmutableDenseMatrix(c[3:, :])
-    return _stack(w + w_own, wd + tilde(w) * w_own + c_w, rdd + 2 * (tilde(w) * v_own) + c_v)
+    return stack(w + w_own, wd + tilde(w) * w_own + c_w, rdd + 2 * (tilde(w) * v_own) + c_v)
 
 
 def _of_body(derivation: Derivation, name: str) -> sp.Basic:
@@ -138,9 +136,9 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     inputs = hinge_quantities(motion.hinge)[:1]
     elimination = eliminate(nu, subspace, inputs)
-    gain, offset = _gain(nu)
+    gain, offset = gains(nu)
     tau = next(q for q in elimination.inputs if q.name == "tau")
-    middle = (_symbol("S_x", 6, 6), _symbol("e_x", 6))
+    middle = (symbol("S_x", 6, 6), symbol("e_x", 6))
     mass = _of_body(body_kernels.inertia(body), "S")
     return Derivation(
         motion.hinge.name,
@@ -168,9 +166,9 @@ def floor(body: Body) -> sp.ImmutableDenseMatrix:
 def recover(motion: HingeMotion) -> Derivation:
     """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
-    gain, offset = _gain(nu)
-    rates = Quantity(_symbol("udot", nu), "", "accelerations of the free coordinates")
-    between, carried = _symbol("delta_x", 6), _symbol("delta_Q", 6)
+    gain, offset = gains(nu)
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
+    between, carried = symbol("delta_x", 6), symbol("delta_Q", 6)
     full = with_unit_columns(gain.symbol, unit_directions(subspace))
     return Derivation(
         motion.hinge.name,

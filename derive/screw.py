@@ -25,25 +25,15 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from .algebra import part, stack, symbol
 from .derivation import Derivation, Equation, Quantity, tilde
-from .sweep import (
-    DELTA,
-    MOTION,
-    PARENT_DELTA,
-    PARENT_MOTION,
-    SOURCES,
-    E,
-    S,
-    _part,
-    _stack,
-    _symbol,
-)  # fmt: skip
+from .sweep import DELTA, MOTION, PARENT_DELTA, PARENT_MOTION, SOURCES, E, S
 
-TURN = Quantity(_symbol("turn", 2), "", "cosine and sine of the angle")
-SHIFT_ALONG = Quantity(_symbol("d", 1), "m", "shift along the axis")
-R_GIVEN = Quantity(_symbol("Rc", 3, 3), "", "rotation, outboard axes to inboard axes")
-OUT_S = Quantity(_symbol("S_I", 6, 6), "", "f = S a + e at the inboard origin", symmetric=True)
-OUT_E = Quantity(_symbol("e_I", 6), "N, N*m", "force part at the inboard origin")
+TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle")
+SHIFT_ALONG = Quantity(symbol("d", 1), "m", "shift along the axis")
+R_GIVEN = Quantity(symbol("Rc", 3, 3), "", "rotation, outboard axes to inboard axes")
+OUT_S = Quantity(symbol("S_I", 6, 6), "", "f = S a + e at the inboard origin", symmetric=True)
+OUT_E = Quantity(symbol("e_I", 6), "N, N*m", "force part at the inboard origin")
 
 AXES = {"x": 0, "z": 2}
 
@@ -98,7 +88,7 @@ class Stage:
 
     def symbol(self, name: str, rows: int, columns: int = 1) -> sp.MatrixSymbol:
         """An intermediate quantity of this stage."""
-        return _symbol(name + self.mark, rows, columns)
+        return symbol(name + self.mark, rows, columns)
 
     def carried(
         self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair, *, plain: bool = False
@@ -111,8 +101,8 @@ class Stage:
     def _load_turned(self, e: sp.MatrixSymbol) -> tuple[Equation, ...]:
         turn = self.symbol("R", 3, 3)
         return (
-            Equation("force, inboard axes", self.symbol("push", 3), turn * _part(e, 0)),
-            Equation("moment, inboard axes", self.symbol("moment", 3), turn * _part(e, 3)),
+            Equation("force, inboard axes", self.symbol("push", 3), turn * part(e, 0)),
+            Equation("moment, inboard axes", self.symbol("moment", 3), turn * part(e, 3)),
         )
 
     def _turned_plainly(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
@@ -177,7 +167,7 @@ class Stage:
             Equation(
                 "S at the inboard origin", out_s, sp.BlockMatrix([[a, moved], [moved.T, shifted]])
             ),
-            Equation("e at the inboard origin", out_e, _stack(push, moment + lever * push)),
+            Equation("e at the inboard origin", out_e, stack(push, moment + lever * push)),
         )  # fmt: skip
 
     def _moved_mixed(self, a: sp.MatrixSymbol, b: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
@@ -204,24 +194,24 @@ class Stage:
 
     def behind(self, motion: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
         """Bias motion of the outboard frame, at rest in the inboard one."""
-        w, wd, rdd = (_part(motion, n) for n in (0, 3, 6))
+        w, wd, rdd = (part(motion, n) for n in (0, 3, 6))
         turn, carrier = self.symbol("R", 3, 3), self.symbol("K", 3, 3)
         back = turn.T
         moved = rdd + carrier * self.position
         return (
             Equation("rotation", turn, self.rotation),
             Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
-            Equation("bias motion", out, _stack(back * w, back * wd, back * moved)),
+            Equation("bias motion", out, stack(back * w, back * wd, back * moved)),
         )
 
     def deviation(self, delta: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
         """X delta."""
-        a, alpha = _part(delta, 0), _part(delta, 3)
+        a, alpha = part(delta, 0), part(delta, 3)
         turn = self.symbol("R", 3, 3)
         moved = a - tilde(self.position) * alpha
         return (
             Equation("rotation", turn, self.rotation),
-            Equation("X delta", out, _stack(turn.T * moved, turn.T * alpha)),
+            Equation("X delta", out, stack(turn.T * moved, turn.T * alpha)),
         )
 
 
@@ -260,11 +250,9 @@ def turn() -> Derivation:
     for name, words, row, column in _BLOCKS:
         value = rotation * _block(S.symbol, row, column) * rotation.T
         same = row == column
-        turned.append(
-            Equation(f"{words}, inboard axes", _symbol(name, 3, 3), value, symmetric=same)
-        )
-    a, b, c = (_symbol(n, 3, 3) for n in ("A", "B", "C"))
-    load = _stack(rotation * _part(E.symbol, 0), rotation * _part(E.symbol, 3))
+        turned.append(Equation(f"{words}, inboard axes", symbol(name, 3, 3), value, symmetric=same))
+    a, b, c = (symbol(n, 3, 3) for n in ("A", "B", "C"))
+    load = stack(rotation * part(E.symbol, 0), rotation * part(E.symbol, 3))
     return Derivation(
         "screw",
         "S and e in turned axes",
@@ -286,7 +274,7 @@ def turn_by_trace() -> Derivation:
     because of links along x the transverse entries are wanted first (and at the root, alone).
     """
     plain, rotation = turn(), R_GIVEN.symbol
-    rows, m = _symbol("A_rows", 2, 3), _block(S.symbol, 0, 0)
+    rows, m = symbol("A_rows", 2, 3), _block(S.symbol, 0, 0)
     entries: Scalars = {(0, j): rows[j - 1, 0] for j in (1, 2)}
     entries |= {(i, j): rows[i - 1, j] for i in (1, 2) for j in range(i, 3)}
     entries[0, 0] = (m[0, 0] + m[1, 1] + m[2, 2]) - rows[0, 1] - rows[1, 2]

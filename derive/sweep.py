@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from .algebra import column, part, stack, symbol
 from .derivation import Derivation, Equation, Quantity, Solve, tilde
 from .hinge import HingeMotion
 
@@ -31,54 +32,41 @@ SOURCES = (
 )
 
 
-def _symbol(name: str, rows: int, columns: int = 1) -> sp.MatrixSymbol:
-    return sp.MatrixSymbol(name, rows, columns)
-
-
-def _count(nu: int) -> str:
+def free_speeds(nu: int) -> str:
+    """How many coordinates are free, for a title."""
     return f"{nu or 'no'} free speed{'' if nu == 1 else 's'}"
-
-
-def _part(array: sp.MatrixSymbol, first: int, count: int = 3) -> sp.ImmutableDenseMatrix:
-    """Rows first .. first+count of a column."""
-    return sp.ImmutableDenseMatrix([array[i, 0] for i in range(first, first + count)])
-
-
-def _stack(*parts: sp.Basic) -> sp.BlockMatrix:
-    return sp.BlockMatrix([[part] for part in parts])
 
 
 # --- quantities shared by the steps -----------------------------------------------------------
 
-RT = Quantity(_symbol("Rt", 3, 3), "", "rotation, inboard hinge axes to parent axes")
-RO = Quantity(_symbol("ro", 3), "m", "inboard point Q in the parent, parent axes")
+RT = Quantity(symbol("Rt", 3, 3), "", "rotation, inboard hinge axes to parent axes")
+RO = Quantity(symbol("ro", 3), "m", "inboard point Q in the parent, parent axes")
 PARENT_MOTION = Quantity(
-    _symbol("motion_I", 9), "", "bias motion of the parent: w, wd, rdd of its P, parent axes"
+    symbol("motion_I", 9), "", "bias motion of the parent: w, wd, rdd of its P, parent axes"
 )
-MOTION = Quantity(
-    _symbol("motion", 9), "", "bias motion of the body: w, wd, rdd of its P, own axes"
-)
-R = Quantity(_symbol("Rc", 3, 3), "", "rotation, body axes to parent axes")
-SHIFT = Quantity(_symbol("r", 3), "m", "P of the body from P of the parent, parent axes")
-S = Quantity(_symbol("S", 6, 6), "", "f = S a + e of everything outboard, at P", symmetric=True)
-E = Quantity(_symbol("e", 6), "N, N*m", "force part of f = S a + e, at P")
+MOTION = Quantity(symbol("motion", 9), "", "bias motion of the body: w, wd, rdd of its P, own axes")
+R = Quantity(symbol("Rc", 3, 3), "", "rotation, body axes to parent axes")
+SHIFT = Quantity(symbol("r", 3), "m", "P of the body from P of the parent, parent axes")
+S = Quantity(symbol("S", 6, 6), "", "f = S a + e of everything outboard, at P", symmetric=True)
+E = Quantity(symbol("e", 6), "N, N*m", "force part of f = S a + e, at P")
 PARENT_S = Quantity(
-    _symbol("S_I", 6, 6), "", "contribution to the parent's S", symmetric=True, accumulate=True
+    symbol("S_I", 6, 6), "", "contribution to the parent's S", symmetric=True, accumulate=True
 )
-PARENT_E = Quantity(_symbol("e_I", 6), "N, N*m", "contribution to the parent's e", accumulate=True)
-PARENT_DELTA = Quantity(_symbol("delta_I", 6), "", "deviation of the parent's acceleration")
-DELTA = Quantity(_symbol("delta", 6), "", "deviation of the body's acceleration, at P")
+PARENT_E = Quantity(symbol("e_I", 6), "N, N*m", "contribution to the parent's e", accumulate=True)
+PARENT_DELTA = Quantity(symbol("delta_I", 6), "", "deviation of the parent's acceleration")
+DELTA = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration, at P")
 
 
 FLOOR = Quantity(
-    _symbol("floor", 2), "kg, kg*m2", "least inertia along and about an axis that is not rounding"
+    symbol("floor", 2), "kg, kg*m2", "least inertia along and about an axis that is not rounding"
 )
 
 
-def _gain(nu: int) -> tuple[Quantity, Quantity]:
+def gains(nu: int) -> tuple[Quantity, Quantity]:
+    """G and g of a hinge: udot = g - G a_Q."""
     return (
-        Quantity(_symbol("G", nu, 6), "", "udot = g - G a_Q"),
-        Quantity(_symbol("g", nu), "", "udot = g - G a_Q"),
+        Quantity(symbol("G", nu, 6), "", "udot = g - G a_Q"),
+        Quantity(symbol("g", nu), "", "udot = g - G a_Q"),
     )
 
 
@@ -91,10 +79,10 @@ def _bias_equations(
     imposed: sp.Basic | None,
 ) -> tuple[Equation, ...]:
     """Bias motion of the outboard body from that of its parent."""
-    w_i, wd_i, a_i = (_part(PARENT_MOTION.symbol, k) for k in (0, 3, 6))
-    carrier = _symbol("K", 3, 3)
-    seen = _symbol("w_Q", 3)
-    local = _symbol("c_s", 6)
+    w_i, wd_i, a_i = (part(PARENT_MOTION.symbol, k) for k in (0, 3, 6))
+    carrier = symbol("K", 3, 3)
+    seen = symbol("w_Q", 3)
+    local = symbol("c_s", 6)
     lever = RO.symbol if _is_zero(position) else RO.symbol + RT.symbol * position
     own = imposed if imposed is not None and _is_zero(c) else c
     if own is c and imposed is not None:
@@ -106,13 +94,13 @@ def _bias_equations(
         Equation("carrier's angular velocity in body axes", seen, R.symbol.T * w_i),
         Equation("hinge's own acceleration", local, own),
     ]
-    angular = R.symbol.T * wd_i + _part(local, 3)
+    angular = R.symbol.T * wd_i + part(local, 3)
     if not _is_zero(w):
-        angular = angular + tilde(_part(seen, 0)) * w
-    linear = R.symbol.T * (a_i + carrier * SHIFT.symbol) + _part(local, 0)
+        angular = angular + tilde(part(seen, 0)) * w
+    linear = R.symbol.T * (a_i + carrier * SHIFT.symbol) + part(local, 0)
     if not _is_zero(v):
-        linear = linear + 2 * tilde(_part(seen, 0)) * v
-    motion = _stack(seen + w, angular, linear)
+        linear = linear + 2 * tilde(part(seen, 0)) * v
+    motion = stack(seen + w, angular, linear)
     equations.append(Equation("bias motion", MOTION.symbol, motion))
     return tuple(equations)
 
@@ -125,9 +113,9 @@ def _is_zero(value: sp.Basic) -> bool:
 def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
     """Hinge kinematics and bias motion in one kernel; s are the prescribed accelerations."""
     nu = motion.nu
-    s = Quantity(_symbol("s", nu), "", "prescribed part of udot (zero where free)")
+    s = Quantity(symbol("s", nu), "", "prescribed part of udot (zero where free)")
     h = motion.in_arrays(motion.subspace)
-    rates = _symbol("qdot", motion.rates.rows)
+    rates = symbol("qdot", motion.rates.rows)
     equations = _bias_equations(
         motion.in_arrays(motion.rotation),
         motion.in_arrays(motion.position),
@@ -148,9 +136,9 @@ def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
 
 def forward_generic(nu: int) -> Derivation:
     """Bias motion from the outputs of any hinge kernel (R, d, H, v, w, c)."""
-    rotation, d, h = _symbol("R", 3, 3), _symbol("d", 3), _symbol("H", 6, nu)
-    v, w, c, s = _symbol("v", 3), _symbol("w", 3), _symbol("c", 6), _symbol("s", nu)
-    equations = _bias_equations(rotation, d, _column(v), _column(w), c, h * s if nu else None)
+    rotation, d, h = symbol("R", 3, 3), symbol("d", 3), symbol("H", 6, nu)
+    v, w, c, s = symbol("v", 3), symbol("w", 3), symbol("c", 6), symbol("s", nu)
+    equations = _bias_equations(rotation, d, column(v), column(w), c, h * s if nu else None)
     hinge = tuple(Quantity(x) for x in (rotation, d, h, v, w, c, s))
     return Derivation(
         f"generic{nu}",
@@ -162,26 +150,22 @@ def forward_generic(nu: int) -> Derivation:
     )
 
 
-def _column(symbol: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
-    return _part(symbol, 0, int(symbol.rows))
-
-
 def _transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
     """X^T f: the load at P, felt at P of the parent, parent axes."""
-    push = R.symbol * _part(force, 0)
-    return _stack(push, R.symbol * _part(force, 3) + tilde(_column(SHIFT.symbol)) * push)
+    push = R.symbol * part(force, 0)
+    return stack(push, R.symbol * part(force, 3) + tilde(column(SHIFT.symbol)) * push)
 
 
 def _congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
     """X^T S X by blocks: rotate to parent axes, then shift to the parent's P."""
-    reduced = _symbol(name, 6, 6)
+    reduced = symbol(name, 6, 6)
     a, b, c = (
         sp.ImmutableDenseMatrix(3, 3, lambda i, j, k=k, m=m: reduced[i + k, j + m])
         for k, m in ((0, 0), (0, 3), (3, 3))
     )
-    turned_a, turned_b, turned_c = _symbol("A", 3, 3), _symbol("B", 3, 3), _symbol("C", 3, 3)
-    lever = tilde(_column(SHIFT.symbol))
-    moved_b = _symbol("B_I", 3, 3)
+    turned_a, turned_b, turned_c = symbol("A", 3, 3), symbol("B", 3, 3), symbol("C", 3, 3)
+    lever = tilde(column(SHIFT.symbol))
+    moved_b = symbol("B_I", 3, 3)
     equations = (
         Equation(
             "force-acceleration block, parent axes",
@@ -202,20 +186,20 @@ def _congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
     return equations, sp.BlockMatrix([[turned_a, moved_b], [moved_b.T, corner]])
 
 
-def _outboard_deviation() -> sp.BlockMatrix:
+def outboard_deviation() -> sp.BlockMatrix:
     """X delta_I: deviation of the body for udot = 0, own axes."""
-    a, alpha = _part(PARENT_DELTA.symbol, 0), _part(PARENT_DELTA.symbol, 3)
-    linear = R.symbol.T * (a - tilde(_column(SHIFT.symbol)) * alpha)
-    return _stack(linear, R.symbol.T * alpha)
+    a, alpha = part(PARENT_DELTA.symbol, 0), part(PARENT_DELTA.symbol, 3)
+    linear = R.symbol.T * (a - tilde(column(SHIFT.symbol)) * alpha)
+    return stack(linear, R.symbol.T * alpha)
 
 
 def unit_directions(subspace: sp.MatrixBase) -> dict[int, int]:
     """{row: column} for every column of H that is a unit vector."""
     found = {}
     for j in range(subspace.cols):
-        column = list(subspace[:, j])
-        if column.count(0) == 5 and column.count(1) == 1:
-            found[column.index(1)] = j
+        direction = list(subspace[:, j])
+        if direction.count(0) == 5 and direction.count(1) == 1:
+            found[direction.index(1)] = j
     return found
 
 
@@ -233,19 +217,19 @@ def condense(
     With an explicit `subspace` (no rotor inertia J) rows of S_Q along unit directions of H vanish
     identically and are not computed, and the same rows of e_Q are the efforts tau.
     """
-    tau = Quantity(_symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
-    gain, offset = _gain(nu)
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
+    gain, offset = gains(nu)
     equations: list[Equation] = []
     specialised = subspace is not None
-    h_given = Quantity(_symbol("H", 6, nu), "", "motion subspace of the free coordinates")
-    rotor = Quantity(_symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
     h: sp.Basic = sp.ImmutableDenseMatrix(subspace) if specialised else h_given.symbol
-    reduced, load = _symbol("S_Q", 6, 6), _symbol("e_Q", 6)
+    reduced, load = symbol("S_Q", 6, 6), symbol("e_Q", 6)
     if nu:
-        push, pivot = _symbol("U", 6, nu), _symbol("D", nu, nu)
+        push, pivot = symbol("U", 6, nu), symbol("D", nu, nu)
         inertia = h.T * push
         if not specialised:
-            inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*_column(rotor.symbol)))
+            inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
         units = unit_directions(subspace) if specialised else {}
         zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
         passed = E.symbol + push * offset.symbol
@@ -261,8 +245,8 @@ def condense(
             Equation(
                 "S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros, symmetric=True
             ),
-            Equation("e_Q = e + U g", _symbol("e_full", 6), passed),
-            Equation("e_Q", load, _replace_rows(_symbol("e_full", 6), tau.symbol, units)),
+            Equation("e_Q = e + U g", symbol("e_full", 6), passed),
+            Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
         ]
     else:
         equations = [
@@ -278,7 +262,7 @@ def condense(
     given = inputs if specialised else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
-        f"S and e carried across a hinge with {_count(nu)}",
+        f"S and e carried across a hinge with {free_speeds(nu)}",
         (R, SHIFT, *given, FLOOR, S, E, tau),
         (gain, offset, PARENT_S, PARENT_E),
         tuple(equations),
@@ -286,9 +270,10 @@ def condense(
     )
 
 
-def _replace_rows(
+def replace_rows(
     full: sp.MatrixSymbol, tau: sp.MatrixSymbol, units: dict[int, int]
 ) -> sp.ImmutableDenseMatrix:
+    """A load whose rows along unit directions are the efforts there."""
     return sp.ImmutableDenseMatrix(
         [tau[units[i], 0] if i in units else full[i, 0] for i in range(6)]
     )
@@ -303,8 +288,8 @@ def pivot_guards(
     grows with the cube of its length, while the pivots in the plane stay what they are.  A body
     without inertia of its own has nothing else to be judged by.
     """
-    pivot = _symbol("D", nu, nu)
-    h = _symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
+    pivot = symbol("D", nu, nu)
+    h = symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
     guards = []
     for i in range(nu):
         along = sum(h[k, i] ** 2 for k in range(3))
@@ -334,12 +319,12 @@ def recover(
     name: str | None = None,
 ) -> Derivation:
     """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
-    gain, offset = _gain(nu)
-    h_given = Quantity(_symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    gain, offset = gains(nu)
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
     h = sp.ImmutableDenseMatrix(subspace) if subspace is not None else h_given.symbol
-    rates = Quantity(_symbol("udot", nu), "", "accelerations of the free coordinates")
-    carried = _symbol("delta_Q", 6)
-    equations = [Equation("X delta_I", carried, _outboard_deviation())]
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
+    carried = symbol("delta_Q", 6)
+    equations = [Equation("X delta_I", carried, outboard_deviation())]
     if nu:
         equations += [
             Equation("udot = g - G X delta_I", rates.symbol, offset.symbol - gain.symbol * carried),
@@ -350,7 +335,7 @@ def recover(
     given = inputs if subspace is not None else (h_given,)
     return Derivation(
         name or f"generic{nu}",
-        f"accelerations recovered across a hinge with {_count(nu)}",
+        f"accelerations recovered across a hinge with {free_speeds(nu)}",
         (R, SHIFT, *given, gain, offset, PARENT_DELTA),
         (rates, DELTA),
         tuple(equations),
@@ -360,9 +345,9 @@ def recover(
 
 def effort(nu: int) -> Derivation:
     """tau = H^T f: what a hinge's coordinates feel of the load f at P."""
-    h = Quantity(_symbol("H", 6, nu), "", "motion subspace")
-    force = Quantity(_symbol("f", 6), "N, N*m", "load of the inboard on the outboard side at P")
-    tau = Quantity(_symbol("tau", nu), "N, N*m", "efforts along the speeds")
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    force = Quantity(symbol("f", 6), "N, N*m", "load of the inboard on the outboard side at P")
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts along the speeds")
     return Derivation(
         f"generic{nu}",
         f"efforts of a hinge with {nu} speeds",
@@ -374,16 +359,16 @@ def effort(nu: int) -> Derivation:
 
 def project(nu: int) -> Derivation:
     """udot = (H^T H)^-1 H^T (delta - X delta_I): accelerations of a hinge between known motions."""
-    h = Quantity(_symbol("H", 6, nu), "", "motion subspace")
-    rates = Quantity(_symbol("udot", nu), "", "accelerations of the coordinates")
-    carried, gap, gram = _symbol("delta_Q", 6), _symbol("gap", 6), _symbol("HH", nu, nu)
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
+    carried, gap, gram = symbol("delta_Q", 6), symbol("gap", 6), symbol("HH", nu, nu)
     return Derivation(
         f"generic{nu}",
         f"accelerations of a hinge with {nu} speeds from those of its bodies",
         (R, SHIFT, h, DELTA, PARENT_DELTA),
         (rates,),
         (
-            Equation("X delta_I", carried, _outboard_deviation()),
+            Equation("X delta_I", carried, outboard_deviation()),
             Equation("relative deviation", gap, DELTA.symbol - carried),
             Equation("H^T H", gram, h.symbol.T * h.symbol),
             Equation("udot", rates.symbol, Solve(gram, h.symbol.T * gap, symmetric=True)),
