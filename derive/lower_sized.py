@@ -22,7 +22,7 @@ from mstmm.graph import Node
 from mstmm.ir import LOOPS, Port
 
 from .derivation import Derivation, Equation, Quantity, Solve
-from .lower import Lowering, port
+from .lower_fixed import Lowering, port
 from .unrolled import SINGULAR, NodeMatrix
 
 Index = int | str

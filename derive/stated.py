@@ -15,7 +15,7 @@ from sympy.logic.boolalg import Boolean
 
 from mstmm.errors import ElementError, MstmmError
 
-from .lower import FUNCTIONS
+from .functions import FUNCTIONS
 
 #: Nodes of an expression that the IR has operations for, besides the functions.
 _NODES = (
