@@ -12,25 +12,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from mstmm.errors import ElementError
-from mstmm.graph import Graph, Node
+from mstmm.graph import Node
 from mstmm.ir import KernelIR, Port
 from mstmm.structure import (
     ANGLE,
     BodyStructure,
-    Entries,
-    ExpressionStructure,
-    Key,
     Structure,
 )
 
 from .balance import balance
+from .fuse_state import BodyNodes, FusionState, Kernels
 from .fused_loads import LoadPass
 from .fused_modal import ModalPass
-from .inline import Inliner, Nodes
-from .transport import Stage, stages_of
-
-#: (element, kernel name) -> its IR.
-Kernels = Callable[[Key, str], KernelIR]
+from .inline import Nodes
+from .transport import stages_of
 
 #: Reasons of a failure, as the looped engine numbers them.
 UNDETERMINED, HINGE = 1, 4
@@ -46,24 +41,6 @@ class Fused:
     failures: tuple[tuple[int, int, int], ...]
 
 
-@dataclass
-class BodyNodes:
-    """What is known of a body while the sweep runs."""
-
-    stages: tuple[Stage, ...]
-    axial: bool
-    hinge: dict[str, Nodes]
-    s: Nodes
-    motion: Nodes
-    inertia: Nodes
-    load: Nodes
-    own: Nodes
-    tau: Nodes
-    eliminated: dict[str, Nodes]
-    delta: Nodes
-    udot: Nodes
-
-
 def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None) -> Fused:
     """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads.
 
@@ -74,72 +51,14 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     return _Fusion(structure, kernels, numbers).run()
 
 
-class _Fusion:
+class _Fusion(FusionState):
     """One replay of the sweep: forward, laws and loads, condense, recover."""
 
     def __init__(
         self, structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     ) -> None:
-        self.structure, self.kernels, self.numbers = structure, kernels, numbers
-        self.graph = Graph()
-        self.inline = Inliner(self.graph)
-        self.zero, self.one = self.inline.zero, self.inline.one
-        self.failures: list[tuple[int, int, int]] = []
-        self.t = self.graph.element("t", 0)
-        self.q = self.graph.vector("q", structure.nq)
-        self.u = self.graph.vector("u", structure.nu)
-        self.efforts = self.graph.vector("efforts", structure.nu)
-        self.memory = self.graph.vector("memory", structure.n_memory)
-        self.bodies: list[BodyNodes] = []
+        super().__init__(structure, kernels, numbers)
         self.modal = ModalPass(self)
-        self.power, self.potential = self.zero, self.zero
-
-    # --- small tools ---------------------------------------------------------------------------
-
-    def entries(self, entries: Entries) -> Nodes:
-        """Nodes of structural constants and of places in p."""
-        return [self._entry(entry) for entry in entries]
-
-    def _entry(self, entry: float | int) -> Node:
-        if isinstance(entry, float):
-            return self.graph.constant(entry)
-        if self.numbers is not None:
-            return self.graph.constant(self.numbers[entry])
-        return self.graph.element("p", entry)
-
-    def expression(self, found: ExpressionStructure, **more: Sequence[Node]) -> Nodes:
-        """Values of expressions of the scene."""
-        given: dict[str, Sequence[Node]] = {
-            "t": [self.t], "q": self.q, "u": self.u, "constants": self.entries(found.constants),
-        }  # fmt: skip
-        given |= more
-        inputs = {port.name: given[port.name] for port in found.kernel.inputs}
-        return next(iter(self.inline.run(found.kernel, inputs).values()))
-
-    def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A step of the sweep for any hinge with `nu` speeds."""
-        return self.inline.run(self.kernels(("sweep", f"generic{nu}"), name), inputs)
-
-    def screw(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A step across an axial screw."""
-        return self.inline.run(self.kernels(("sweep", "screw"), name), inputs)
-
-    def frames(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A kernel of poses, points and loads."""
-        return self.inline.run(self.kernels(("sweep", "frames"), name), inputs)
-
-    def fail_unless(self, condition: Node, reason: int, element: int, code: int) -> None:
-        """Guard of the fused kernel that stands for a failure of the looped engine."""
-        failure = (reason, element, code)
-        if failure not in self.failures:
-            self.failures.append(failure)
-        self.graph.guard(condition, 1 + self.failures.index(failure), f"failure {failure}")
-
-    def identity(self) -> Nodes:
-        return [self.one if i % 4 == 0 else self.zero for i in range(9)]
-
-    def zeros(self, count: int) -> Nodes:
-        return [self.zero] * count
 
     # --- passes ----------------------------------------------------------------------------------
 
@@ -154,7 +73,7 @@ class _Fusion:
             if body.modal is not None:
                 first, n = body.modal.u, body.modal.n
                 qdot[body.modal.q : body.modal.q + n] = self.u[first : first + n]
-        LoadPass(self).run()
+        LoadPass(self, self.modal).run()
         for index in reversed(range(len(self.bodies))):
             self._condense(index)
         for index, body in enumerate(self.structure.bodies):

@@ -7,15 +7,13 @@ are replayed too, and whatever no load needs of them is never emitted.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from mstmm.graph import Node
 from mstmm.structure import ForceStructure, LawStructure, LoadStructure
 
+from .fuse_state import FusionState
+from .fused_modal import ModalPass
 from .inline import Nodes
-
-if TYPE_CHECKING:
-    from .fuse import _Fusion
 
 #: Reason of a failing force element, as the looped engine numbers it.
 FORCE = 2
@@ -33,8 +31,8 @@ class _Pose:
 class LoadPass:
     """Adds laws to the efforts, loads and forces to e, their power and potential to the sums."""
 
-    def __init__(self, fusion: _Fusion) -> None:
-        self.fusion = fusion
+    def __init__(self, fusion: FusionState, modal: ModalPass) -> None:
+        self.fusion, self.modal = fusion, modal
         self.values: Nodes = []
         self._poses: dict[int, _Pose] = {}
 
@@ -48,7 +46,7 @@ class LoadPass:
             self._law(law)
         for index, body in enumerate(f.structure.bodies):
             if body.modal is not None and body.modal.drag:
-                f.modal.drag(index, body.modal, self._pose(index).v)
+                self.modal.drag(index, body.modal, self._pose(index).v)
         for load in f.structure.loads:
             self._load(load)
         for index, force in enumerate(f.structure.forces):

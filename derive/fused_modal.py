@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from mstmm.graph import Node
 from mstmm.structure import ModalStructure, SectionStructure
 
+from .fuse_state import FusionState
 from .inline import Guarding, Nodes
-
-if TYPE_CHECKING:
-    from .fuse import _Fusion
 
 #: Reasons of a failure, as the looped engine numbers them.
 SECTION, MODES = 7, 8
@@ -32,7 +29,7 @@ class ModalNodes:
 class ModalPass:
     """The modal steps, by body."""
 
-    def __init__(self, fusion: _Fusion) -> None:
+    def __init__(self, fusion: FusionState) -> None:
         self.fusion = fusion
         self.modes: dict[int, ModalNodes] = {}
         self.subspaces: dict[int, Nodes] = {}

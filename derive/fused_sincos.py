@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from mstmm.ir import Assign, Guard, Operand, Statement, Store, Temporary
 
-from .straight_c import operands
+from .line import operands
 
 
 @dataclass

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
 
 from .c_text import TRUTH_VALUED, literal
+from .line import operands
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _COMPARISONS = {"lt": "<", "le": "<=", "eq": "=="}
@@ -124,15 +125,6 @@ class StraightText:
         if isinstance(a, Temporary) and a.number in self._truths:
             return f"{self.dialect.prefix}not(m{a.number})"
         return f"{self.whole(a)} == {self.whole(Constant('0'))}"
-
-
-def operands(statement: object) -> tuple[Operand, ...]:
-    """What a statement of a straight-line kernel reads."""
-    if isinstance(statement, Assign):
-        return statement.args
-    if isinstance(statement, Store):
-        return (statement.value,)
-    return (statement.condition,) if isinstance(statement, Guard) else ()
 
 
 def _used_as_numbers(statements: Iterable[object]) -> set[int]:

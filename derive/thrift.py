@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .streams import Line, reads_of, units_of
+from .line import Line, reads_of, units_of
 
 #: How far a statement may be brought forward (measured: 20 to 100 are alike, 1000 is worse).
 _WINDOW = 60

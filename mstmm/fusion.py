@@ -50,10 +50,9 @@ PRINTERS = {
         "structure.py", "tangent.py",
     ),
     "mstmm.derive": (
-        "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fused_c.py", "fused_loads.py",
-        "fused_modal.py",
-        "fused_sincos.py", "inline.py", "straight_c.py", "streams.py", "thrift.py",
-        "transport.py", "unrolled.py",
+        "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fuse_state.py", "fused_c.py",
+        "fused_loads.py", "fused_modal.py", "fused_sincos.py", "inline.py", "line.py",
+        "straight_c.py", "streams.py", "thrift.py", "transport.py", "unrolled.py",
     ),
 }  # fmt: skip
 

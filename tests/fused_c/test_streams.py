@@ -9,8 +9,8 @@ from support.random_kernels import random_inputs, random_kernel
 
 from mstmm.derive.evaluate import evaluate_floats
 from mstmm.derive.fused_sincos import gather
-from mstmm.derive.straight_c import operands
-from mstmm.derive.streams import Line, merged
+from mstmm.derive.line import Line, operands
+from mstmm.derive.streams import merged
 from mstmm.derive.thrift import thrifty
 from mstmm.graph import Graph
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
