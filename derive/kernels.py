@@ -13,7 +13,7 @@ from mstmm.ir import KernelIR
 from . import body as body_kernels
 from . import force as force_kernels
 from . import frames, laws, link, screw, sweep
-from .classical import CLASSICAL, classical_guards
+from .classical.catalogue import CLASSICAL, classical_guards
 from .derivation import Derivation, Equation, Quantity, vector
 from .element import Body, Hinge
 from .elements.body_rigid import RigidBody

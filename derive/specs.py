@@ -8,7 +8,7 @@ from mstmm.ir import KernelIR
 from mstmm.spec import ElementSpec
 
 from . import sweep
-from .classical import CLASSICAL, classical_spec
+from .classical.catalogue import CLASSICAL, classical_spec
 from .element import Hinge
 from .hinge import speeds_of
 from .kernels import (

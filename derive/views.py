@@ -14,7 +14,7 @@ from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
 from mstmm.spec import ElementSpec
 
-from .classical import classical_spec
+from .classical.catalogue import classical_spec
 from .kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, kernels_of
 from .registry import Element, builtin_elements, kind_of
 from .render import element_source

@@ -108,7 +108,7 @@ def _matrices() -> Section:
 
 
 def _derived_matrices() -> list[tuple[str, ...]]:
-    from mstmm.derive.classical import CLASSICAL
+    from mstmm.derive.classical.catalogue import CLASSICAL
 
     made = ((name, derive()) for name, derive in CLASSICAL.items())
     return [(f"classical_{name}", d.title, "; ".join(d.sources)) for name, d in made]

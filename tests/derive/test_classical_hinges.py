@@ -21,8 +21,6 @@ from support.dense_chain import Array, Body, Joint, accelerations, planar_body, 
 from support.sign_flips import Flip, flipped, flips, terms
 
 from mstmm.derive.classical import (
-    CLASSICAL,
-    VANISHING_PIVOT,
     acceleration,
     ball,
     body_planar,
@@ -31,7 +29,8 @@ from mstmm.derive.classical import (
     pin_planar,
     pin_spatial,
 )
-from mstmm.derive.classical.hinge_relation import HingeStatement
+from mstmm.derive.classical.catalogue import CLASSICAL
+from mstmm.derive.classical.hinge_relation import VANISHING_PIVOT, HingeStatement
 from mstmm.derive.evaluate import GuardFailure
 from mstmm.derive.notation import matrix_symbols
 from mstmm.ir import KernelIR

@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 import pytest
 import sympy as sp
 
-from mstmm.derive.classical import CLASSICAL, FLEXIBLE, classical_spec
+from mstmm.derive.classical.catalogue import CLASSICAL, classical_spec
+from mstmm.derive.classical.flexible_catalogue import FLEXIBLE
 from mstmm.derive.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from mstmm.derive.notation import Matrix, Tilde, explicit
 from mstmm.derive.render import element_source

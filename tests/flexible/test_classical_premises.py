@@ -18,7 +18,8 @@ from support.hinge_premises import body_residual, hinge_residual, matrices
 from support.premises import Premises
 from support.random_bodies import random_body
 
-from mstmm.derive.classical import CLASSICAL, flexible_body
+from mstmm.derive.classical import flexible_body
+from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.flexible_catalogue import (
     BODIES,
     HINGES,

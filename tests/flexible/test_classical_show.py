@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mstmm.derive.classical import CLASSICAL, FLEXIBLE
-from mstmm.derive.classical.flexible_catalogue import BODIES, HINGES
+from mstmm.derive.classical.catalogue import CLASSICAL
+from mstmm.derive.classical.flexible_catalogue import BODIES, FLEXIBLE, HINGES
 from mstmm.derive.show import show_view
 from mstmm.derive.show_text import WIDTH, columns
 from mstmm.derive.views import view

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mstmm.derive.classical import CLASSICAL
+from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.evaluate import evaluate_floats
 from mstmm.derive.lower import lower
 from mstmm.ir import KernelIR

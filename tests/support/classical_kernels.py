@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.derive.classical import classical_guards
+from mstmm.derive.classical.catalogue import classical_guards
 from mstmm.derive.derivation import Derivation
 from mstmm.derive.evaluate import evaluate, evaluate_floats
 from mstmm.derive.lower import lower

@@ -14,7 +14,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from mstmm.derive.classical import CLASSICAL
+from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.evaluate import evaluate
 from mstmm.derive.lower import lower
 from mstmm.ir import KernelIR

@@ -1,0 +1,51 @@
+"""Which classical transfer matrices are generated, and how they are lowered.
+
+`CLASSICAL` names them all, those of the discrete-time form included; `classical_guards` are the
+pivot guards to lower them with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sympy as sp
+
+from mstmm.spec import ElementSpec
+
+from ..derivation import Derivation
+from ..lower import lower
+from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
+from .flexible_catalogue import FLEXIBLE
+from .hinge_relation import guards
+
+
+def _planar_acceleration() -> Derivation:
+    return acceleration.derivation(acceleration.PLANAR_DIRECTIONS, planar=True)
+
+
+#: Name -> derivation of the classical elements that are generated.
+CLASSICAL: dict[str, Callable[[], Derivation]] = {
+    "body_planar": body_planar.derivation,
+    "body_spatial": body_spatial.derivation,
+    "pin_planar": pin_planar.derivation,
+    "ball": ball.derivation,
+    "pin_spatial": pin_spatial.derivation,
+    "acceleration": acceleration.derivation,
+    "acceleration_planar": _planar_acceleration,
+    **FLEXIBLE,
+}
+
+
+def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
+    """Guards of a classical element: the pivot's for a hinge, none for a body."""
+    has_margin = any(quantity.name == "margin" for quantity in derivation.outputs)
+    return guards(derivation) if has_margin else ()
+
+
+def classical_spec(name: str) -> ElementSpec:
+    """What generation needs of a classical element: one kernel, `transfer`."""
+    derivation = CLASSICAL[name]()
+    kernel = lower(derivation, "transfer", classical_guards(derivation))
+    return ElementSpec(
+        "classical", name, derivation.title, (), (), (), (kernel,), derivation.sources
+    )
