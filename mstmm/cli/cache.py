@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .guard import ENVIRONMENT
+from .explain import ENVIRONMENT
 from .options import Json, not_negative, quoted
 
 if TYPE_CHECKING:

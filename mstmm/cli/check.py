@@ -41,7 +41,7 @@ def check(
     json: Json = False,
 ) -> None:
     """Check scenes, definitions of elements, and kernels against the equations they come from."""
-    from .guard import explain
+    from .explain import explain
     from .output import complain, emit_json, say
 
     if hinge:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from .guard import ENVIRONMENT
+from .explain import ENVIRONMENT
 from .options import Json
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from cli.commands import Command
 from mstmm import errors
-from mstmm.cli.guard import explain
+from mstmm.cli.explain import explain
 
 PROGRAM = [sys.executable, "-m", "mstmm"]
 
