@@ -14,7 +14,7 @@ from functools import lru_cache
 
 from .errors import ExpressionError
 from .expression_parser import FUNCTIONS, MAX_LENGTH, MEANING, Name, Parser, Term
-from .graph import Graph, Node
+from .graph_terms import Node, Terms
 
 __all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
 
@@ -97,14 +97,14 @@ class Expression:
 
     # --- meaning --------------------------------------------------------------------------------
 
-    def build(self, graph: Graph, resolve: Callable[[Name], Node]) -> Node:
+    def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
         """The expression as a node of `graph`; `resolve` gives the node of each name.
 
         A comparison becomes 1 where it holds and 0 elsewhere.
         """
         return self.nodes(graph, resolve)[self.root]
 
-    def nodes(self, graph: Graph, resolve: Callable[[Name], Node]) -> dict[int, Node]:
+    def nodes(self, graph: Terms, resolve: Callable[[Name], Node]) -> dict[int, Node]:
         """The nodes of all terms that the value depends on, by their numbers."""
         nodes: dict[int, Node] = {}
         needed = self._needed(self.root)
@@ -195,7 +195,7 @@ def _distinct(names: object) -> tuple[Name, ...]:
 # --- terms as nodes, numbers and straight lines ---------------------------------------------------
 
 
-def _node(graph: Graph, term: Term, args: list[Node], resolve: Callable[[Name], Node]) -> Node:
+def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], Node]) -> Node:
     if term.exact is not None:
         return graph.constant(term.exact)
     if term.name is not None:

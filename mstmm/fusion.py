@@ -46,7 +46,8 @@ _MODES_PER_BODY = 24
 #: What decides the text besides structure and kernels: the modules that print it.
 PRINTERS = {
     "mstmm": (
-        "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "graph_writer.py", "ir.py",
+        "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "graph_terms.py", "graph_writer.py",
+        "ir.py", "ir_check.py", "ir_kernel.py", "ir_statements.py",
         "structure.py", "tangent.py",
     ),
     "mstmm.derive": (

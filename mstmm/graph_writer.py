@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from .ir import (
-    INNER_INDEX,
-    LOOP_INDEX,
+from .graph_terms import LOOP_BITS, Node, Number, Terms
+from .ir_statements import (
     LOOPS,
     Assign,
     Constant,
@@ -24,12 +23,6 @@ from .ir import (
     Sum,
     Temporary,
 )
-
-if TYPE_CHECKING:
-    from .graph import Graph, Node, Number
-
-#: Loop variable -> its bit in `Node.loops`.
-LOOP_BITS = {LOOP_INDEX: 1, INNER_INDEX: 2}
 
 
 @dataclass(frozen=True)
@@ -67,7 +60,7 @@ class _Level:
 class Writer:
     """Emits nodes in dependency order, each once, with temporaries numbered densely."""
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Terms) -> None:
         self.graph = graph
         self.statements: list[Statement] = []
         self._outside = _Level(0, None, self.statements)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from .ir import (
+from .ir_statements import (
     LOOPS,
     OPERATIONS,
     Assign,
     Element,
     Guard,
     Inner,
-    KernelIR,
     Operand,
     Port,
     Solve,
@@ -25,27 +24,32 @@ from .ir import (
 class Check:
     """One walk over a kernel's statements; what is readable and defined grows as it goes."""
 
-    def __init__(self, kernel: KernelIR) -> None:
-        self.kernel = kernel
-        self.readable = {port.name: port for port in kernel.inputs}
-        self.writable = {port.name: port for port in kernel.outputs}
+    def __init__(
+        self,
+        name: str,
+        inputs: tuple[Port, ...],
+        outputs: tuple[Port, ...],
+        size_symbol: str | None,
+    ) -> None:
+        self.name, self.ports, self.size_symbol = name, (*inputs, *outputs), size_symbol
+        self.readable = {port.name: port for port in inputs}
+        self.writable = {port.name: port for port in outputs}
         self.stored: dict[str, set[tuple[int | str, ...]]] = {}
         self.defined: set[int] = set()
         self.ever: set[int] = set()
         self.constants: set[str] = set()
 
     def fail(self, text: str) -> None:
-        raise ValueError(f"{self.kernel.name}: {text}")
+        raise ValueError(f"{self.name}: {text}")
 
-    def run(self) -> None:
-        ports = (*self.kernel.inputs, *self.kernel.outputs)
-        if len({port.name for port in ports}) != len(ports):
+    def run(self, statements: tuple[Statement, ...]) -> None:
+        if len({port.name for port in self.ports}) != len(self.ports):
             self.fail("two ports share a name")
-        for port in ports:
+        for port in self.ports:
             sizes = {extent for extent in port.shape if isinstance(extent, str)}
-            if sizes - {self.kernel.size_symbol}:
+            if sizes - {self.size_symbol}:
                 self.fail(f"{port.name} has the shape {port.shape}")
-        for statement in self.kernel.statements:
+        for statement in statements:
             self.statement(statement)
 
     def statement(self, statement: Statement) -> None:
@@ -76,7 +80,7 @@ class Check:
             self.fail(f"{store.port}{list(store.index)} stores a diagonal alone")
         self.body(store.body, store.value, store.loops)
         self.index(store.port, store.index, self.writable, store.loops)
-        if self.kernel.size_symbol is None:
+        if self.size_symbol is None:
             return
         if store.port in self.readable:
             self.fail(f"{store.port} is stored again where it is complete")
@@ -88,7 +92,7 @@ class Check:
             self.readable[port.name] = port
 
     def body(self, body: tuple[Inner, ...], value: Operand, loops: tuple[str, ...]) -> None:
-        if loops and self.kernel.size_symbol is None:
+        if loops and self.size_symbol is None:
             self.fail("a loop without a size symbol")
         for statement in body:
             self.inner(statement, loops)
@@ -143,7 +147,7 @@ class Check:
                 self.fail(f"{name}{list(index)} is out of range")
 
     def solve(self, solve: Solve) -> None:
-        size = self.kernel.size_symbol
+        size = self.size_symbol
         for name, ports in (
             (solve.matrix, self.readable), (solve.right, self.readable), (solve.port, self.writable)
         ):  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-from .ir import KernelIR
+from .ir_kernel import KernelIR
 
 #: Entry points in which installed packages name their elements: a class, or a module of them.
 ENTRY_POINTS = "mstmm.elements"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import astuple
 
-from .ir import KernelIR, from_json, to_json
+from .ir_kernel import KernelIR, from_json, to_json
 from .spec import ElementSpec, Param
 
 

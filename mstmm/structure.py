@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .ir import KernelIR
+from .ir_kernel import KernelIR
 
 #: A structural constant (float) or a place in p (int).
 Entry = float | int

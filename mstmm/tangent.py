@@ -16,14 +16,15 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
-from .graph import Graph, Node, Number
-from .ir import (
+from .graph import Graph
+from .graph_terms import Node, Number, Terms
+from .ir_kernel import KernelIR
+from .ir_statements import (
     LOOPS,
     Assign,
     Element,
     Guard,
     Inner,
-    KernelIR,
     Operand,
     Port,
     Solve,
@@ -34,7 +35,7 @@ from .ir import (
 #: Name of the derivative of a port.
 PREFIX = "d_"
 
-Rule = Callable[[Graph, Node, list[Node]], Node]
+Rule = Callable[[Terms, Node, list[Node]], Node]
 
 
 def derivative(node: Node, seeds: Mapping[Node, Node | Number]) -> Node:
@@ -69,7 +70,7 @@ def _differentiated(node: Node, d: list[Node]) -> Node:
     return _RULES[node.op](graph, node, d)
 
 
-def _power(graph: Graph, node: Node, d: list[Node]) -> Node:
+def _power(graph: Terms, node: Node, d: list[Node]) -> Node:
     base, exponent = node.args
     slope = exponent * graph.power(base, exponent - 1) * d[0]
     if d[1].value == 0:
@@ -79,23 +80,23 @@ def _power(graph: Graph, node: Node, d: list[Node]) -> Node:
     return graph.select(still, slope, slope + node * graph.call("log", base) * d[1])
 
 
-def _arc(graph: Graph, node: Node, d: list[Node]) -> Node:
+def _arc(graph: Terms, node: Node, d: list[Node]) -> Node:
     """Derivative of asin; that of acos is its opposite."""
     a = node.args[0]
     return d[0] / graph.sqrt(1 - a * a)
 
 
-def _angle(graph: Graph, node: Node, d: list[Node]) -> Node:
+def _angle(graph: Terms, node: Node, d: list[Node]) -> Node:
     y, x = node.args
     return (d[0] * x - y * d[1]) / (y * y + x * x)
 
 
-def _lesser(graph: Graph, node: Node, d: list[Node]) -> Node:
+def _lesser(graph: Terms, node: Node, d: list[Node]) -> Node:
     """Slope of the operand that `min` gives."""
     return graph.select(graph.call("lt", *node.args), d[0], d[1])
 
 
-def _greater(graph: Graph, node: Node, d: list[Node]) -> Node:
+def _greater(graph: Terms, node: Node, d: list[Node]) -> Node:
     return graph.select(graph.call("lt", *node.args), d[1], d[0])
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .ir import OPERATIONS, Assign, Constant, Element, Guard, KernelIR, Operand, Store, Temporary
+from .ir_kernel import KernelIR
+from .ir_statements import OPERATIONS, Assign, Constant, Element, Guard, Operand, Store, Temporary
 
 #: Operation name -> number of the instruction, in the order of `ir.OPERATIONS`.
 OPCODES: dict[str, int] = {name: number for number, name in enumerate(OPERATIONS)}
