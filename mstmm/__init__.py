@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from .runtime.model import Model
     from .runtime.result import Result
     from .scene import Scene
-    from .scene_file import load_scene
+    from .scene_load import load_scene
 
 __version__ = "0.1.0"
 
 #: Public name -> (module, name there).
 _LAZY = {
     "Scene": (".scene", "Scene"),
-    "load_scene": (".scene_file", "load_scene"),
+    "load_scene": (".scene_load", "load_scene"),
     "compile": (".compilation", "compile_scene"),
     "register": (".compilation", "register"),
     "generate_file": (".compilation", "generate_file"),

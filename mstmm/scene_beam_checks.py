@@ -3,27 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
-from . import scene_rules as rules
+from .scene_beam_keys import DIRECTIONS, MAX_SHAPES, BeamKeys, Section
 from .scene_errors import near
 from .scene_rules import Location, counted, found
 from .scene_shapes import problem_with
 
-if TYPE_CHECKING:
-    from .scene_beam import Beam, Section
-
 Problem = tuple[Location, str]
-
-#: Directions of the shapes in the order of the modal coordinates: deflection along y, along z,
-#: rotation about x, displacement along x.
-DIRECTIONS = ("y", "z", "twist", "axial")
-#: Most shapes in one direction.  More have half-waves so short that neither Euler's hypothesis nor
-#: the integrals of their products in double precision tell them apart.
-MAX_SHAPES = 60
-SHAPES = rules.Rule(
-    "a whole number, 0 or more", lambda value: _count(value), {"type": "integer", "minimum": 0}
-)
 
 #: Pieces join, and ends lie on the beam, to this share of its length.
 _ROUNDING = 1e-9
@@ -45,14 +31,7 @@ _MEANING = {
 }
 
 
-def _count(value: Any) -> int:
-    value = rules.plain(value)
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise rules.refuse(f"expected {SHAPES.expected}, found {found(value)}")
-    return value
-
-
-def problems(beam: Beam) -> Iterator[Problem]:
+def problems(beam: BeamKeys) -> Iterator[Problem]:
     """Everything in which the keys of a beam do not fit each other."""
     pieces = list(_pieces(beam))
     yield from pieces
@@ -66,7 +45,7 @@ def problems(beam: Beam) -> Iterator[Problem]:
     yield from _lists(beam)
 
 
-def joined(beam: Beam) -> tuple[Section, ...]:
+def joined(beam: BeamKeys) -> tuple[Section, ...]:
     """The pieces of a beam, each beginning exactly where the one before ends."""
     pieces: list[Section] = []
     for k, piece in enumerate(beam.section):
@@ -76,7 +55,7 @@ def joined(beam: Beam) -> tuple[Section, ...]:
     return tuple(pieces)
 
 
-def _pieces(beam: Beam) -> Iterator[Problem]:
+def _pieces(beam: BeamKeys) -> Iterator[Problem]:
     """Do the pieces cover the beam from root to tip, each once?"""
     reached, slack = 0.0, _ROUNDING * beam.length
     for i, piece in enumerate(beam.section):
@@ -111,7 +90,7 @@ def _article(word: str) -> str:
 # --- shapes and what they need --------------------------------------------------------------------
 
 
-def _modes(beam: Beam) -> Iterator[Problem]:
+def _modes(beam: BeamKeys) -> Iterator[Problem]:
     if beam.modes is None or beam.model == "rigid":
         return
     if beam.modes.total == 0:
@@ -130,7 +109,7 @@ def _modes(beam: Beam) -> Iterator[Problem]:
             )
 
 
-def _data(beam: Beam) -> Iterator[Problem]:
+def _data(beam: BeamKeys) -> Iterator[Problem]:
     """Every piece has what its mass and the shapes need; nothing is given for some pieces only."""
     given = beam.sections
     for key, why in _needed(beam).items():
@@ -147,11 +126,11 @@ def _data(beam: Beam) -> Iterator[Problem]:
             )
 
 
-def _at(beam: Beam, i: int, key: str) -> Location:
+def _at(beam: BeamKeys, i: int, key: str) -> Location:
     return ("section", i, key) if beam.section else (key,)
 
 
-def _needed(beam: Beam) -> dict[str, str]:
+def _needed(beam: BeamKeys) -> dict[str, str]:
     """Keys that must be given, each with what needs it."""
     needed = {"mass_per_length": ""}
     if beam.model == "rigid":
@@ -167,7 +146,7 @@ def _needed(beam: Beam) -> dict[str, str]:
     return needed
 
 
-def _polar(beam: Beam) -> Iterator[Problem]:
+def _polar(beam: BeamKeys) -> Iterator[Problem]:
     """A plane section has the sum of both rotary inertias about its axis."""
     for i, piece in enumerate(beam.sections):
         polar, rotary = piece.polar_inertia_per_length, piece.rotary_inertia
@@ -181,7 +160,7 @@ def _polar(beam: Beam) -> Iterator[Problem]:
         return
 
 
-def _sizes(beam: Beam) -> Iterator[Problem]:
+def _sizes(beam: BeamKeys) -> Iterator[Problem]:
     """Can the moments, stiffnesses and frequencies of the beam be written as numbers at all?"""
     if any(piece.mass_per_length is None for piece in beam.sections):
         return
@@ -204,7 +183,7 @@ def _sizes(beam: Beam) -> Iterator[Problem]:
     yield from _contrast(beam)
 
 
-def _contrast(beam: Beam) -> Iterator[Problem]:
+def _contrast(beam: BeamKeys) -> Iterator[Problem]:
     """Are the pieces so unlike that the shapes of the one drown in the rounding of the other?"""
     for key in _MEANING:
         given = [getattr(piece, key) for piece in beam.sections]
@@ -222,7 +201,7 @@ def _contrast(beam: Beam) -> Iterator[Problem]:
                 return
 
 
-def _shapes(beam: Beam) -> Iterator[Problem]:
+def _shapes(beam: BeamKeys) -> Iterator[Problem]:
     shapes = beam.shapes
     if shapes is None:
         if beam.basis == "given":
@@ -248,7 +227,7 @@ def _shapes(beam: Beam) -> Iterator[Problem]:
 # --- ends, frame, start values --------------------------------------------------------------------
 
 
-def _ends(beam: Beam) -> Iterator[Problem]:
+def _ends(beam: BeamKeys) -> Iterator[Problem]:
     slack = _ROUNDING * beam.length
     for name, end in beam.ends.items():
         x, y, z = end.position
@@ -280,7 +259,7 @@ def _ends(beam: Beam) -> Iterator[Problem]:
         )
 
 
-def _lists(beam: Beam) -> Iterator[Problem]:
+def _lists(beam: BeamKeys) -> Iterator[Problem]:
     """Lists with one entry per shape."""
     lists = [
         (("initial", "eta"), beam.initial.eta),

@@ -11,8 +11,9 @@ from pydantic import BaseModel, model_validator
 from . import scene_rules as rules
 from . import scene_rules_text as texts
 from .rotations import Vector
-from .scene_parts import BodyTable, HingeTable, Orientation
-from .scene_rules import GROUND, Location, Refused, Shorthand, Table, refuse, split
+from .scene_body import BodyTable
+from .scene_hinge_table import HingeTable
+from .scene_rules import GROUND, Location, Orientation, Refused, Shorthand, Table, refuse, split
 
 #: The longest chain; 1e6 bodies take some gigabytes.
 MAX_COUNT = 10_000_000

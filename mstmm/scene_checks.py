@@ -8,28 +8,30 @@ from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from . import scene_flexible_checks, scene_units, topology
+from . import scene_flexible_checks as flexible_bodies
+from . import topology
 from .expression import Expression
+from .scene_angles import notes
 from .scene_errors import MAX_PROBLEMS, TABLES, Problem, near
 from .scene_names import Scope, flexible, problem_with
 from .scene_physics import negative_moment, triangle_excess
 from .scene_rules import GROUND, Location, split
 
 if TYPE_CHECKING:
-    from .scene import Scene
-    from .scene_parts import BodyTable
+    from .scene_all import SceneTables
+    from .scene_body import BodyTable
 
 
-def problems(scene: Scene) -> list[Problem]:
+def problems(scene: SceneTables) -> list[Problem]:
     """Everything in which the elements of a scene do not fit each other."""
     if not (scene.body or scene.chain or scene.beam or scene.elastic):
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
-                   scene_flexible_checks.problems(scene))  # fmt: skip
-    return found or _first(_expressions(scene), _tree(scene), scene_flexible_checks.spins(scene))
+                   flexible_bodies.problems(scene))  # fmt: skip
+    return found or _first(_expressions(scene), _tree(scene), flexible_bodies.spins(scene))
 
 
-def _tree(scene: Scene) -> Iterator[Problem]:
+def _tree(scene: SceneTables) -> Iterator[Problem]:
     """What keeps the hinges from being a tree, each body in the table it comes from."""
     firsts = (("body", 0), ("beam", len(scene.body)),
               ("elastic", len(scene.body) + len(scene.beam)))  # fmt: skip
@@ -44,7 +46,7 @@ def _first(*findings: Iterable[Problem]) -> list[Problem]:
     return list(islice(one_after_another(*findings), MAX_PROBLEMS))
 
 
-def _duplicates(scene: Scene) -> Iterator[Problem]:
+def _duplicates(scene: SceneTables) -> Iterator[Problem]:
     for table in TABLES:
         seen: dict[str, int] = {}
         for i, element in enumerate(getattr(scene, table)):
@@ -72,7 +74,7 @@ _WORDS = {"elastic": "an elastic body"}
 _APART = ({"hinge", "a body"},)
 
 
-def _references(scene: Scene) -> Iterator[Problem]:
+def _references(scene: SceneTables) -> Iterator[Problem]:
     bodies = scene.skeleton.bodies
     for i, hinge in enumerate(scene.hinge):
         yield from _end(hinge.inboard, scene, ("hinge", i, "inboard"))
@@ -102,7 +104,7 @@ def _references(scene: Scene) -> Iterator[Problem]:
             yield place, f'"{event.hinge}" is neither driven nor fixed, so it cannot be released'
 
 
-def _end(reference: str, scene: Scene, place: Location) -> Iterator[Problem]:
+def _end(reference: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
     """Is there such a body, and has it such an end?"""
     body, at = split(reference)
     if body == GROUND:
@@ -119,7 +121,7 @@ def _end(reference: str, scene: Scene, place: Location) -> Iterator[Problem]:
         yield place, f'"{body}" is an elastic body, which is met at its ends alone; {way_out}'
 
 
-def _axes(scene: Scene, i: int) -> Iterator[Problem]:
+def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
     load = scene.load[i]
     bodies = scene.skeleton.bodies
     known = bodies.find(load.axes) is not None
@@ -134,7 +136,7 @@ def _axes(scene: Scene, i: int) -> Iterator[Problem]:
         yield ("load", i, "axes"), f'there is no body "{load.axes}"{near(load.axes, options)}'
 
 
-def _tables(scene: Scene) -> Iterator[tuple[Location, str, BodyTable]]:
+def _tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
     """(place, name for a warning, table) of every body table, those of chains among them."""
     for i, body in enumerate(scene.body):
         yield ("body", i), f'body "{body.name}"', body
@@ -143,7 +145,7 @@ def _tables(scene: Scene) -> Iterator[tuple[Location, str, BodyTable]]:
             yield ("chain", i, "body", k), f'body {k + 1} of chain "{chain.name}"', table
 
 
-def _inertias(scene: Scene) -> Iterator[Problem]:
+def _inertias(scene: SceneTables) -> Iterator[Problem]:
     for place, _, body in _tables(scene):
         if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
             continue
@@ -161,7 +163,7 @@ def _inertias(scene: Scene) -> Iterator[Problem]:
 _ACCEPTED = "allow_unphysical_inertia = true"
 
 
-def warnings(scene: Scene) -> tuple[str, ...]:
+def warnings(scene: SceneTables) -> tuple[str, ...]:
     """What is accepted but worth knowing: inertias that no body can have, angles that look like
     degrees, beams that are asked for what they cannot do well."""
     found, dusty = [], []
@@ -175,13 +177,13 @@ def warnings(scene: Scene) -> tuple[str, ...]:
         name, entry = dusty[0]
         more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
         found.append(f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}")
-    return (*found, *scene_units.notes(scene), *scene_flexible_checks.warnings(scene))
+    return (*found, *notes(scene), *flexible_bodies.warnings(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------
 
 
-def _expressions(scene: Scene) -> Iterator[Problem]:
+def _expressions(scene: SceneTables) -> Iterator[Problem]:
     hinges, bodies = scene.hinges, scene.skeleton.bodies
     anywhere = Scope(hinges, bodies, flexible=flexible(scene))
     in_events = replace(anywhere, positions=True)

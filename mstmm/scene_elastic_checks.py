@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from .scene_elastic_keys import SOURCES, ElasticKeys
 from .scene_rules import Location
-
-if TYPE_CHECKING:
-    from .scene_elastic import Elastic
 
 Problem = tuple[Location, str]
 
-SOURCES = ("matrices", "arrays", "mesh", "box")
 #: Keys of the material, with their units; of bodies that are meshed.
 MATERIAL = {
     "young": "Young's modulus in Pa, more than 0",
@@ -21,7 +17,7 @@ MATERIAL = {
 }
 
 
-def problems(elastic: Elastic) -> Iterator[Problem]:
+def problems(elastic: ElasticKeys) -> Iterator[Problem]:
     """Everything in which the keys of an elastic body do not fit each other."""
     given = [key for key in SOURCES if getattr(elastic, key) is not None]
     if len(given) != 1:
@@ -37,7 +33,7 @@ def problems(elastic: Elastic) -> Iterator[Problem]:
     yield from _start(elastic)
 
 
-def _material(elastic: Elastic, source: str) -> Iterator[Problem]:
+def _material(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
     meshed = source in ("mesh", "box")
     for key, meaning in MATERIAL.items():
         value = getattr(elastic, key)
@@ -57,7 +53,7 @@ def _material(elastic: Elastic, source: str) -> Iterator[Problem]:
         yield ("scale",), "only a mesh file has a unit of its own; leave it out"
 
 
-def _ends(elastic: Elastic, source: str) -> Iterator[Problem]:
+def _ends(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
     if not elastic.ends:
         yield (
             ("ends",),
@@ -79,7 +75,7 @@ def _ends(elastic: Elastic, source: str) -> Iterator[Problem]:
             )
 
 
-def _start(elastic: Elastic) -> Iterator[Problem]:
+def _start(elastic: ElasticKeys) -> Iterator[Problem]:
     """eta and etad belong together; how many there are the matrices decide."""
     start = elastic.initial
     if start.eta is not None and start.etad is not None and len(start.eta) != len(start.etad):

@@ -7,15 +7,11 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .errors import SceneError
-from .spec import ElementSpec
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .scene_errors import near
 
 #: Largest file in MB by ending: what is read and validated within about half a minute.
 MAX_SIZE = {".toml": 8, ".json": 64}
@@ -24,32 +20,6 @@ MAX_PARTS = 64
 _LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}+"""
 )
-
-
-def load_scene(
-    path: str | os.PathLike[str],
-    known_types: Mapping[tuple[str, str], ElementSpec] | None = None,
-) -> Scene:
-    """Read and validate a scene file (.toml or .json).
-
-    Relative paths in it start from its folder; no file that it names is opened.
-
-    `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
-    types.  When it is given every type must be built in or in it; without it types that are not
-    built in are left to `Scene.check_types`.  Raises SceneError.
-    """
-    from .scene import Scene
-    from .scene_elastic import FOLDER
-
-    where, data = read(path)
-    token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
-    try:
-        scene = Scene.from_data(data, where)
-    finally:
-        FOLDER.reset(token)
-    if known_types is not None:
-        scene.check_types(known_types, where)
-    return scene
 
 
 def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
@@ -112,8 +82,6 @@ def _content(path: Path, where: str) -> bytes:
 
 def _neighbour(path: Path) -> str:
     """A file beside the missing one with a similar name."""
-    from .scene_errors import near
-
     try:
         names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in (".toml", ".json")]
     except OSError:

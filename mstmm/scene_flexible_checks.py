@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
-from . import scene_lines
 from .rotations import Vector, apply, dot, norm, unit
+from .scene_lines import lines as lines_of
 from .scene_rules import Location, split
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .scene_all import SceneTables
     from .scene_beam import Beam
-    from .scene_parts import Hinge
+    from .scene_hinge_table import Hinge
 
 Problem = tuple[Location, str]
 
@@ -31,7 +31,7 @@ _CF, _FF, _SS = "clamped-free", "free-free", "simply-supported"
 # --- loads per length -----------------------------------------------------------------------------
 
 
-def problems(scene: Scene) -> Iterator[Problem]:
+def problems(scene: SceneTables) -> Iterator[Problem]:
     """Everything in which flexible bodies and other elements do not fit each other."""
     beams = {beam.name: beam for beam in scene.beam}
     for i, load in enumerate(scene.load):
@@ -59,7 +59,7 @@ def problems(scene: Scene) -> Iterator[Problem]:
 # --- what hinges leave free -----------------------------------------------------------------------
 
 
-def spins(scene: Scene) -> Iterator[Problem]:
+def spins(scene: SceneTables) -> Iterator[Problem]:
     """Beams without inertia about their axis where a hinge lets them spin about it."""
     carriers = {name for name, _ in _carried(scene)}
     released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
@@ -80,7 +80,7 @@ def spins(scene: Scene) -> Iterator[Problem]:
             )
 
 
-def _held(scene: Scene) -> Iterator[tuple[int, Beam, Hinge]]:
+def _held(scene: SceneTables) -> Iterator[tuple[int, Beam, Hinge]]:
     """(number, beam, the hinge that holds it); checked to be one."""
     holding = {hinge.outboard_body: hinge for hinge in scene.hinge}
     for i, beam in enumerate(scene.beam):
@@ -88,7 +88,7 @@ def _held(scene: Scene) -> Iterator[tuple[int, Beam, Hinge]]:
             yield i, beam, holding[beam.name]
 
 
-def _carried(scene: Scene) -> Iterator[tuple[str, str]]:
+def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
     """(body, end) of everything that a hinge or chain hangs on."""
     for hinge in scene.hinge:
         yield split(hinge.inboard)
@@ -140,7 +140,7 @@ def _within(direction: Vector, axes: list[Vector]) -> float:
 # --- warnings -------------------------------------------------------------------------------------
 
 
-def warnings(scene: Scene) -> Iterator[str]:
+def warnings(scene: SceneTables) -> Iterator[str]:
     """What is accepted but worth knowing of flexible bodies."""
     yield from short_beams(scene)
     for body in (*scene.beam, *scene.elastic):
@@ -161,16 +161,16 @@ def warnings(scene: Scene) -> Iterator[str]:
             yield _loose(f'elastic "{hinge.outboard_body}"', hinge)
 
 
-def _called(scene: Scene, name: str) -> str:
+def _called(scene: SceneTables, name: str) -> str:
     word = "beam" if any(beam.name == name for beam in scene.beam) else "elastic"
     return f'{word} "{name}"'
 
 
-def short_beams(scene: Scene) -> Iterator[str]:
+def short_beams(scene: SceneTables) -> Iterator[str]:
     """Beams that are short for their height; those welded in line are one, and named once."""
     if not scene.beam:
         return
-    lines, said = scene_lines.lines(scene), set[str]()
+    lines, said = lines_of(scene), set[str]()
     for beam in scene.beam:
         height, direction, source = max(_heights(beam), default=(0.0, "", ""))
         line = lines[beam.name]
@@ -225,7 +225,7 @@ def _loose(body: str, hinge: Hinge) -> str:
     )
 
 
-def _weak_basis(scene: Scene, beam: Beam) -> Iterator[str]:
+def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[str]:
     """A basis asked for by name whose shapes have no bending moment where a hinge carries one."""
     if beam.basis not in (_CF, _FF, _SS):
         return

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .drive import jump, motion_at
 from .errors import ExpressionError
 from .expression import Expression
 from .hinge_types import HINGE_TYPES, HingeType, effort_unit
 from .rotations import cross, norm, perpendicular, unit
-from .scene_rules import GROUND, Location, Refused, counted, found, quaternion
+from .scene_hinge_keys import HingeKeys, Initial
+from .scene_law import Law, LawEntry
+from .scene_rules import Location, Refused, counted, found, quaternion
 
-if TYPE_CHECKING:
-    from .scene_law import Law, LawEntry
-    from .scene_parts import Hinge, HingeTable
-
-_ZERO = (0.0, 0.0, 0.0)
 _Z = (0.0, 0.0, 1.0)
 _X = (1.0, 0.0, 0.0)
 #: Start values of a driven coordinate must agree with the drive to this accuracy.
 _AGREES = 1e-9
 
 
-def settled(hinge: HingeTable) -> dict[str, Any]:
+def settled(hinge: HingeKeys) -> dict[str, Any]:
     """Fields with their defaults filled in; Refused names everything that does not fit."""
     problems = hinge.misplaced()
     changes: dict[str, Any] = {}
@@ -56,26 +53,7 @@ def settled(hinge: HingeTable) -> dict[str, Any]:
     return changes
 
 
-def misplaced(hinge: Hinge) -> list[tuple[Location, str]]:
-    """Ends that cannot be joined."""
-    problems: list[tuple[Location, str]] = []
-    if hinge.outboard_body == GROUND:
-        problems.append((("outboard",), "the ground cannot be outboard; swap inboard and outboard"))
-    elif hinge.inboard_body == hinge.outboard_body:
-        problems.append((
-            ("outboard",),
-            f'"{hinge.outboard_body}" is hinged to itself; join two different bodies',
-        ))  # fmt: skip
-    if hinge.inboard_body != GROUND and hinge.position != _ZERO:
-        problems.append((
-            ("position",),
-            'only a hinge whose inboard is "ground" takes a position; '
-            f'give "{hinge.inboard_body}" an end there',
-        ))  # fmt: skip
-    return problems
-
-
-def _user_type(hinge: HingeTable) -> list[tuple[Location, str]]:
+def _user_type(hinge: HingeKeys) -> list[tuple[Location, str]]:
     """A user's type takes parameters instead of the keys of the built-in types."""
     return [
         ((key,), f'only built-in types take {key}; give "{hinge.type}" its numbers as parameters')
@@ -85,7 +63,7 @@ def _user_type(hinge: HingeTable) -> list[tuple[Location, str]]:
 
 
 def _axes(
-    hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]
+    hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]
 ) -> dict[str, Any]:
     """axis, axis2, normal and lead, each where the type has it."""
     for key in ("axis2", "lead"):
@@ -114,7 +92,7 @@ def _axes(
     return {}
 
 
-def _planar_axes(hinge: HingeTable, problems: list[tuple[Location, str]]) -> dict[str, Any]:
+def _planar_axes(hinge: HingeKeys, problems: list[tuple[Location, str]]) -> dict[str, Any]:
     """The normal under both its names, and the direction of x in the plane."""
     normal = hinge.axis if hinge.normal is None else hinge.normal
     if hinge.normal is not None and hinge.axis not in (_Z, hinge.normal):
@@ -141,7 +119,7 @@ def _not_collinear(
 # --- law ------------------------------------------------------------------------------------------
 
 
-def _law(hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
+def _law(hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
     """The law with one entry per speed."""
     law, count = hinge.law, len(kind.speeds)
     neutral = _neutral(type(law))
@@ -210,7 +188,7 @@ def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, 
 
 
 def _drive(
-    hinge: HingeTable, kind: HingeType, problems: list[tuple[Location, str]]
+    hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]
 ) -> tuple[Expression | None, ...] | None:
     drive = hinge.drive
     if drive is None or (drive and all(entry is None for entry in drive)):
@@ -258,14 +236,12 @@ def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
 
 
 def _initial(
-    hinge: HingeTable,
+    hinge: HingeKeys,
     kind: HingeType,
     drive: tuple[Expression | None, ...] | None,
     problems: list[tuple[Location, str]],
-) -> Any:
+) -> Initial | None:
     """Start values, filled in; None when a drive gives all of them."""
-    from .scene_parts import Initial
-
     given = hinge.initial
     if drive is not None and None not in drive:
         if given is not None and (given.q is not None or given.u is not None):

@@ -8,9 +8,9 @@ from .rotations import Matrix, apply
 from .scene_rules import split
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .scene_all import SceneTables
     from .scene_beam import Beam
-    from .scene_parts import Hinge
+    from .scene_hinge_table import Hinge
 
 ROOT = "root"
 
@@ -25,7 +25,7 @@ class Line(NamedTuple):
     length: float
 
 
-def lines(scene: Scene) -> dict[str, Line]:
+def lines(scene: SceneTables) -> dict[str, Line]:
     """Beam -> the straight line of welded beams that it is a part of; alone it is one itself.
 
     Two beams are in line where a fixed hinge joins an extreme end of one to one of the other and

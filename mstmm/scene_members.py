@@ -12,9 +12,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from typing import Generic, TypeVar, overload
 
+from .scene_body import Body
 from .scene_chain import HINGE, Chain
 from .scene_errors import near
-from .scene_parts import Body, Hinge
+from .scene_hinge_table import Hinge
 from .scene_rules import NAME
 
 _MEMBER = re.compile(rf"({NAME.pattern})\[([0-9]+|last)\]")

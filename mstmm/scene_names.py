@@ -10,9 +10,9 @@ from .expression import Name
 from .scene_errors import near
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .scene_all import SceneTables
+    from .scene_hinge_table import Hinge
     from .scene_members import Bodies, Hinges
-    from .scene_parts import Hinge
 
 
 #: Names of the modal coordinates of a flexible body; None where they are not known before it is
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Modal = tuple[str, ...] | None
 
 
-def flexible(scene: Scene) -> dict[str, Modal]:
+def flexible(scene: SceneTables) -> dict[str, Modal]:
     """The modal coordinates of every flexible body by its name."""
     beams: dict[str, Modal] = {beam.name: beam.mode_names for beam in scene.beam}
     return beams | {elastic.name: None for elastic in scene.elastic}

@@ -27,6 +27,8 @@ NAME_SHAPE = "a letter, then letters, digits or _ (64 characters at most)"
 GROUND = "ground"
 
 Location = tuple[str | int, ...]
+Numbers = tuple[float, ...]
+Orientation = tuple[float, ...]
 
 
 class Refused(ValueError):

@@ -6,9 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from . import expression
 from .errors import ExpressionError
-from .expression import Expression
+from .expression import Expression, number, parse
 from .scene_rules import (
     BODY,
     GROUND,
@@ -152,9 +151,9 @@ def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
     if isinstance(value, Expression):
         return value
     if not isinstance(value, str):
-        return expression.number(finite(value, expected, *place))
+        return number(finite(value, expected, *place))
     try:
-        return expression.parse(value)
+        return parse(value)
     except ExpressionError as error:
         raise refuse(f"{error}{with_unit(value)}", *place) from None
 
@@ -231,7 +230,7 @@ def condition(expected: str, time: bool = False) -> Rule:
     def check(value: Any) -> Expression:
         value = plain(value)
         if time and isinstance(value, (int, float)) and not isinstance(value, bool):
-            return expression.parse(f"t >= {finite(value, expected)!r}")
+            return parse(f"t >= {finite(value, expected)!r}")
         if not isinstance(value, (str, Expression)):
             raise refuse(f"expected {expected}, found {found(value)}")
         result = to_expression(value, expected)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from .scene_errors import TABLES
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .scene_all import SceneTables
 
 #: Keys that say the same as another key of the same hinge.
 _TWICE = {"planar": "axis"}
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: SceneTables) -> str:
     """TOML text that loads back to an equal scene."""
     data = scene.model_dump(by_alias=True)
     lines = [

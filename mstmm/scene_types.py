@@ -13,8 +13,8 @@ from .scene_rules import Location
 from .spec import ElementSpec
 
 if TYPE_CHECKING:
-    from .scene import Scene
-    from .scene_parts import HingeTable
+    from .scene_all import SceneTables
+    from .scene_hinge_table import HingeTable
 
 #: Table of the scene -> (kind of the definition, built-in types).
 _KINDS = {
@@ -24,7 +24,7 @@ _KINDS = {
 }
 
 
-def tables(scene: Scene) -> Iterator[tuple[str, Location, Any]]:
+def tables(scene: SceneTables) -> Iterator[tuple[str, Location, Any]]:
     """(kind of definition, place, table) of everything that has a type, patterns of chains too."""
     for table, (kind, _) in _KINDS.items():
         for i, element in enumerate(getattr(scene, table)):
@@ -35,12 +35,12 @@ def tables(scene: Scene) -> Iterator[tuple[str, Location, Any]]:
                 yield _KINDS[table][0], ("chain", i, table, k), element
 
 
-def types(scene: Scene) -> set[tuple[str, str]]:
+def types(scene: SceneTables) -> set[tuple[str, str]]:
     """(kind, type) of everything in a scene."""
     return {(kind, element.type) for kind, _, element in tables(scene)}
 
 
-def problems(scene: Scene, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
+def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
     """Unknown types, and elements that do not fit the definition of their type."""
     found: list[Problem] = []
     builtin = dict(_KINDS.values())
@@ -60,7 +60,7 @@ def problems(scene: Scene, known: Mapping[tuple[str, str], ElementSpec]) -> list
     return found
 
 
-def problems_with(scene: Scene, spec: ElementSpec) -> list[Problem]:
+def problems_with(scene: SceneTables, spec: ElementSpec) -> list[Problem]:
     """What does not fit in the elements of this one type."""
     return [
         problem
@@ -70,7 +70,9 @@ def problems_with(scene: Scene, spec: ElementSpec) -> list[Problem]:
     ]
 
 
-def _element(scene: Scene, place: Location, element: Any, spec: ElementSpec) -> Iterator[Problem]:
+def _element(
+    scene: SceneTables, place: Location, element: Any, spec: ElementSpec
+) -> Iterator[Problem]:
     yield from _parameters(place, element.parameters, spec)
     if spec.kind == "hinge":
         yield from _counts(place, element, spec)
@@ -124,7 +126,7 @@ def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[P
             yield (*place, *at), f"{spec.name} has {count} entries here, found {len(values)}"
 
 
-def _indices(scene: Scene, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
+def _indices(scene: SceneTables, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
     """Indices of this hinge's coordinates in all expressions of the scene."""
     for place, expression, own in _all_expressions(scene):
         for name in expression.names:
@@ -139,14 +141,14 @@ def _indices(scene: Scene, hinge: HingeTable, spec: ElementSpec) -> Iterator[Pro
                 yield place, message
 
 
-def _called(scene: Scene, place: Location) -> str:
+def _called(scene: SceneTables, place: Location) -> str:
     """Name of the hinge at a place: of a chain's pattern, the first member that has it."""
     if place[0] == "chain":
         return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
     return scene.hinge[int(place[1])].name
 
 
-def _table(scene: Scene, name: str) -> HingeTable | None:
+def _table(scene: SceneTables, name: str) -> HingeTable | None:
     """The table that describes the hinge of this name."""
     index = scene.hinges.find(name)
     if index is None or index < len(scene.hinge):
@@ -155,7 +157,9 @@ def _table(scene: Scene, name: str) -> HingeTable | None:
     return scene.chain[chain].hinge_of(k)
 
 
-def _all_expressions(scene: Scene) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
+def _all_expressions(
+    scene: SceneTables,
+) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
     """(place, expression, hinge whose q and u need no prefix)."""
     for kind, place, table in tables(scene):
         if kind == "hinge":

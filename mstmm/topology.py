@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from .scene_errors import report
 from .scene_rules import split
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .scene_all import SceneTables
 
 GROUND_INDEX = -1
 Problem = tuple[tuple[str | int, ...], str]
@@ -155,7 +156,7 @@ class Topology:
         return all(run.parent == run.place - 1 for run in self.runs)
 
 
-def build(scene: Scene) -> Topology:
+def build(scene: SceneTables) -> Topology:
     """The tree of a scene.  O(tables), no recursion.
 
     Raises SceneError, one line per problem, for closed loops, hinges written the wrong way round
@@ -163,8 +164,6 @@ def build(scene: Scene) -> Topology:
     """
     tree = _tree(_Graph(scene))
     if tree is None:
-        from .scene_errors import report
-
         tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
         raise report(list(problems(scene)), tables, "scene")
     return tree
@@ -173,7 +172,7 @@ def build(scene: Scene) -> Topology:
 class _Graph:
     """Nodes are the scene's bodies, then its chains; edges its hinges, then the chains' first."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneTables) -> None:
         self.scene = scene
         self.index = {body.name: i for i, body in enumerate(scene.body)}
         self.nodes = len(scene.body) + len(scene.chain)
@@ -265,7 +264,7 @@ class _Component:
     closing: list[tuple[int, int, int]]
 
 
-def problems(scene: Scene) -> Iterator[Problem]:
+def problems(scene: SceneTables) -> Iterator[Problem]:
     """Places and messages of everything that keeps the hinges from being a tree."""
     graph = _Graph(scene)
     edges: list[list[tuple[int, int, bool]]] = [[] for _ in range(graph.nodes + 1)]

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from mstmm.expression import Expression
 from mstmm.scene import Scene
+from mstmm.scene_hinge_table import Hinge, HingeTable
 from mstmm.scene_members import Hinges
-from mstmm.scene_parts import Hinge, HingeTable, Spring
+from mstmm.scene_parts import Spring
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.scene import Scene, split
+from mstmm.scene import split
+from mstmm.scene_all import SceneTables
+from mstmm.scene_body import BodyTable
 from mstmm.scene_errors import near
-from mstmm.scene_parts import BodyTable
 
 from .calls import PARTS, Probe
 
@@ -150,7 +151,7 @@ class References(Collection[str]):
     `scene` is the skeleton: flexible bodies count as bodies with ends like all others.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneTables) -> None:
         self.scene, self.bodies = scene, scene.bodies
 
     def canonical(self, reference: str) -> str | None:

@@ -8,7 +8,7 @@ from typing import Any
 from mstmm.expression import Expression
 from mstmm.ir import KernelIR
 from mstmm.scene import Scene, split
-from mstmm.scene_parts import HingeTable
+from mstmm.scene_hinge_table import HingeTable
 from mstmm.tape import Tape, compile_tape
 from mstmm.topology import build
 

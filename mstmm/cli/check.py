@@ -140,8 +140,8 @@ def _tree_lines(scene: Scene) -> list[str]:
     """The tree of bodies, each with the hinge it hangs on."""
     from mstmm.topology import build
 
-    scene = scene.skeleton
-    tree = build(scene)
+    skeleton = scene.skeleton
+    tree = build(skeleton)
     depth: dict[int, int] = {-1: 0}  # of the bodies on which others may hang
     lines = ["  ground"] if tree.runs else []
     shown = 0
@@ -150,10 +150,11 @@ def _tree_lines(scene: Scene) -> list[str]:
             break
         first = 1 + _depth(tree, depth, run.parent)
         depth[run.place] = first
-        hinge, body = scene.hinges[run.hinge], scene.bodies[run.body]
+        hinge, body = skeleton.hinges[run.hinge], skeleton.bodies[run.body]
         what = f"{body.name}  ({hinge.name}: {hinge.type})"
         if run.count > 1:
-            what = f"{body.name} to {scene.bodies.name(run.body + run.count - 1)}  ({hinge.type})"
+            last = skeleton.bodies.name(run.body + run.count - 1)
+            what = f"{body.name} to {last}  ({hinge.type})"
         lines.append("  " + "  " * min(first, 20) + what)
         shown += run.count
     if shown < tree.count:

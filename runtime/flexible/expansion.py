@@ -15,7 +15,8 @@ from mstmm.errors import SceneError
 from mstmm.expression import Expression, parse
 from mstmm.rotations import rows, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split
-from mstmm.scene_parts import End, Load
+from mstmm.scene_body import End
+from mstmm.scene_parts import Load
 
 from .modal_body import ModalBody
 from .modal_port import MassPoint, ModalPort

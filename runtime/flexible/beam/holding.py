@@ -19,7 +19,7 @@ from .static_shapes import stiffness_of
 if TYPE_CHECKING:
     from mstmm.scene import Chain, Scene
     from mstmm.scene_beam import Beam
-    from mstmm.scene_parts import Hinge
+    from mstmm.scene_hinge_table import Hinge
 
 #: Deflection along y turns the section about z, along z about y, and twist turns it about x.
 AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}

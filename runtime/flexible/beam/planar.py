@@ -17,7 +17,8 @@ from mstmm.scene_rules import GROUND, split
 if TYPE_CHECKING:
     from mstmm.expression import Expression
     from mstmm.scene import Scene
-    from mstmm.scene_parts import Hinge, Load
+    from mstmm.scene_hinge_table import Hinge
+    from mstmm.scene_parts import Load
 
 #: Angles, and heights relative to the largest, below this are rounding.
 _ROUNDING = 1e-9
