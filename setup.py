@@ -3,6 +3,6 @@
 from setuptools import setup
 
 setup(
-    cffi_modules=["runtime/build_extension.py:ffibuilder"],
+    cffi_modules=["runtime/libraries/build_extension.py:ffibuilder"],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

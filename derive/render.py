@@ -60,7 +60,7 @@ def engine_sources(specs: Sequence[ElementSpec] = ()) -> dict[str, str]:
 def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
     """`manifest.json`: ABI number, SHA-256 of all C text, names and hashes of elements and kernels.
 
-    A module that was compiled from other text is told by it (`runtime/prebuilt.py`).
+    A module that was compiled from other text is told by it (`runtime/kernels/prebuilt.py`).
     """
     text = hashlib.sha256()
     for name in sorted(name for name in files if name.endswith((".c", ".h"))):

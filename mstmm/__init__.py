@@ -26,17 +26,16 @@ from .errors import (
     NumericalFailure,
     SceneError,
 )
+from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .compilation import compile_scene as compile
     from .compilation import generate_file, register
-    from .runtime.loading import load_result
-    from .runtime.model import Model
-    from .runtime.result import Result
+    from .runtime.model.loading import load_result
+    from .runtime.model.model import Model
+    from .runtime.result.result import Result
     from .scene import Scene
     from .scene_load import load_scene
-
-__version__ = "0.1.0"
 
 #: Public name -> (module, name there).
 _LAZY = {
@@ -45,9 +44,9 @@ _LAZY = {
     "compile": (".compilation", "compile_scene"),
     "register": (".compilation", "register"),
     "generate_file": (".compilation", "generate_file"),
-    "Model": (".runtime.model", "Model"),
-    "Result": (".runtime.result", "Result"),
-    "load_result": (".runtime.loading", "load_result"),
+    "Model": (".runtime.model.model", "Model"),
+    "Result": (".runtime.result.result", "Result"),
+    "load_result": (".runtime.model.loading", "load_result"),
 }
 
 __all__ = [

@@ -14,9 +14,9 @@ from .spec import ElementSpec
 
 if TYPE_CHECKING:
     from .derive.registry import Element
-    from .runtime.bodies import Known
-    from .runtime.model import Model
-    from .runtime.packed import Packed
+    from .runtime.model.model import Model
+    from .runtime.pack.bodies import Known
+    from .runtime.pack.packed import Packed
 
 ENGINES = ("auto", "fused", "looped")
 SWEEPS = ("riccati", "product")
@@ -68,9 +68,9 @@ def compile_scene(
     if not accuracy > 0:
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
     from .fusion import MOST_ASKED, MOST_BODIES, Fusion
-    from .runtime import store
-    from .runtime.flexible.one_way.rigidified import with_level
-    from .runtime.model import Model
+    from .runtime.kernels import store
+    from .runtime.model.model import Model
+    from .runtime.pack.flexible.rigidified import with_level
 
     scene = with_level(scene, flexibility)
 
@@ -109,7 +109,7 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
     from .derive.registry import kind_of
     from .derive.render import element_source, header
     from .derive.specs import spec_of
-    from .runtime import prebuilt, store
+    from .runtime.kernels import prebuilt, store
 
     made = []
     for element in elements:

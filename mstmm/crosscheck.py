@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .derive.points import Source
     from .derive.properties import Property
     from .derive.registry import Element as Definition
-    from .runtime.prebuilt import Element as Compiled
+    from .runtime.kernels.prebuilt import Element as Compiled
 
 #: Largest relative difference between specialised and generic kernels in doubles.
 SPECIALISED = 1e-13
@@ -43,7 +43,7 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
     """
     from .derive.kernels import built_in
     from .derive.registry import builtin_elements, kind_of
-    from .runtime import prebuilt, store
+    from .runtime.kernels import prebuilt, store
 
     make = built_in().get((kind, name))
     if make is not None:
@@ -67,7 +67,7 @@ def crosscheck_definition(element: Definition, points: int = 2) -> Report:
     from .derive.kernels import kernels_of
     from .derive.registry import kind_of
     from .derive.specs import spec_from
-    from .runtime import store
+    from .runtime.kernels import store
 
     kernels, key = kernels_of(element), (kind_of(element), element.name)
     stored = store.spec(key)
@@ -271,7 +271,7 @@ class _Subject:
     def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
         """The compiled specialised kernels against the compiled generic ones."""
         from .derive.kernels import generic_kernels
-        from .runtime import prebuilt
+        from .runtime.kernels import prebuilt
 
         if self.compiled is None or self.compiled.tape is not None:
             return
@@ -306,7 +306,7 @@ def _call(
 ) -> tuple[int, dict[str, list[float]]]:
     """A compiled kernel through its descriptor: (code, outputs)."""
     from .abi import c_outputs
-    from .runtime import prebuilt
+    from .runtime.kernels import prebuilt
 
     ffi, _ = prebuilt.module()
     descriptor = compiled.descriptor
@@ -333,8 +333,8 @@ def _interpret(
     tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
     """The hinge kernel of an element without a library, as the engine interprets it."""
-    from .runtime import prebuilt
-    from .runtime.tape_kernel import c_tape
+    from .runtime.kernels import prebuilt
+    from .runtime.kernels.tape import c_tape
 
     ffi, lib = prebuilt.module()
     kept: list[Any] = []

@@ -18,17 +18,17 @@ from . import columns_abi
 from .errors import ElementError, EnvironmentFailure, SceneError
 from .fused_abi import ABI, FLAGS, TUNING
 from .ir import KernelIR, from_json
-from .runtime.cache import Built, Recipe, find, opened
-from .runtime.columns import ColumnsLibrary, open_columns
-from .runtime.fused import FusedLibrary, open_library
-from .runtime.structure import structure_of
+from .runtime.kernels.columns import ColumnsLibrary, open_columns
+from .runtime.kernels.fused import FusedLibrary, open_library
+from .runtime.libraries.cache import Built, Recipe, find, opened
+from .runtime.pack.structure import structure_of
 from .spec import ElementSpec
 from .structure import BodyStructure, Key, Structure
 
 if TYPE_CHECKING:
     from .derive.fuse import Fused
-    from .runtime.bodies import Known
-    from .runtime.packed import Packed
+    from .runtime.pack.bodies import Known
+    from .runtime.pack.packed import Packed
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
 #: asks for it: the compiler's time grows with their square while the advantage shrinks.

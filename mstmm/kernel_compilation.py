@@ -9,8 +9,8 @@ from hashlib import sha256
 
 from .derive.scalar_c import library_source
 from .ir import KernelIR
-from .runtime.cache import Recipe, opened
-from .runtime.scalar_kernel import ScalarKernel
+from .runtime.kernels.scalar import ScalarKernel
+from .runtime.libraries.cache import Recipe, opened
 from .scalars import FLAGS, NEEDS, SCALARS, SYMBOL
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mstmm.cli.guard import run
-from mstmm.runtime import steppers
+from mstmm.runtime.integrate import steppers
 
 PAGES = Path(__file__).parents[1] / "docs" / "use" / "extending"
 #: A block, with the file's name where the line before it is one.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import json
 import re
 import shutil
@@ -12,6 +13,7 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -180,6 +182,15 @@ def test_import_contracts_hold() -> None:
         [linter, "--no-cache"], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert done.returncode == 0, done.stdout
+
+
+def test_no_module_imports_itself_in_the_end() -> None:
+    """Imports inside functions and for the type checker count like any other."""
+    graph = grimp.build_graph("mstmm")
+    imported = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    rooms = {name: found for name, found in imported.items() if name.split(".")[1:2] == ["runtime"]}
+    assert len(rooms) > 100
+    graphlib.TopologicalSorter(rooms).prepare()  # CycleError tells the way around
 
 
 def test_links_between_the_pages_lead_somewhere() -> None:

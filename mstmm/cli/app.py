@@ -43,7 +43,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from mstmm import __version__
+        from mstmm.version import __version__
 
         from .output import say
 

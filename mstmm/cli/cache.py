@@ -12,7 +12,7 @@ from .explain import ENVIRONMENT
 from .options import Json, not_negative, quoted
 
 if TYPE_CHECKING:
-    from mstmm.runtime.cache_upkeep import Listed
+    from mstmm.runtime.libraries.upkeep import Listed
 
 ACTIONS = ("list", "verify", "clean")
 
@@ -43,7 +43,7 @@ def cache(
         raise typer.BadParameter(f"{quoted(action)}: expected {', '.join(ACTIONS)}")
     if unused and action != "clean":
         raise typer.BadParameter("--unused goes with clean")
-    from mstmm.runtime.cache_folder import private_folder
+    from mstmm.runtime.libraries.folder import private_folder
 
     folder = private_folder()
     if action == "clean":
@@ -53,7 +53,7 @@ def cache(
 
 
 def _list(folder: Path, json: bool, verify: bool) -> None:
-    from mstmm.runtime.cache_upkeep import limit, listed, unfinished
+    from mstmm.runtime.libraries.upkeep import limit, listed, unfinished
 
     from . import output
 
@@ -93,7 +93,7 @@ def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off:
 
 
 def _clean(folder: Path, unused: float, json: bool) -> None:
-    from mstmm.runtime.cache_upkeep import clean
+    from mstmm.runtime.libraries.upkeep import clean
 
     from . import output
     from .report import count

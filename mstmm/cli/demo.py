@@ -13,7 +13,7 @@ from .progress import bar
 from .simulate import load_method
 
 if TYPE_CHECKING:
-    from mstmm.runtime.result import Result
+    from mstmm.runtime.result.result import Result
 
 #: The scene of examples/three_bodies_on_balls, as it travels with the package.
 SCENE = "three_bodies_on_balls.toml"
@@ -101,7 +101,7 @@ def _simulate(text: str) -> tuple[Result, float]:
     import tomllib
 
     import mstmm
-    from mstmm.runtime.results import certified
+    from mstmm.runtime.model.results import certified
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
     load_method("dop853")

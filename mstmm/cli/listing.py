@@ -123,7 +123,7 @@ def _sweep() -> Section:
 
 
 def _methods() -> Section:
-    from mstmm.runtime.steppers import get, names
+    from mstmm.runtime.integrate.steppers import get, names
 
     rows, data = [], []
     for name in names():
@@ -141,7 +141,7 @@ def _methods() -> Section:
 
 
 def _user() -> Section:
-    from mstmm.runtime import store
+    from mstmm.runtime.kernels import store
 
     from .stored import of_spec
 

@@ -9,7 +9,7 @@ KINDS = ("hinge", "body", "force", "classical", "sweep")
 
 def known() -> dict[str, tuple[str, str]]:
     """Full name (hinge_pin) -> (kind, name), of built-in elements and of the kernel store."""
-    from mstmm.runtime import store
+    from mstmm.runtime.kernels import store
 
     from . import stored
 

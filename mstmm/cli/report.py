@@ -7,8 +7,8 @@ from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mstmm.runtime.result import Result
-    from mstmm.runtime.verdict import Verdict
+    from mstmm.runtime.result.result import Result
+    from mstmm.runtime.result.verdict import Verdict
 
 
 def sizes(result: Result) -> str:
@@ -57,7 +57,7 @@ def default_quantities(result: Result) -> list[str]:
 
     The second is for scenes whose coordinates are all quaternions.
     """
-    from mstmm.runtime.table import default_names
+    from mstmm.runtime.result.output.table import default_names
 
     scene = result.model.scene
     body = scene.skeleton.bodies[-1]
@@ -67,7 +67,7 @@ def default_quantities(result: Result) -> list[str]:
 
 def default_panels(result: Result) -> list[str]:
     """What to draw if nobody asked: shapes of flexible bodies, and what the table shows."""
-    from mstmm.runtime.table import default_pictures
+    from mstmm.runtime.result.output.table import default_pictures
 
     return [*default_pictures(result), *default_quantities(result)] or ["energy"]
 

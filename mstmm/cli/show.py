@@ -108,7 +108,7 @@ def _views(element: str, at: str) -> list[ElementView]:
 
 def _kept(kind: str, name: str, at: str) -> ElementView:
     """An element of the user's kernel store: its kernels, as its equations are in its file."""
-    from mstmm.runtime import store
+    from mstmm.runtime.kernels import store
 
     full = f"{kind}_{name}"
     if at not in ("ir", "c"):

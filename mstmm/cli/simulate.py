@@ -18,9 +18,9 @@ from .options import Json, Times, not_negative, output_file, positive, python_fi
 from .progress import Bar, bar, waiting
 
 if TYPE_CHECKING:
-    from mstmm.runtime.model import Model
-    from mstmm.runtime.result import Result
-    from mstmm.runtime.verdict import Verdict
+    from mstmm.runtime.model.model import Model
+    from mstmm.runtime.result.result import Result
+    from mstmm.runtime.result.verdict import Verdict
     from mstmm.scene import Scene
 
 RESULTS = (".nc", ".csv")
@@ -275,10 +275,10 @@ def _saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
     """
     short = seconds < SHORT and not plan.resume
     if result.trajectory.success and (short if plan.certify is None else plan.certify):
-        from mstmm.runtime import storage
+        from mstmm.runtime.result.output import storage
 
         storage.save(result, plan.output)
-        from mstmm.runtime.results import certified
+        from mstmm.runtime.model.results import certified
 
         progress.label("estimating the error")
         result = certified(result, progress)
@@ -323,7 +323,7 @@ def load_method(name: str) -> None:
     SceneError for a method that does not exist.
     """
     if not name.startswith("scipy-"):
-        from mstmm.runtime.steppers import get
+        from mstmm.runtime.integrate.steppers import get
 
         get(name)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .beam.beams import BeamBodies
+from .beam.bodies import BeamBodies
 from .modal_body import ModalBody
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 
-from ..vectorized import evaluate
+from ..kernels.vectorized import evaluate
 from .modal_kernels import kernel
 from .parts import slices
 from .records import moments_of, section_inputs

@@ -19,7 +19,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from .beam.beam_shapes import BeamShapes
+from .beam.ports import BeamShapes
 from .modal_port import MassPoint, ModalPort
 from .moments import Moments
 

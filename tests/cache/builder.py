@@ -14,7 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cache.workbench import Kernel, scaled
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import cache, library_build, lock, process, self_test  # noqa: F401 - before fork
+from mstmm.runtime.host import lock, process  # noqa: F401 - before fork
+from mstmm.runtime.libraries import cache
 
 
 def child(factor: int) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from cache.workbench import Kernel, alive, assert_tidy, false_compiler, scaled
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import cache, self_test
+from mstmm.runtime.libraries import cache, self_test
 
 #: Script of the compiler -> what the message must say.
 BAD = {

@@ -16,8 +16,8 @@ import pytest
 
 from cache.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import cache, processor, toolchain
-from mstmm.runtime.cache_upkeep import clean, listed
+from mstmm.runtime.libraries import cache, processor, toolchain
+from mstmm.runtime.libraries.upkeep import clean, listed
 
 
 def test_second_time_nothing_is_printed_or_compiled(
@@ -44,9 +44,9 @@ def test_warm_hit_loads_neither_numpy_nor_what_starts_processes(cache_folder: Pa
     built = cache.library(Kernel().recipe)
     script = (
         "import sys; before = set(sys.modules)\n"
-        "from mstmm.runtime import cache\n"
+        "from mstmm.runtime.libraries import cache\n"
         "from pathlib import Path\n"
-        "from mstmm.runtime.library_build import found\n"
+        "from mstmm.runtime.libraries.build import found\n"
         f"assert found(Path({str(built.path.parent)!r}), {built.key!r}) is not None\n"
         "print(*(set(sys.modules) - before))\n"
     )
@@ -99,7 +99,7 @@ def _other_processor(recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Pa
 
 
 def _other_version(recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Path) -> cache.Recipe:
-    patch.setattr("mstmm.__version__", "99.9")
+    patch.setattr("mstmm.version.__version__", "99.9")
     return recipe
 
 

@@ -20,7 +20,7 @@ from cache.workbench import (
     without_privileges,
 )
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import cache
+from mstmm.runtime.libraries import cache
 
 
 def refusal() -> str:

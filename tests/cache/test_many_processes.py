@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 
 from cache.workbench import Kernel, alive, assert_tidy, entry_folders, false_compiler, scaled
-from mstmm.runtime import cache, lock
-from mstmm.runtime import entry as entries
-from mstmm.runtime.cache_upkeep import clean, unfinished
-from mstmm.runtime.library_build import remove_leftovers
+from mstmm.runtime.host import lock
+from mstmm.runtime.libraries import cache
+from mstmm.runtime.libraries import entry as entries
+from mstmm.runtime.libraries.build import remove_leftovers
+from mstmm.runtime.libraries.upkeep import clean, unfinished
 
 BUILDER = Path(__file__).parent / "builder.py"
 

@@ -15,9 +15,9 @@ import pytest
 import mstmm
 from cache.workbench import NOBODY, entry_folders, false_compiler
 from mstmm.fusion import Fusion
-from mstmm.runtime import cache
-from mstmm.runtime.cache_upkeep import listed
-from mstmm.runtime.fused import open_library
+from mstmm.runtime.kernels.fused import open_library
+from mstmm.runtime.libraries import cache
+from mstmm.runtime.libraries.upkeep import listed
 
 MASS, ARM, INERTIA, G = 1.7, 0.4, 0.3, 9.81
 #: Evaluations that repay any compiler.
@@ -173,7 +173,7 @@ def test_parameter_study_compiles_once(
     def never(*arguments: object) -> float:
         raise AssertionError("the compiler was asked again")
 
-    monkeypatch.setattr("mstmm.runtime.toolchain.build", never)
+    monkeypatch.setattr("mstmm.runtime.libraries.toolchain.build", never)
     heavier = model.with_parameters({"rod.mass": 2 * MASS})
     assert heavier.engine == "fused" and len(entry_folders(cache_folder)) == 1
     square = 2 * MASS * G * ARM / (INERTIA + 2 * MASS * ARM**2)

@@ -15,8 +15,8 @@ import pytest
 import mstmm
 from cache.workbench import false_compiler
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import store
-from mstmm.runtime.cache_folder import objection
+from mstmm.runtime.kernels import store
+from mstmm.runtime.libraries.folder import objection
 
 DEFINITIONS = Path(__file__).parents[1] / "user_elements" / "definitions"
 KNEE = {"type": "knee", "parameters": {"width": 0.06, "depth": 0.03, "slip": 0.4}}

@@ -13,9 +13,9 @@ from typing import Any
 
 import cffi
 
-from mstmm.runtime import entry as entries
-from mstmm.runtime.cache import Recipe
-from mstmm.runtime.library_build import LOCK, UNFINISHED
+from mstmm.runtime.libraries import entry as entries
+from mstmm.runtime.libraries.build import LOCK, UNFINISHED
+from mstmm.runtime.libraries.cache import Recipe
 
 #: A user who owns nothing here.
 NOBODY = 65534

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.commands import Command
-from mstmm.runtime import cache as libraries
+from mstmm.runtime.libraries import cache as libraries
 
 
 @pytest.fixture
@@ -161,7 +161,7 @@ def test_doctor_survives_kernels_that_do_not_load(
     def broken() -> None:
         raise RuntimeError("symbol lookup error")
 
-    monkeypatch.setattr("mstmm.runtime.prebuilt.elements", broken)
+    monkeypatch.setattr("mstmm.runtime.kernels.prebuilt.elements", broken)
     done = mstmm("doctor", "--json")
     problems = [f for f in json.loads(done.out)["findings"] if not f["ok"]]
     assert done.code == 3 and any("symbol lookup" in f["text"] for f in problems)

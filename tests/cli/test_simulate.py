@@ -233,7 +233,7 @@ def test_disk_too_full_for_netcdf(
     class Usage:
         free = 1000
 
-    monkeypatch.setattr("mstmm.runtime.storage.shutil.disk_usage", lambda path: Usage)
+    monkeypatch.setattr("mstmm.runtime.result.output.storage.shutil.disk_usage", lambda path: Usage)
     done = mstmm("simulate", "pendulum.toml", "--t-end", "0.1")
     assert done.code == 3 and "MB left" in done.err
     assert not list(folder.glob("*.nc")) and not list(folder.glob(".*.nc"))

@@ -18,9 +18,9 @@ from support.complex_arithmetic import complex_step
 import mstmm
 from mstmm.derive.evaluate import evaluate
 from mstmm.ir import KernelIR
-from mstmm.runtime.derivatives import Derivatives
-from mstmm.runtime.pack import pack
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.model.derivatives import Derivatives
+from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.structure import structure_of
 
 TIME = 0.3
 MOVING = tuple(name for name in SIZES if name != "fixed")

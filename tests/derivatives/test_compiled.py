@@ -12,8 +12,8 @@ from reference.compare import drawn, worst
 import mstmm
 from mstmm.columns_abi import SYMBOL
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import tangents
-from mstmm.runtime.columns import open_columns
+from mstmm.runtime.engine import tangents
+from mstmm.runtime.kernels.columns import open_columns
 
 ARRAYS = ("q", "u", "efforts", "t", "rate_q", "rate_u")
 TIME = 0.3

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mstmm.runtime.derivatives import Derivatives
+from mstmm.runtime.model.derivatives import Derivatives
 
 PAGE = (Path(__file__).parents[2] / "docs" / "use" / "derivatives.md").read_text("utf-8")
 

@@ -17,10 +17,10 @@ import mstmm
 from mstmm import rotations
 from mstmm.dual import Dual, Marks, atan2, hypot
 from mstmm.errors import SceneError
-from mstmm.runtime import parameters
-from mstmm.runtime.pack import pack
-from mstmm.runtime.seeded import slopes
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.pack import parameters
+from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.slopes import slopes
+from mstmm.runtime.pack.structure import structure_of
 
 TIME = 0.3
 #: Weights of the central difference of eighth order, for the steps 1 to 4.

@@ -18,7 +18,7 @@ from mstmm.derive.evaluate import evaluate_floats
 from mstmm.errors import SceneError
 from mstmm.fusion import Fusion, modes_at
 from mstmm.ir import KernelIR
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.pack.structure import structure_of
 
 AGREEMENT = 1e-13
 TIME = 0.3

@@ -15,10 +15,10 @@ from scipy.integrate import solve_ivp
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.one_way.oscillators import Cells, Oscillators
-from mstmm.runtime.flexible.one_way.response import Response, modal_loads, rigidity
-from mstmm.runtime.flexible.one_way.result import OneWayResult
-from mstmm.runtime.observed import Observed
+from mstmm.runtime.result.observed import Observed
+from mstmm.runtime.result.one_way.oscillators import Cells, Oscillators
+from mstmm.runtime.result.one_way.response import Response, modal_loads, rigidity
+from mstmm.runtime.result.one_way.result import OneWayResult
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import pytest
 
 import mstmm
 from mstmm.cli.guard import run as command
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
 
 #: Spin-up to 6 rad/s, 1.58 times the first frequency (theory: Simo and Vu-Quoc 1986).
 SPIN_UP = "where(t < 15, 0.4*(t^2/2 + (15/(2*pi))^2*(cos(2*pi*t/15) - 1)), 45 + 6*(t - 15))"

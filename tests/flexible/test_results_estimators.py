@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from support.beam_motions import EI_Y, EI_Z, LENGTH, MASS, beam, moving, under_tip_load
 
-from mstmm.runtime.flexible.results import certify, estimators
-from mstmm.runtime.flexible.results.certify import Flexibility, missed
-from mstmm.runtime.flexible.results.coupling import coupling
-from mstmm.runtime.flexible.results.observe_energy import frequencies, modal_energy, strain_energy
+from mstmm.runtime.result.flexible import certify, estimators
+from mstmm.runtime.result.flexible.certify import Flexibility, missed
+from mstmm.runtime.result.flexible.coupling import coupling
+from mstmm.runtime.result.flexible.energy import frequencies, modal_energy, strain_energy
 
 #: First root of the clamped-free beam, and its moments with unit mass and length: int phi,
 #: int phi x, shortening integrals G0, G1 and G(L) of the first shape.

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from support.beam_motions import LENGTH, MASS, beam, moving
 
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.results import observe
-from mstmm.runtime.flexible.results.observe import Motion
-from mstmm.runtime.flexible.results.observe_momentum import equivalent, frame_momentum, undeformed
+from mstmm.runtime.result.flexible import motion as observe
+from mstmm.runtime.result.flexible.momentum import equivalent, frame_momentum, undeformed
+from mstmm.runtime.result.flexible.motion import Motion
 
 Array = NDArray[np.float64]
 

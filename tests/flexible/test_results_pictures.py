@@ -11,8 +11,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 
 import mstmm
-from mstmm.runtime.flexible.results.plot_shapes import Strip, instants, plane, strip_height
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.flexible.plot_shapes import Strip, instants, plane, strip_height
+from mstmm.runtime.result.result import Result
 
 
 @pytest.fixture(scope="module")

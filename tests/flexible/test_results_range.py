@@ -10,8 +10,8 @@ from scipy.integrate import solve_bvp
 from support.models import model_of
 
 import mstmm
-from mstmm.runtime.flexible.results.estimators import shear_error
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.flexible.estimators import shear_error
+from mstmm.runtime.result.result import Result
 
 ENDS = {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 0.5]}}
 WALL = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "bar"}

@@ -11,7 +11,7 @@ from flexible import elastic_bar
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
 
 Array = NDArray[np.float64]
 

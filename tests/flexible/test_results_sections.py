@@ -10,8 +10,8 @@ import pytest
 from support.beam_motions import EI_Y, EI_Z, LENGTH, MASS, beam, moving, under_tip_load
 
 import mstmm
-from mstmm.runtime.flexible.results import observe
-from mstmm.runtime.flexible.results.observe_loads import LineLoad, PointLoad, section_loads
+from mstmm.runtime.result.flexible import motion as observe
+from mstmm.runtime.result.flexible.loads import LineLoad, PointLoad, section_loads
 
 X = np.linspace(0.0, LENGTH, 7)
 STILL = np.zeros(3)

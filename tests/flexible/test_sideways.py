@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.results.certify import flexibilities
-from mstmm.runtime.flexible.results.sideways import rule, sideways
-from mstmm.runtime.pack import expansion_of
+from mstmm.runtime.pack.pack import expansion_of
+from mstmm.runtime.result.flexible.certify import flexibilities
+from mstmm.runtime.result.flexible.sideways import rule, sideways
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from reference.tree import SIZES
 
 import mstmm
 from mstmm.derive.evaluate import evaluate_floats
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.pack.structure import structure_of
 
 AGREEMENT = 1e-13
 TIME = 0.3

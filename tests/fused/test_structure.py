@@ -15,8 +15,8 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.fusion import MOST_ASKED, MOST_BODIES, PRINTERS, Fusion
 from mstmm.ir import KernelIR
-from mstmm.runtime.pack import pack
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.structure import structure_of
 
 
 def chain(

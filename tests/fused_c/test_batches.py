@@ -10,7 +10,7 @@ from support.rod_scenes import chain, drawn_state
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime import batch
+from mstmm.runtime.engine import batch
 
 ENGINES = ("fused", "looped")
 HINGES = ["pin", "ball"]

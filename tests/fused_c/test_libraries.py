@@ -14,8 +14,8 @@ import mstmm
 from mstmm import fused_abi
 from mstmm.derive.fused_c import fused_sources
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.fused import Call, FusedLibrary, open_library
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.kernels.fused import Call, FusedLibrary, open_library
+from mstmm.runtime.pack.structure import structure_of
 
 KEY = "5" * 64
 MIXED = ["free", "pin", "ball", "prismatic"]

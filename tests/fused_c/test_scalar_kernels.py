@@ -14,7 +14,7 @@ from mstmm.derive.evaluate import evaluate
 from mstmm.graph import Graph
 from mstmm.ir import OPERATIONS, Port
 from mstmm.kernel_compilation import compile_kernel
-from mstmm.runtime.scalar_kernel import fractions
+from mstmm.runtime.kernels.scalar import fractions
 from mstmm.scalars import SCALARS
 
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")

@@ -15,8 +15,8 @@ import numpy as np
 
 import mstmm
 from mstmm.errors import MstmmError
-from mstmm.runtime.model import Model
-from mstmm.runtime.result import Result
+from mstmm.runtime.model.model import Model
+from mstmm.runtime.result.result import Result
 
 T_END = 0.05
 STEP = 0.01

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.integration_lab import Lab, Problem
 
-from mstmm.runtime.integrate import Run, Status
+from mstmm.runtime.integrate.loop import Run, Status
 
 NEVER = 1e300
 IGNORE, RESTART, STOP, CONTINUE = 0, 1, 2, 3

@@ -9,8 +9,8 @@ import pytest
 from support.integration_lab import Lab, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate import Run, Status
-from mstmm.runtime.steppers import Tableau, get
+from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.steppers import Tableau, get
 
 START = (1.0, 1.0)
 

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 from support.integration_lab import Lab, Problem, same_bits
 
-from mstmm.runtime.integrate import Status
-from mstmm.runtime.steppers import get
-from mstmm.runtime.tableau_in_c import c_tableau
+from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.steppers import get
+from mstmm.runtime.integrate.tableau_in_c import c_tableau
 
 Array = NDArray[np.float64]
 TIMES = (0.0, 0.35, 1.0, 1.1, 2.0)

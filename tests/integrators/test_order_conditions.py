@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, RK45
 
-from mstmm.runtime.steppers import Tableau, get
+from mstmm.runtime.integrate.steppers import Tableau, get
 
 #: A rooted tree is the sorted tuple of its branches.
 Tree = tuple["Tree", ...]

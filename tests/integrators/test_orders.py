@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import RK23, solve_ivp
 from support.integration_lab import Lab
 
-from mstmm.runtime.integrate import Status
-from mstmm.runtime.steppers import Tableau, from_monomials, frozen, get
+from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.steppers import Tableau, from_monomials, frozen, get
 
 ARENSTORF = (0.994, 0.0, 0.0, -2.00158510637908252240537862224)
 PERIOD = 17.0652165601579625588917206249

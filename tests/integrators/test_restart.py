@@ -12,7 +12,7 @@ import pytest
 from support.integration_lab import Lab, Problem, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate import Run, Samples, Status
+from mstmm.runtime.integrate.loop import Run, Samples, Status
 
 START = (1.0, 0.0)
 CASES: dict[str, tuple[str, dict[str, Any]]] = {

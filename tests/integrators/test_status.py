@@ -10,7 +10,7 @@ import pytest
 from support.integration_lab import Lab, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate import Run, Status
+from mstmm.runtime.integrate.loop import Run, Status
 
 ADAPTIVE = ("dopri5", "dop853")
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import DOP853, RK45
 
 from mstmm.errors import SceneError
-from mstmm.runtime import steppers
-from mstmm.runtime.steppers import from_monomials, frozen
+from mstmm.runtime.integrate import steppers
+from mstmm.runtime.integrate.steppers import from_monomials, frozen
 
 METHODS = ("rk4", "dopri5", "dop853", "pirk13")
 

@@ -14,8 +14,11 @@ import pytest
 from cli.commands import Command
 
 from mstmm import errors
-from mstmm.runtime import execution, interruptible, results, storage
-from mstmm.runtime.files import replacing
+from mstmm.runtime.host import interruptible
+from mstmm.runtime.host.files import replacing
+from mstmm.runtime.model import results
+from mstmm.runtime.result.output import storage
+from mstmm.runtime.run import execution
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
 KEPT = "the run is kept in a.csv.checkpoint; continue with the same command and --resume"
@@ -76,7 +79,7 @@ def test_an_interrupt_while_the_error_is_estimated(
 WRITER = """
 import sys, time
 from pathlib import Path
-from mstmm.runtime.files import replacing
+from mstmm.runtime.host.files import replacing
 with replacing(Path(sys.argv[1])) as file:
     file.write_text("half")
     print("half", flush=True)

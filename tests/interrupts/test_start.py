@@ -83,7 +83,7 @@ def test_an_ignored_interrupt_is_ignored_from_the_start(tmp_path: Path) -> None:
 def test_a_library_leaves_signals_alone() -> None:
     program = (
         "import signal; before = [signal.getsignal(n) for n in (2, 15)]\n"
-        "import mstmm, mstmm.runtime.simulate\n"
+        "import mstmm, mstmm.runtime.run.simulate\n"
         "print(before == [signal.getsignal(n) for n in (2, 15)])"
     )
     done = subprocess.run(

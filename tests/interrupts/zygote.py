@@ -21,7 +21,7 @@ from typing import Any
 
 from mstmm import interrupts
 from mstmm.cli import guard
-from mstmm.runtime import execution, simulate
+from mstmm.runtime.run import execution, simulate
 
 #: Events of Python's audit that are steps of files, each told before it happens.
 STEPS = {"open", "os.rename", "os.remove", "os.truncate", "os.chmod", "fcntl.flock"}

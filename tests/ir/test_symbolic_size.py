@@ -21,7 +21,7 @@ from mstmm.derive.show_ir import listing
 from mstmm.errors import NumericalFailure
 from mstmm.graph import Graph
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json
-from mstmm.runtime import vectorized
+from mstmm.runtime.kernels import vectorized
 from mstmm.tangent import tangent
 
 n = sp.Symbol("n", integer=True, positive=True)

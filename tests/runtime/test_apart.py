@@ -16,9 +16,9 @@ import pytest
 from flexible import elastic_bar as bar
 
 from mstmm.errors import EnvironmentFailure, SceneError
-from mstmm.runtime.apart import apart
 from mstmm.runtime.flexible.elastic import bodies
 from mstmm.runtime.flexible.modal_body import ModalBody
+from mstmm.runtime.host.apart import apart
 
 #: `hold` keeps Python's lock, as a sparse factorisation does.
 MODULE = """\

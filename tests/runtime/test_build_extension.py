@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import pytest
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import prebuilt
-from mstmm.runtime.build_extension import built_from, cdef, headers
+from mstmm.runtime.kernels import prebuilt
+from mstmm.runtime.libraries.build_extension import built_from, cdef, headers
 
 ROOT = Path(__file__).resolve().parents[2]
 INNER = """\
@@ -51,8 +51,9 @@ def project(tmp_path: Path) -> Path:
     (tmp_path / "generated" / "z_inner.h").write_text(INNER)
     (tmp_path / "generated" / "a_outer.h").write_text(OUTER)
     (tmp_path / "generated" / "twice.c").write_text(SOURCE)
-    (tmp_path / "runtime").mkdir()
-    shutil.copy(ROOT / "runtime" / "build_extension.py", tmp_path / "runtime")
+    builder = Path("runtime", "libraries", "build_extension.py")
+    (tmp_path / builder.parent).mkdir(parents=True)
+    shutil.copy(ROOT / builder, tmp_path / builder)
     shutil.copy(ROOT / "setup.py", tmp_path)
     return tmp_path
 

@@ -13,7 +13,7 @@ from support.written_out import plain_name, written_out
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.model import Model
+from mstmm.runtime.model.model import Model
 from mstmm.scene import Scene
 
 Array = NDArray[np.float64]

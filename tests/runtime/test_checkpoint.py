@@ -17,8 +17,8 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime import execution
-from mstmm.runtime.integrate import Run
+from mstmm.runtime.integrate.loop import Run
+from mstmm.runtime.run import execution
 
 #: Runs a scene from a file; says where it is, so that the parent can interrupt it half-way.
 PROGRAM = """
@@ -105,7 +105,7 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
 
 def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
     """Ctrl-C, from within, as soon as a run has passed this time."""
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
 
     def look(self: execution.Watch, run: Run, earlier: object) -> None:
         if run.t > at:
@@ -201,7 +201,7 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
 ) -> None:
     model = mstmm.compile(pins(2, [0.3, 0.4]))
     monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -218,7 +218,7 @@ def test_checkpoints_are_written_on_the_way(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
     path, seen = tmp_path / "run.npz", list[int]()
 
     def progress(t: float, t_end: float) -> None:
@@ -261,7 +261,7 @@ def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
 
 @pytest.mark.parametrize("certify", [False, True])
 def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: bool) -> None:
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
     told = list[tuple[float, float]]()
     model = mstmm.compile(pins(1, [0.3]))
     run = model.simulate(2.0, progress=lambda *x: told.append(x), certify=certify)
@@ -273,7 +273,7 @@ def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: boo
 def test_a_progress_callback_that_raises_does_not_break_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
     calls = list[float]()
 
     def progress(t: float, t_end: float) -> None:
@@ -293,7 +293,7 @@ def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
 def test_ctrl_c_in_the_second_run_costs_the_estimate_only(
     heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
 
     def look(self: execution.Watch, run: Run, earlier: object) -> None:
         if self.run == 1 and run.t > 0.5:

@@ -11,7 +11,7 @@ from support.result_scenes import motor, pins, rod
 
 import mstmm
 from mstmm.errors import UndeterminedMotion
-from mstmm.runtime.integrate import Status
+from mstmm.runtime.integrate.loop import Status
 
 
 def pair(**more: Any) -> mstmm.Scene:

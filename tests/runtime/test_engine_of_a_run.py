@@ -14,9 +14,9 @@ from support.rod_scenes import chain
 
 import mstmm
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime import simulate
-from mstmm.runtime.model import Model
-from mstmm.runtime.result import Result
+from mstmm.runtime.model.model import Model
+from mstmm.runtime.result.result import Result
+from mstmm.runtime.run import simulate
 
 LONG: dict[str, Any] = {"t_end": 12000.0, "rtol": 1e-6, "atol": 1e-8, "output_times": [12000.0]}
 SHORT: dict[str, Any] = {"t_end": 2.0, "rtol": 1e-9, "atol": 1e-11}

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime.error_estimate import SAFETY, ErrorEstimate, compare
-from mstmm.runtime.observed import quaternions
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.observed import quaternions
+from mstmm.runtime.result.result import Result
+from mstmm.runtime.run.error_estimate import SAFETY, ErrorEstimate, compare
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime.integrate import Status
-from mstmm.runtime.result import Result
+from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.result.result import Result
 
 
 def check_remains(run: Result) -> None:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from support.result_scenes import motor, pins, tree
 
 import mstmm
-from mstmm.runtime import jacobian
-from mstmm.runtime.second_opinion import Equations
+from mstmm.runtime.engine import jacobian
+from mstmm.runtime.run.second_opinion import Equations
 
 Array = NDArray[np.float64]
 

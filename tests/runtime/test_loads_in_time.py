@@ -99,7 +99,7 @@ def test_a_fixed_step_that_may_miss_a_pulse_is_told() -> None:
 
 def test_the_second_run_looks_elsewhere() -> None:
     """Nothing moves: the first run makes long steps, the second one shorter ones."""
-    from mstmm.runtime.error_estimate import tighter
+    from mstmm.runtime.run.error_estimate import tighter
 
     run = pushed("0*t", 10.0).trajectory
     second, _ = tighter(run)

@@ -9,7 +9,7 @@ from reference.closed_forms import pendulum_angle
 from support.result_scenes import pins, tree
 
 import mstmm
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
 
 Array = NDArray[np.float64]
 
@@ -266,7 +266,7 @@ def test_arrays_that_are_kept_cannot_be_changed(run: Result) -> None:
 def test_quantities_come_out_the_same_in_small_batches(
     run: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mstmm.runtime import observed
+    from mstmm.runtime.result import observed
 
     monkeypatch.setattr(observed, "_BATCH", 10)
     other = Result(run.model, run.trajectory)

@@ -16,7 +16,7 @@ import xarray
 from support.result_scenes import motor, pins, tree
 
 import mstmm
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
 
 
 @pytest.fixture(scope="module")
@@ -226,7 +226,7 @@ def test_changed_bytes_never_reach_the_library(
     whole = path.read_bytes()
     with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
         np.testing.assert_array_equal(file["q"], run.q)  # others read it as it is
-    monkeypatch.delattr("mstmm.runtime.loading._read")
+    monkeypatch.delattr("mstmm.runtime.model.loading._read")
     for place in (0, 600, len(whole) // 2, len(whole) - 100):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
         with pytest.raises(mstmm.SceneError, match="damaged, or was changed since it was written"):

@@ -12,9 +12,9 @@ from support.models import model_of
 from support.result_scenes import motor, pins, tree
 
 import mstmm
-from mstmm.runtime.curves import curve
-from mstmm.runtime.names_of import Quantity
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.names import Quantity
+from mstmm.runtime.result.output.curves import curve
+from mstmm.runtime.result.result import Result
 
 
 @pytest.fixture(scope="module")

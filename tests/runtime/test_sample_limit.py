@@ -6,7 +6,7 @@ import pytest
 from support.result_scenes import pins
 
 import mstmm
-from mstmm.runtime import simulate
+from mstmm.runtime.run import simulate
 
 
 def test_a_run_stops_before_its_samples_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:

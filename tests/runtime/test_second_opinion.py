@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from support.result_scenes import motor, pins, rod, tree
 
 import mstmm
-from mstmm.runtime import second_opinion
-from mstmm.runtime.integrate import Status
+from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.run import second_opinion
 
 Array = NDArray[np.float64]
 

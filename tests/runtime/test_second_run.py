@@ -10,8 +10,8 @@ from support.models import model_of
 from support.result_scenes import motor, pins
 
 import mstmm
-from mstmm.runtime.error_estimate import alike, tighter
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
+from mstmm.runtime.run.error_estimate import alike, tighter
 
 
 def true_error(run: Result) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.integrate import Samples, Status
-from mstmm.runtime.settings import Settings
-from mstmm.runtime.simulate import make_run
-from mstmm.runtime.system import SceneSystem
+from mstmm.runtime.integrate.loop import Samples, Status
+from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.run.simulate import make_run
+from mstmm.runtime.run.system import SceneSystem
 
 METHODS = ("dopri5", "dop853", "pirk13", "scipy-RK45", "scipy-DOP853")
 
@@ -169,8 +169,8 @@ def test_scipys_methods_end_where_a_motion_sticks() -> None:
 
 
 def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mstmm.runtime.switches.MOST", 1)
-    monkeypatch.setattr("mstmm.runtime.system.MOST", 1)
-    monkeypatch.setattr("mstmm.runtime.run_notes.MOST", 1)
+    monkeypatch.setattr("mstmm.runtime.pack.switches.MOST", 1)
+    monkeypatch.setattr("mstmm.runtime.run.system.MOST", 1)
+    monkeypatch.setattr("mstmm.runtime.run.notes.MOST", 1)
     result = moved("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
     assert any("more than 1 conditions depend on the motion" in text for text in result.warnings)

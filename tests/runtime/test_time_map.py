@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mstmm.expression import Expression, parse
-from mstmm.runtime.acting import Acting
-from mstmm.runtime.enclosures import enclose, of_time
-from mstmm.runtime.intervals import Interval
-from mstmm.runtime.time_map import TimeMap, time_map
+from mstmm.runtime.breaks.acting import Acting
+from mstmm.runtime.breaks.enclosures import enclose, of_time
+from mstmm.runtime.breaks.intervals import Interval
+from mstmm.runtime.breaks.times import TimeMap, time_map
 
 SHAPES = [
     "sin(3*t)^2 - cos(t/2)", "t^3 - 2*t^2 + t", "exp(-t)*tan(t/3)", "sqrt(t)/(1 + t^2)",

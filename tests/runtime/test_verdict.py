@@ -10,8 +10,8 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime.result import Result
-from mstmm.runtime.verdict import Verdict
+from mstmm.runtime.result.result import Result
+from mstmm.runtime.result.verdict import Verdict
 
 
 def test_a_clean_certified_run_is_trusted() -> None:

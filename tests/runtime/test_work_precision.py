@@ -9,8 +9,8 @@ from support.rod_scenes import chain
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.settings import Settings
-from mstmm.runtime.work_precision import WorkPoint, cheapest, run_once, work_precision
+from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.model.work_precision import WorkPoint, cheapest, run_once, work_precision
 
 TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)
 

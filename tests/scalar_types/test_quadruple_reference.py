@@ -13,8 +13,8 @@ from support.rod_scenes import chain, drawn_state
 from support.scalar_kernels import ScalarKernel, farthest
 
 import mstmm
-from mstmm.runtime.pack import pack
-from mstmm.runtime.structure import structure_of
+from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.structure import structure_of
 
 
 def reference(

@@ -12,10 +12,10 @@ from reference.compare import fresh, worst
 from support.rod_scenes import chain
 
 import mstmm
-from mstmm.runtime.calls import Observation
-from mstmm.runtime.engine import Engine
-from mstmm.runtime.pack import pack
-from mstmm.runtime.packed import Packed
+from mstmm.runtime.engine.calls import Observation
+from mstmm.runtime.engine.engine import Engine
+from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.packed import Packed
 
 AXIAL = ("pin", "prismatic", "cylindrical", "screw")
 ACCURACY = 1e-11

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import mstmm
 from mstmm.runtime.flexible.bodies import modal_bodies
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.results.observe import Motion
+from mstmm.runtime.result.flexible.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import ArrayLike
 
 import mstmm.templates
-from mstmm.runtime.build_extension import cdef
-from mstmm.runtime.integrate import Run, Status
-from mstmm.runtime.steppers import Tableau, get
+from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.steppers import Tableau, get
+from mstmm.runtime.libraries.build_extension import cdef
 
 from .c_library import compile_library
 

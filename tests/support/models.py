@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mstmm
-from mstmm.runtime.result import Result
+from mstmm.runtime.result.result import Result
 
 
 def model_of(result: Result) -> mstmm.Model:

@@ -12,7 +12,7 @@ from mstmm.arrays import Array
 from mstmm.ir import KernelIR
 from mstmm.stored import element_from_json
 
-from ... import vectorized
+from ...kernels import vectorized
 
 
 @cache

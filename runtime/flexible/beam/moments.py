@@ -10,8 +10,8 @@ from mstmm.arrays import Array
 
 from ..moments import Moments
 from . import kernels as beam_kernels
-from .beam_shapes import BeamShapes, without_noise
 from .multilinear import Row, Term, Terms, add_products, known, rows_of, terms
+from .ports import BeamShapes, without_noise
 
 
 def mass_moments(shapes: BeamShapes) -> Moments:

@@ -10,8 +10,8 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..modal_port import MassPoint
-from .beam_shapes import BeamShapes
 from .gauss import gauss
+from .ports import BeamShapes
 from .shape_fields import DIRECTIONS
 
 #: Most numbers of second order that the sections of all points may hold together: a quarter of a

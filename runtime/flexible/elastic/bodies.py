@@ -17,7 +17,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.scene_rules import GROUND, split
 
-from ...apart import apart
+from ...host.apart import apart
 from ..computable import computed
 from ..definiteness import stays_definite
 from ..modal_body import ModalBody

@@ -12,7 +12,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene_errors import near
 
-from ...files import read_arrays, refuse_special
+from ...host.files import read_arrays, refuse_special
 from .model import ElasticModel
 
 _MATRICES = ("mass", "stiffness", "scalar_mass")

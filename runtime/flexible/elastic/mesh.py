@@ -16,7 +16,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.extras import missing
 
-from ...files import refuse_special
+from ...host.files import refuse_special
 from .mesh_references import refuse_outside
 from .model import ElasticModel
 

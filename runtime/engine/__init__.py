@@ -1,0 +1,1 @@
+"""Evaluations of a packed scene: accelerations, inverse dynamics, observations, tangents."""

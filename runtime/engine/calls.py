@@ -1,0 +1,222 @@
+"""Calls into the looped engine: numpy in, numpy out, failures as sentences naming the element."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..pack.packed import Packed
+
+UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT, _SECTION, _MODES = range(1, 9)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A point with axes: body in the topology (-1 ground), axes (9), offset (3), internal axes."""
+
+    body: int
+    axes: tuple[float, ...]
+    offset: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a batch of n states shows; inertial axes.
+
+    points: (n, probes, 24): position, velocity, acceleration, angular velocity, angular
+    acceleration, rotation matrix (row by row).  loads: (n, bodies, 6) force and moment of each
+    inboard hinge.  efforts, udot: (n, nu).  sums: (n, 10): kinetic, gravity and spring energy,
+    power, momentum (3), angular momentum about the inertial origin (3).
+    """
+
+    points: Array
+    loads: Array
+    efforts: Array
+    udot: Array
+    sums: Array
+    failures: tuple[str, ...] = ()
+
+
+#: The arrays of an Observation.
+PARTS = ("points", "loads", "efforts", "udot", "sums")
+
+
+class Calls:
+    """The compiled engine on one packed scene.  Safe to call from several threads."""
+
+    def __init__(self, packed: Packed) -> None:
+        self.packed = packed
+        self.ffi, self.lib = packed.ffi, packed.lib
+        self.nq, self.nu = packed.layout.nq, packed.layout.nu
+        self._local = threading.local()
+
+    def workspace(self) -> Any:
+        """This thread's workspace as `real *`."""
+        size = int(self.packed.model.workspace)
+        if getattr(self._local, "size", None) != size:
+            self._local.array = np.zeros(size)
+            self._local.pointer = self.pointer(self._local.array)
+            self._local.size = size
+        return self._local.pointer
+
+    def workspace_array(self) -> Array:
+        """The numbers this thread's last call left in its workspace, a view."""
+        self.workspace()
+        return np.asarray(self._local.array)
+
+    def pointer(self, array: Array) -> Any:
+        """`real *` to a contiguous array of doubles."""
+        return self.ffi.from_buffer("real[]", array)
+
+    def start_memory(self) -> Array:
+        """Memory at the start: nothing released, no turns counted."""
+        return np.zeros(max(1, self.packed.n_memory))
+
+    @cached_property
+    def inertia_alone(self) -> Self:
+        """The same tree without gravity, laws, drives and loads."""
+        model = self.ffi.new("mstmm_model *", self.packed.model[0])
+        for k in range(3):
+            model.gravity[k] = 0.0
+        model.n_laws = model.n_drives = model.n_values = 0
+        model.n_loads = model.n_forces = model.needs_pose = 0
+        model.product = self.ffi.NULL
+        return type(self)(replace(self.packed, model=model))
+
+    def probes(self, probes: Sequence[Probe]) -> Any:
+        """`mstmm_probe[]`."""
+        records = self.ffi.new("mstmm_probe[]", max(1, len(probes)))
+        for record, probe in zip(records, probes, strict=False):
+            record.body = probe.body
+            record.axes = list(probe.axes)
+            record.offset = list(probe.offset)
+        return records
+
+    def observe(
+        self,
+        t: Array,
+        q: Array,
+        u: Array,
+        memory: Array,
+        probes: Sequence[Probe] = (),
+        parts: Collection[str] = PARTS,
+    ) -> Observation:
+        """What `parts` name of n states.
+
+        A state that cannot be evaluated gives nan in its row; `failures` has a sentence for the
+        first of each kind.  Arrays that are not asked for have no columns.
+        """
+        n, place = len(t), {name: i for i, name in enumerate(PARTS)}
+        bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
+        shapes = [
+            (len(probes), numbers), (bodies, 6), (self.nu,), (self.nu,),
+            (int(self.lib.MSTMM_SUM_NUMBERS),),
+        ]  # fmt: skip
+        arrays = [
+            np.full((n, *shape), np.nan) if name in parts else np.empty((n, *shape[:-1], 0))
+            for name, shape in zip(PARTS, shapes, strict=True)
+        ]
+        states = [np.ascontiguousarray(x, dtype=np.float64) for x in (t, q, u, memory)]
+        wanted = self.ffi.new("mstmm_observation *")
+        records = self.probes(probes)
+        wanted.n_probes, wanted.probes = len(probes), records
+        failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
+        failures: dict[tuple[int, int], list[str]] = {}
+        first = 0
+        while first < n:
+            for name in parts:
+                setattr(wanted, name, self.pointer(arrays[place[name]][first:]))
+            code = self.lib.mstmm_observe_many(
+                self.packed.model, self.workspace(), n - first,
+                *(self.pointer(x[first:]) for x in states), wanted, failure, at,
+            )  # fmt: skip
+            if not code:
+                break
+            text = self.failure_text(failure, float(states[0][first + int(at[0])]))
+            failures.setdefault((int(failure.reason), int(failure.element)), []).append(text)
+            first += int(at[0]) + 1
+        points, loads, efforts, udot, sums = arrays
+        return Observation(
+            points, loads, efforts, udot, sums, tuple(map(_first, failures.values()))
+        )
+
+    # --- words ----------------------------------------------------------------------------------
+
+    def hinge_name(self, position: int) -> str:
+        """Name of the inboard hinge of the body at this place of the topology."""
+        packed = self.packed
+        return packed.scene.hinges.name(packed.topology.at(position)[1])
+
+    def is_flexible(self, position: int) -> bool:
+        """Whether the body at this place of the topology belongs to a flexible one."""
+        expanded = self.packed.expanded
+        return expanded is not None and expanded.is_node(self.body_name(position))
+
+    def body_name(self, position: int) -> str:
+        """Name of the body at this place of the topology."""
+        packed = self.packed
+        return packed.scene.bodies.name(packed.topology.at(position)[0])
+
+    def failure_text(self, failure: Any, t: float) -> str:
+        """A failure of the engine as a sentence: element, cause, time, one way out."""
+        at = f"at t = {t:.9g} s"
+        reason, element = int(failure.reason), int(failure.element)
+        if reason == UNDETERMINED and self.is_flexible(element):
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: what it moves has no positive inertia '
+                f'left: the shapes of the flexible body "{self.body_name(element).split("/")[0]}" '
+                "carry it all, or its deflection is beyond the stiffened model; use fewer shapes, "
+                'frame = "chord" or "mean", quadrature = true, or split it into welded beams'
+            )
+        if reason == UNDETERMINED:
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
+                "what it carries has no positive inertia in that direction (a thin rod on a ball, "
+                "a point mass, collinear axes, a negative principal moment); give the body "
+                "inertia, give the hinge rotor inertia (law.inertia), or fix that motion"
+            )
+        if reason == _FORCE:
+            name = self.packed.scene.spring[element].name
+            return (
+                f'spring "{name}" {at}: its direction is undefined because its ends coincide; move '
+                "one of them, or put an elastic hinge in its place"
+            )
+        if reason == _HINGE:
+            return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
+        if reason == _SECTION:
+            name = self.hinge_name(element).replace("/", ".")
+            return (
+                f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, '
+                "far beyond small deflections; split the body into several that are welded together"
+            )
+        if reason == _MODES:
+            name = self.body_name(element)
+            return (
+                f'flexible body "{name}" {at}: its modal mass matrix is not positive definite; '
+                'use fewer shapes, frame = "chord" or "mean", or quadrature = true'
+            )
+        if reason == _PIVOT:
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '
+                'vanishes, so the product does not exist in this state; use sweep = "riccati"'
+            )
+        if reason == _PRODUCT:
+            return (
+                f"the product of transfer matrices {at}: its deviation from the Riccati sweep "
+                "exceeds the accuracy asked for (errors grow geometrically along the chain); "
+                'use sweep = "riccati"'
+            )
+        return f"an expression of the scene cannot be evaluated {at}"
+
+
+def _first(texts: list[str]) -> str:
+    """The first of equal failures, with how many follow."""
+    more = len(texts) - 1
+    return texts[0] + (f" ({more} more samples alike)" if more else "")

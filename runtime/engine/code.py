@@ -1,0 +1,75 @@
+"""What a model knows of the fused code of its scene; how it is made is not this room's affair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+if TYPE_CHECKING:
+    from ..kernels.columns import ColumnsLibrary
+    from ..kernels.fused import FusedLibrary
+
+
+class Fusing(Protocol):
+    """Fused libraries of a scene: `library` for one state, `lanes` for several side by side.
+
+    `numbers` is the vector p they read; `note` says where the library came from, `obstacle` why
+    there can be none.  `ready(n)` gives a library if it is there or if n evaluations are worth a
+    compiler run; `find()` only looks; `build()` raises EnvironmentFailure where there can be none;
+    `follow(other)` takes over the libraries of the same scene with other numbers.
+    """
+
+    library: FusedLibrary | None
+    lanes: FusedLibrary | None
+    numbers: Array
+    note: str
+    obstacle: str
+
+    def find(self) -> FusedLibrary | None: ...
+    def build(self) -> FusedLibrary: ...
+    def follow(self, other: Any) -> None: ...
+    def ready(self, evaluations: float) -> FusedLibrary | None: ...
+    def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
+    def fused(self, structure: Any) -> Any: ...
+    def columns(
+        self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
+    ) -> ColumnsLibrary | None: ...
+
+
+@dataclass
+class NotFused:
+    """A scene that runs on the looped engine alone."""
+
+    obstacle: str = "this model was made without the means to compile fused code"
+    library: FusedLibrary | None = None
+    lanes: FusedLibrary | None = None
+    note: str = ""
+    numbers: Array = field(default_factory=lambda: np.zeros(0))
+
+    def find(self) -> None:
+        return None
+
+    def build(self) -> FusedLibrary:
+        from mstmm.errors import EnvironmentFailure
+
+        raise EnvironmentFailure(f'{self.obstacle}; use mstmm.compile(scene, engine="fused")')
+
+    def follow(self, other: Any) -> None:
+        pass
+
+    def ready(self, evaluations: float) -> None:
+        return None
+
+    def ready_lanes(self, evaluations: float) -> None:
+        return None
+
+    def fused(self, structure: Any) -> Any:
+        return self.build()
+
+    def columns(self, structure: Any, kernels: Callable[[], Any], what: str, build: bool) -> None:
+        return None

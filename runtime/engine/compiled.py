@@ -1,0 +1,98 @@
+"""Compiled: a scene packed for the engines, which runs, results and models are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Self
+
+from mstmm.scene import Scene
+
+from ..flexible.modal_body import ModalBody
+from ..pack import parameters as named_parameters
+from ..pack.bodies import Known
+from ..pack.layout import Layout
+from ..pack.pack import pack
+from ..pack.packed import Packed
+from .code import Fusing, NotFused
+from .engine import Engine
+
+
+class Compiled:
+    """A scene ready for evaluation.
+
+    Attributes:
+        scene: as it was given.
+        known: elements that are not prebuilt, by (kind, name).
+        looped: the looped engine on the packed scene.
+        fusion: what is known of the fused code of the scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        known: Known | None = None,
+        fusing: Callable[[Packed, Known], Fusing] | None = None,
+        product_accuracy: float | None = None,
+    ) -> None:
+        self.scene, self.known = scene, known
+        self._fusing, self._product_accuracy = fusing, product_accuracy
+        self.looped = Engine(pack(scene, known, product_accuracy))
+        self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
+
+    @property
+    def packed(self) -> Packed:
+        """The numbers of the scene in internal frames."""
+        return self.looped.packed
+
+    @property
+    def engine(self) -> str:
+        """The engine in use: "fused" or "looped"."""
+        return "looped" if self.fusion.library is None else "fused"
+
+    @property
+    def engine_choice(self) -> str:
+        """The engine in use and why, in words."""
+        f = self.fusion
+        if f.library is not None:
+            return f"fused: {f.note}"
+        if f.obstacle:
+            return f"looped: {f.obstacle}"
+        return "looped: fused code of this scene is not compiled yet; a long run or batch builds it"
+
+    @property
+    def layout(self) -> Layout:
+        """Places of hinges in q and u."""
+        return self.packed.layout
+
+    @property
+    def flexible(self) -> Mapping[str, ModalBody]:
+        """Numbers of the flexible bodies by their names: modes, moments, stiffness, ports."""
+        return self.packed.flexible
+
+    @property
+    def nq(self) -> int:
+        return self.looped.nq
+
+    @property
+    def nu(self) -> int:
+        return self.looped.nu
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every number of the scene that has a name, such as "rod1.mass"."""
+        return named_parameters.read(self.scene)
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Self:
+        """The same scene with other numbers.
+
+        Nothing is compiled again, but where the model is fused and a number that was exactly zero
+        (or an axis along a coordinate axis) changes; then other code is compiled or found.
+
+        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
+        """
+        changed = type(self)(
+            named_parameters.changed(self.scene, changes), self.known, self._fusing,
+            self._product_accuracy,
+        )  # fmt: skip
+        changed.fusion.follow(self.fusion)
+        return changed

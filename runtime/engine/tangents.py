@@ -1,0 +1,121 @@
+"""Tangent kernels of one scene, on the tape that is always there or compiled where that pays."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import EnvironmentFailure
+from mstmm.ir import Constant, KernelIR, Store
+from mstmm.structure import Structure
+from mstmm.tangent import PREFIX, tangent
+
+from ..kernels.columns import ColumnsLibrary
+from ..kernels.tape import TapeKernel
+from .code import Fusing
+
+#: Inputs of the kernel "accelerations", in its order.
+INPUTS = ("p", "t", "q", "u", "memory", "efforts")
+
+#: What is differentiated by what: (input, output).
+PAIRS = (
+    ("u", "qdot"), ("q", "qdot"), ("q", "udot"), ("u", "udot"), ("efforts", "udot"),
+    ("t", "udot"), ("p", "udot"),
+)  # fmt: skip
+
+#: Directions that are worth a compiler run.  Its time and what a direction gains both grow with the
+#: size of the kernels; measured break-even between 130 000 (7 balls) and 490 000 (24 pins).
+WORTH_COMPILING = 300_000
+
+
+class Tangents:
+    """Derivatives of the accelerations of one structure along given directions.
+
+    Safe to call from several threads.  Compiled code and the tape agree to rounding.
+    """
+
+    def __init__(self, fusion: Fusing, structure: Structure, parameters: bool) -> None:
+        self._fusion, self.structure = fusion, structure
+        self._pairs = PAIRS if parameters else PAIRS[:-1]
+        self._tapes: dict[tuple[str, str], TapeKernel | None] = {}
+        self._lock = threading.Lock()
+        self._directions = 0
+        self._obstacle = ""
+        self._library = self._get(build=False)
+
+    def expect(self, directions: int) -> None:
+        """So many directions are to come: the compiler is started once it pays in all."""
+        with self._lock:
+            self._directions += directions
+            if self._library is None and self._directions > WORTH_COMPILING:
+                self._library = self._get(build=True)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether compiled code is in use."""
+        return self._library is not None
+
+    def columns(
+        self, port: str, output: str, states: Mapping[str, Array], directions: Array
+    ) -> Array:
+        """Derivatives (states, n, length) of `output` along directions of the input `port`.
+
+        `states[name]` (states or 1, width) for every input; `directions` (states or 1, n, width).
+        """
+        if self._library is not None:
+            inputs = [states[name] for name in INPUTS]
+            return self._library.run(self._pairs.index((port, output)), inputs, directions)
+        with self._lock:
+            return self._interpreted(port, output, states, directions)
+
+    def _interpreted(
+        self, port: str, output: str, states: Mapping[str, Array], directions: Array
+    ) -> Array:
+        length = self.structure.nq if output == "qdot" else self.structure.nu
+        count = max(len(directions), *map(len, states.values()))
+        found = np.zeros((count, directions.shape[1], length))
+        if (port, output) not in self._tapes:
+            kernel = self._kernel(port, output)
+            self._tapes[port, output] = None if _vanishes(kernel) else TapeKernel(kernel)
+        tape = self._tapes[port, output]
+        if tape is None:
+            return found
+        for i in range(count):
+            given = {name: rows[min(i, len(rows) - 1)] for name, rows in states.items()}
+            for k, direction in enumerate(directions[min(i, len(directions) - 1)]):
+                _, outputs = tape.run({**given, PREFIX + port: direction})
+                given = {}  # the inputs of the state stay
+                found[i, k] = outputs[PREFIX + output][:length]
+        return found
+
+    @cached_property
+    def _accelerations(self) -> KernelIR:
+        kernel: KernelIR = self._fusion.fused(self.structure).kernels["accelerations"]
+        return kernel
+
+    def _kernel(self, port: str, output: str) -> KernelIR:
+        """The derivative of `output` along a direction of `port`, and nothing else."""
+        return tangent(self._accelerations, [port], [output], values=False, guards=False)
+
+    def _get(self, build: bool) -> ColumnsLibrary | None:
+        if self._obstacle:
+            return None
+        what = " ".join(f"{output}/{port}" for port, output in self._pairs)
+        try:
+            return self._fusion.columns(self.structure, self._kernels, what, build)
+        except EnvironmentFailure as error:
+            self._obstacle = str(error)
+            return None
+
+    def _kernels(self) -> Sequence[KernelIR]:
+        return [self._kernel(port, output) for port, output in self._pairs]
+
+
+def _vanishes(kernel: KernelIR) -> bool:
+    """Whether everything that the kernel stores is the constant zero."""
+    stores = [s for s in kernel.statements if isinstance(s, Store)]
+    return all(s.value == Constant("0") for s in stores)

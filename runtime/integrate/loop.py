@@ -1,0 +1,433 @@
+"""A time integration from Python: a thin hold on the C loop of `engine_integrate.c`.
+
+`Run` owns the arrays of a run and translates its numbers into words.  It knows nothing of
+mechanics: the system is a `mstmm_system` that the caller has filled, so that a scene, a test
+system in C or a few cffi call-backs are all the same to it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array, Integers
+from mstmm.errors import SceneError
+
+from .steppers import Tableau
+from .tableau_in_c import c_tableau
+
+_SAMPLE_DOUBLES = 2**19  # of one buffer, about 4 MB
+_ARGUMENTS = {
+    1: "the sizes of state, events or memory",
+    2: "the times: both finite, t_end not before t_start",
+    3: "the tolerances or steps: absolute tolerances above zero, nothing negative, "
+    "and a method with an error estimate unless the step is fixed",
+    4: "the breaks and the starts of bounds: finite and strictly increasing",
+    5: "the output times: finite, strictly increasing and within the run",
+    6: "the sample buffer",
+}
+
+
+class Status(IntEnum):
+    """Why the C loop came back; negative values are failures (`MSTMM_*` of the C header)."""
+
+    RUNNING = 0
+    FINISHED = 1
+    STOPPED = 2
+    BUFFER_FULL = 3
+    STEP_TOO_SMALL = -1
+    NOT_FINITE = -2
+    RHS_FAILED = -3
+    ACCEPT_FAILED = -4
+    EVENT_FAILED = -5
+    FIRE_FAILED = -6
+    TOO_MANY_STEPS = -7
+    EVENT_CHATTER = -8
+    BAD_ARGUMENT = -9
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Rows of a run.
+
+    Attributes:
+        t: (m,) times; equal neighbours stand just before and just after an event.
+        y: (m, n_state).
+        memory: (m, n_memory).
+        event: (m,) 0; -(i + 1) just before and i + 1 just after event i changed the state.
+    """
+
+    t: Array
+    y: Array
+    memory: Array
+    event: Integers
+
+    @staticmethod
+    def joined(parts: Sequence[Samples]) -> Samples:
+        """All rows of `parts` (at least one) in one object."""
+        return Samples(
+            np.concatenate([p.t for p in parts]),
+            np.concatenate([p.y for p in parts]),
+            np.concatenate([p.memory for p in parts]),
+            np.concatenate([p.event for p in parts]),
+        )
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What stopped a run: numbers for whoever turns them into the name of an element."""
+
+    status: Status
+    time: float
+    component: int | None
+    event: int | None
+    code: int
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run has done so far.
+
+    Attributes:
+        steps, rejected, evaluations, events: counts; evaluations are calls of the right-hand side.
+        smallest_step, largest_step: of steps not cut short by a break, an event or the end (s).
+        sum_local_error: sum over all steps of the RMS local error estimate, in the units of y.
+            Not the error of the result, which may be larger by any factor.
+        sum_scaled_error: the same in units of the tolerance.  Both None without an estimate.
+        stiffness_index: last estimate of h |lambda|; largest_stiffness_index its maximum.
+        stability_limited: True if at least fifty steps, and a tenth of all, were about as long as
+            stability allows: an explicit method suits the system badly, or the fixed step is long.
+        stability_limited_steps: how many steps were.
+        crossings: how often a step ended where an expression of the state switches.
+    """
+
+    steps: int
+    rejected: int
+    evaluations: int
+    events: int
+    smallest_step: float | None
+    largest_step: float | None
+    sum_local_error: float | None
+    sum_scaled_error: float | None
+    stiffness_index: float
+    largest_stiffness_index: float
+    stability_limited: bool
+    stability_limited_steps: int
+    crossings: int = 0
+
+
+class Run:
+    """One time integration, advanced in slices.
+
+    Args:
+        ffi, lib: a cffi pair that knows the declarations of `engine_integrate.h`.
+        system: `mstmm_system *`, filled; kept alive by the run.
+        tableau: the method, see `mstmm.runtime.integrate.steppers`.
+        t_start, t_end: seconds, t_end >= t_start.
+        y0: (n_state,).
+        rtol: relative tolerance.
+        atol: absolute tolerance, one number or (n_error,), above zero.
+        step: fixed step in seconds; None for adaptive steps.
+        output_times: strictly increasing times of samples; None for every accepted step.
+        breaks: strictly increasing times at which the right-hand side is not smooth.  Steps end
+            there; the right-hand side never sees a break itself but the number before or after.
+        bounds: (starts, longest): from each start on, the first at or before t_start, no adaptive
+            step is longer.
+        first_step, min_step, max_step: seconds, 0 to let the loop choose.
+        max_steps: 0 for as many as it takes, if the end is in sight.
+        capacity: rows of the sample buffer, at least 2.
+
+    Raises:
+        SceneError: if an argument makes no sense.
+    """
+
+    def __init__(
+        self,
+        ffi: Any,
+        lib: Any,
+        system: Any,
+        tableau: Tableau,
+        *,
+        t_start: float,
+        t_end: float,
+        y0: ArrayLike,
+        rtol: float = 1e-6,
+        atol: ArrayLike = 1e-9,
+        step: float | None = None,
+        output_times: ArrayLike | None = None,
+        breaks: ArrayLike = (),
+        bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
+        first_step: float = 0.0,
+        min_step: float = 0.0,
+        max_step: float = 0.0,
+        max_steps: int = 0,
+        capacity: int | None = None,
+    ) -> None:
+        self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
+        self._kept: list[Any] = [system]
+        self._samples: list[Samples] = []
+        self.kept_bytes = 0  # of all samples so far
+        self._run = run = ffi.new("mstmm_run *")
+        run.system = system
+        run.tableau = c_tableau(ffi, tableau)
+        run.t_start, run.t_end, run.rtol = t_start, t_end, rtol
+        run.fixed_step = 0.0 if step is None else step
+        run.first_step, run.min_step, run.max_step = first_step, min_step, max_step
+        run.max_steps = max_steps
+        if step is not None and not step > 0.0:
+            raise SceneError(f"step = {step!r}: a fixed step is a time above zero, in seconds")
+        tolerances = np.broadcast_to(np.asarray(atol, dtype=np.float64), (system.n_error,))
+        run.atol = self._doubles(tolerances)
+        self._times(run, output_times, breaks)
+        starts, longest = (np.asarray(x, dtype=np.float64) for x in bounds)
+        run.n_bounds = len(starts)
+        run.bound_starts, run.bounds = self._doubles(starts), self._doubles(longest)
+        self._buffer(run, capacity)
+        size = lib.mstmm_workspace_size(system, run.tableau)
+        run.workspace = self._doubles(np.zeros(max(size, 1)))
+        start = np.array(y0, dtype=np.float64)
+        if start.shape != (system.n_state,):
+            raise SceneError(f"y0 has shape {start.shape}, expected ({system.n_state},)")
+        if lib.mstmm_run_start(run, self._doubles(start)) == Status.BAD_ARGUMENT:
+            raise SceneError(f"{tableau.name}: check {_ARGUMENTS[run.count.code]}")
+
+    def _doubles(self, array: ArrayLike) -> Any:
+        """`double *` to a contiguous copy that lives as long as the run."""
+        copy = np.array(array, dtype=np.float64, order="C")
+        pointer = self._ffi.from_buffer("double[]", copy)
+        self._kept += [copy, pointer]
+        return pointer
+
+    def _times(self, run: Any, output_times: ArrayLike | None, breaks: ArrayLike) -> None:
+        stops = np.atleast_1d(np.asarray(breaks, dtype=np.float64))
+        run.n_breaks, run.breaks = len(stops), self._doubles(stops)
+        run.n_outputs = -1
+        if output_times is not None:
+            outputs = np.atleast_1d(np.asarray(output_times, dtype=np.float64))
+            run.n_outputs, run.outputs = len(outputs), self._doubles(outputs)
+
+    def _buffer(self, run: Any, capacity: int | None) -> None:
+        n, nm = self._system.n_state, self._system.n_memory
+        if capacity is None:
+            capacity = min(4096, max(2, _SAMPLE_DOUBLES // max(1, n + nm)))
+        self._t, self._y = np.empty(capacity), np.empty((capacity, n))
+        self._memory, self._event = np.empty((capacity, nm)), np.empty(capacity, dtype=np.int64)
+        run.sample_capacity = capacity
+        for name, array in (("sample_t", self._t), ("sample_y", self._y)):
+            setattr(run, name, self._ffi.from_buffer("double[]", array))
+        run.sample_memory = self._ffi.from_buffer("double[]", self._memory)
+        run.sample_event = self._ffi.from_buffer("int64_t[]", self._event)
+
+    def advance(self, wall: float = 0.1, steps: int = 0) -> Status:
+        """Goes on for `wall` seconds or to the end.  Full buffers are emptied on the way.
+
+        Args:
+            wall: seconds; infinite for no limit.
+            steps: comes back, too, when the run has made so many steps in all; 0 for no limit.
+
+        Returns:
+            RUNNING, FINISHED, STOPPED or a failure; never BUFFER_FULL.
+        """
+        deadline = time.monotonic() + wall
+        self._run.pause_steps = steps
+        while True:
+            left = max(0.0, deadline - time.monotonic())
+            status = Status(self._lib.mstmm_advance(self._run, left))
+            self._drain()
+            if status is not Status.BUFFER_FULL:
+                return status
+            if left == 0.0:
+                return Status.RUNNING
+
+    def _drain(self) -> None:
+        m = int(self._run.n_samples)
+        self._run.n_samples = 0
+        if m:
+            rows = (self._t, self._y, self._memory, self._event)
+            t, y, memory, event = (x[:m].copy() for x in rows)
+            self.kept_bytes += t.nbytes + y.nbytes + memory.nbytes + event.nbytes
+            self._samples.append(Samples(t, y, memory, event))
+
+    @property
+    def samples(self) -> Samples:
+        """All samples not yet taken."""
+        n, nm = self._system.n_state, self._system.n_memory
+        if not self._samples:
+            return Samples(
+                np.zeros(0), np.zeros((0, n)), np.zeros((0, nm)), np.zeros(0, dtype=np.int64)
+            )
+        if len(self._samples) > 1:
+            self._samples = [Samples.joined(self._samples)]
+        return self._samples[0]
+
+    def take(self) -> Samples:
+        """All samples not yet taken, which are then forgotten here (for writing as they come)."""
+        samples = self.samples
+        self._samples = []
+        return samples
+
+    @property
+    def status(self) -> Status:
+        """What the last `advance` returned."""
+        status = Status(self._run.count.status)
+        return Status.RUNNING if status is Status.BUFFER_FULL else status
+
+    @property
+    def t(self) -> float:
+        """Time of the current (after a failure: the last good) state, in seconds."""
+        return float(self._run.real.t)
+
+    @property
+    def y(self) -> Array:
+        """The current (after a failure: the last good) state, a copy of shape (n_state,)."""
+        n = self._system.n_state
+        pointer = self._lib.mstmm_run_y(self._run)
+        data = self._ffi.buffer(pointer, n * 8)
+        return np.frombuffer(data, dtype=np.float64, count=n).copy()
+
+    @property
+    def failure(self) -> Failure | None:
+        """What went wrong, None if nothing did."""
+        if self.status >= 0:
+            return None
+        c = self._run.count
+        component = int(c.component) if c.component >= 0 else None
+        event = int(c.event) if c.event >= 0 else None
+        time_ = float(self._run.real.fail_time)
+        return Failure(self.status, time_, component, event, int(c.code))
+
+    @property
+    def statistics(self) -> Statistics:
+        """Counts and estimates so far."""
+        c, r = self._run.count, self._run.real
+        adaptive = self.tableau.adaptive
+        some = c.steps > 0 and r.largest_step > 0.0
+        return Statistics(
+            steps=int(c.steps),
+            rejected=int(c.rejected),
+            evaluations=int(c.evaluations),
+            events=int(c.events_fired),
+            smallest_step=float(r.smallest_step) if some else None,
+            largest_step=float(r.largest_step) if some else None,
+            sum_local_error=float(r.sum_local_error) if adaptive else None,
+            sum_scaled_error=float(r.sum_scaled_error) if adaptive else None,
+            stiffness_index=float(r.stiffness),
+            largest_stiffness_index=float(r.largest_stiffness),
+            stability_limited=bool(c.stability_limited),
+            stability_limited_steps=int(c.stability_limited_steps),
+            crossings=int(c.crossings),
+        )
+
+    @property
+    def chatter(self) -> tuple[int, float] | None:
+        """(switch, time in s): the last one that switched without end and is not watched since."""
+        c = self._run.count
+        return (int(c.chatter), float(self._run.real.chatter_time)) if c.chatter >= 0 else None
+
+    def fits(self, samples: Samples) -> bool:
+        """True if the rows of `samples` have the sizes of this run's."""
+        return samples.y.shape[1:] == (self._system.n_state,) and samples.memory.shape[1:] == (
+            self._system.n_memory,
+        )
+
+    def message(
+        self,
+        components: Sequence[str] | None = None,
+        events: Sequence[str] | None = None,
+        cause: str = "",
+    ) -> str:
+        """The status as a sentence.
+
+        Args:
+            components: a name per component of y.
+            events: a name per event.
+            cause: what is known to have made the numbers fail.
+        """
+        fail = self.failure
+        if fail is None:
+            event = _name("event", int(self._run.count.event), events)
+            return {
+                Status.FINISHED: f"finished at t = {self.t:.9g} s",
+                Status.STOPPED: f"stopped by {event} at t = {self.t:.9g} s",
+            }.get(self.status, f"running, t = {self.t:.9g} s")
+        return (
+            failure_text(fail, components, events, cause)
+            + f"; last good state at t = {self.t:.9g} s"
+        )
+
+    def state(self) -> dict[str, Array | Integers]:
+        """The run as plain arrays {"real", "integer"}: everything a new process needs to continue
+        bit for bit, given the same problem (samples already written are not part of it)."""
+        real = np.zeros(self._lib.mstmm_run_pack_reals(self._run))
+        integer = np.zeros(self._lib.mstmm_run_pack_integers(self._run), dtype=np.int64)
+        self._lib.mstmm_run_pack(
+            self._run,
+            self._ffi.from_buffer("double[]", real),
+            self._ffi.from_buffer("int64_t[]", integer),
+        )
+        return {"real": real, "integer": integer}
+
+    def restore(self, state: Mapping[str, Array | Integers]) -> None:
+        """Puts the run where `state()` was taken.  Samples in hand are dropped.
+
+        Raises:
+            SceneError: if the state belongs to a run of other sizes or another method.
+        """
+        real = np.array(state["real"], dtype=np.float64)
+        integer = np.array(state["integer"], dtype=np.int64)
+        answer = self._lib.mstmm_run_restore(
+            self._run,
+            len(real),
+            self._ffi.from_buffer("double[]", real),
+            len(integer),
+            self._ffi.from_buffer("int64_t[]", integer),
+        )
+        self._samples = []
+        if answer:
+            raise SceneError("the saved state belongs to another scene, method or version")
+
+
+def _name(kind: str, index: int, names: Sequence[str] | None) -> str:
+    return names[index] if names is not None and 0 <= index < len(names) else f"{kind} {index}"
+
+
+def failure_text(
+    fail: Failure,
+    components: Sequence[str] | None = None,
+    events: Sequence[str] | None = None,
+    cause: str = "",
+) -> str:
+    """One sentence for each failure, with a way out where there is one; names as in `message`."""
+    what = _name("component", -1 if fail.component is None else fail.component, components)
+    event = _name("event", -1 if fail.event is None else fail.event, events)
+    at = f"at t = {fail.time:.9g} s"
+    texts = {
+        Status.STEP_TOO_SMALL: f"step too small {at}: {what} has the largest error; "
+        + (
+            cause
+            or "the motion may be singular or too stiff for an explicit method, or the "
+            "tolerance too tight"
+        ),
+        Status.NOT_FINITE: f"not finite {at}: {what}; "
+        + (cause or "a smaller step or tolerance may help"),
+        Status.RHS_FAILED: f"the equations of motion cannot be evaluated {at} (code {fail.code})",
+        Status.ACCEPT_FAILED: f"the state cannot be accepted {at} (code {fail.code})",
+        Status.EVENT_FAILED: f"an event condition cannot be evaluated {at} (code {fail.code})"
+        if fail.code
+        else f"the condition of {event} is not a number {at}",
+        Status.FIRE_FAILED: f"{event} failed {at} (code {fail.code})",
+        Status.TOO_MANY_STEPS: f"more steps than allowed {at}"
+        if not fail.code
+        else f"no end in sight {at}: at the pace of the last steps the run would take more than "
+        "1e10 of them; the motion sticks where the right-hand side jumps, or is too stiff for the "
+        "tolerance; max_steps, if given, is the only limit",
+        Status.EVENT_CHATTER: f"{event} fires without end {at}",
+        Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",
+    }
+    return texts[fail.status]

@@ -1,0 +1,106 @@
+"""The prebuilt kernels: the compiled module, opened once, and its elements by kind and name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from mstmm import abi
+from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.spec import Param
+from mstmm.tape import Tape
+
+from ..libraries.build_extension import BUILT_FROM, built_from
+
+
+@dataclass(frozen=True)
+class Element:
+    """One compiled element as its descriptor states it; `functions` by kernel name."""
+
+    kind: str
+    name: str
+    nq: int
+    nu: int
+    parameters: tuple[str, ...]
+    functions: dict[str, Any]
+    guards: dict[str, dict[int, str]]
+    descriptor: Any
+    tape: Tape | None = None  # hinge kernel of an element without a library
+    declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
+    owner: Any = None  # keeps the library or the arrays of the descriptor alive
+
+
+@cache
+def module() -> tuple[Any, Any]:
+    """(ffi, lib) of the compiled kernels.  EnvironmentFailure if they are missing or stale."""
+    try:
+        kernels: Any = import_module("mstmm.generated._kernels")
+    except ImportError as error:
+        raise EnvironmentFailure(
+            f"the compiled kernels cannot be loaded ({error}); install mstmm again: "
+            "pip install -e . (a C compiler is needed)"
+        ) from error
+    _refuse_stale(kernels)
+    return kernels.ffi, kernels.lib
+
+
+def _refuse_stale(kernels: Any) -> None:
+    """The module must come from the C text beside it: after an update it may be an older one."""
+    try:
+        found = text(kernels.ffi, getattr(kernels.lib, BUILT_FROM))
+    except AttributeError:  # before modules told
+        found = ""
+    if found != built_from(Path(str(files("mstmm.generated")))):
+        raise EnvironmentFailure(
+            f"the compiled kernels {kernels.__file__} belong to another version of mstmm; build "
+            "them again: pip install -e . in the checkout, or pip install --force-reinstall mstmm "
+            "(a C compiler is needed)"
+        )
+
+
+def text(ffi: Any, pointer: Any) -> str:
+    """C string as str; empty for NULL."""
+    return "" if pointer == ffi.NULL else ffi.string(pointer).decode()
+
+
+def describe(ffi: Any, descriptor: Any) -> Element:
+    """Element of a C descriptor.  EnvironmentFailure if it was built for another layout."""
+    name = text(ffi, descriptor.name)
+    if descriptor.abi != abi.ABI:
+        raise EnvironmentFailure(
+            f"element {name!r} was built for layout {descriptor.abi}, this mstmm has {abi.ABI}; "
+            "generate it again: mstmm generate FILE"
+        )
+    functions, guards = {}, {}
+    for i in range(descriptor.n_kernels):
+        kernel = descriptor.kernels[i]
+        functions[text(ffi, kernel.name)] = kernel.function
+        guards[text(ffi, kernel.name)] = {
+            int(kernel.guards[k].code): text(ffi, kernel.guards[k].message)
+            for k in range(kernel.n_guards)
+        }
+    parameters = tuple(text(ffi, descriptor.p_names[i]) for i in range(descriptor.np))
+    return Element(
+        text(ffi, descriptor.kind), name, int(descriptor.nq), int(descriptor.nu), parameters,
+        functions, guards, descriptor,
+    )  # fmt: skip
+
+
+@cache
+def elements() -> dict[tuple[str, str], Element]:
+    """All prebuilt elements by (kind, name)."""
+    ffi, lib = module()
+    found = (describe(ffi, lib.mstmm_elements[i]) for i in range(lib.mstmm_element_count))
+    return {(element.kind, element.name): element for element in found}
+
+
+def element(kind: str, name: str) -> Element:
+    """A prebuilt element.  ElementError if there is none of that name."""
+    try:
+        return elements()[kind, name]
+    except KeyError:
+        raise ElementError(f"there is no prebuilt {kind} called {name!r}") from None

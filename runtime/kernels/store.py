@@ -1,0 +1,280 @@
+"""The user's kernel store: elements generated from files outside the package, one folder each.
+
+A folder `hinge_knee/` holds the stored element (JSON), its C text and, where a compiler was found,
+an entry with its library (`entry.py`), built and checked as those of the cache are.  Loading reads
+these files and executes none of the definitions.  Hinges without a library are interpreted from
+their IR.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cffi
+
+from mstmm import abi
+from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene import Scene
+from mstmm.scene_types import types
+from mstmm.spec import ElementSpec
+from mstmm.stored import element_from_json, element_to_json
+from mstmm.tape import compile_tape
+
+from ..host.files import replacing
+from ..libraries.build import Built, Order, fetched, found, remove
+from ..libraries.build_extension import COMPILE_ARGS
+from ..libraries.entry import ABOUT, Damaged
+from ..libraries.folder import objection
+from ..libraries.toolchain import TIMEOUT
+from . import prebuilt
+from .prebuilt import Element
+
+Key = tuple[str, str]
+
+_ROOT = (0,)  # may put a store where all can read it
+_WAY_OUT = "set MSTMM_KERNELS to a folder of your own"
+
+
+def folder() -> Path:
+    """The store: $MSTMM_KERNELS, or a folder of the user's."""
+    named = os.environ.get("MSTMM_KERNELS")
+    if named:
+        return Path(named)
+    import platformdirs
+
+    return Path(platformdirs.user_data_path("mstmm")) / "kernels"
+
+
+def _place(key: Key) -> Path:
+    return folder() / f"{key[0]}_{key[1]}"
+
+
+def _trusted(place: Path) -> None:
+    """EnvironmentFailure if somebody else may have put something into a folder of the store.
+
+    What lies there becomes equations and code of this process.
+    """
+    for each in (folder(), place):
+        with suppress(OSError):  # not there: nothing to trust
+            problem = objection(each, os.stat(each), "kernel store", _WAY_OUT, _ROOT)
+            if problem:
+                raise EnvironmentFailure(problem)
+
+
+def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
+    """Write a generated element (`files`: name -> C text) and compile it.
+
+    Returns its folder and a sentence on how it will run.  Raises EnvironmentFailure if the folder
+    cannot be written, or if a body or force element cannot be compiled.
+    """
+    place = _place((spec.kind, spec.name))
+    _trusted(place)
+    replaced = _replaces(place, spec)
+    try:
+        folder().parent.mkdir(parents=True, exist_ok=True)
+        for made in (folder(), place):
+            made.mkdir(mode=0o700, exist_ok=True)
+        for name, text in {**files, "element.json": element_to_json(spec)}.items():
+            with replacing(place / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+    except (OSError, EnvironmentFailure) as error:
+        said = error.strerror if isinstance(error, OSError) else error
+        raise EnvironmentFailure(
+            f"the kernel store {folder()} cannot be written ({said}); {_WAY_OUT}"
+        ) from error
+    opened.cache_clear()
+    try:
+        fetched(_library_place(spec), _order(spec), TIMEOUT)
+        _remove_old(place, _library_place(spec))
+        return place, f"compiled{replaced}"
+    except EnvironmentFailure as error:
+        if spec.kind != "hinge":
+            raise
+        return place, f"interpreted, several times slower than compiled: {error}{replaced}"
+
+
+def _replaces(place: Path, spec: ElementSpec) -> str:
+    """A remark if another definition of this name is in the store."""
+    try:
+        earlier = element_from_json((place / "element.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    if earlier.hash() == spec.hash():
+        return ""
+    return f", replacing another definition of {spec.kind} {spec.name}"
+
+
+#: Flags of users' kernels: those of the prebuilt ones, with the descriptor in sight.
+_FLAGS = tuple(flag for flag in COMPILE_ARGS if flag != "-fvisibility=hidden")
+
+
+def _library_place(spec: ElementSpec) -> Path:
+    return _place((spec.kind, spec.name)) / f"{spec.hash()[:16]}-{abi.ABI}"
+
+
+def _order(spec: ElementSpec) -> Order:
+    """How the library is made of the texts in the store, now or when it was found damaged."""
+    place = _place((spec.kind, spec.name))
+    decides = " ".join((spec.hash(), str(abi.ABI), *_FLAGS))
+
+    def sources(key: str) -> dict[str, str]:
+        names = ("mstmm.h", f"{spec.kind}_{spec.name}.c")
+        try:
+            return {name: (place / name).read_text(encoding="utf-8") for name in names}
+        except OSError as error:
+            raise EnvironmentFailure(
+                f"{place} lacks its C text ({error.strerror}); generate it again: "
+                "mstmm generate FILE"
+            ) from None
+
+    return Order(
+        f"{spec.kind}_{spec.name}", hashlib.sha256(decides.encode()).hexdigest(), sources,
+        _FLAGS, (abi.element_symbol(spec.kind, spec.name),), "MSTMM_KERNELS",
+    )  # fmt: skip
+
+
+def _remove_old(place: Path, current: Path) -> None:
+    for path in place.glob(f"*/{ABOUT}"):
+        if path.parent != current:
+            remove(path.parent)
+
+
+def specs() -> dict[Key, ElementSpec]:
+    """Every element in the store; files that cannot be read are passed over."""
+    found: dict[Key, ElementSpec] = {}
+    for path in sorted(folder().glob("*/element.json")):
+        _trusted(path.parent)
+        try:
+            spec = _read(path)
+        except ElementError:
+            continue
+        found[spec.kind, spec.name] = spec
+    return found
+
+
+def spec(key: Key) -> ElementSpec | None:
+    """One element of the store, None if it is not there.  ElementError if its file is damaged."""
+    path = _place(key) / "element.json"
+    if not path.is_file():
+        return None
+    _trusted(path.parent)
+    return _read(path)
+
+
+def _read(path: Path) -> ElementSpec:
+    try:
+        return element_from_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise ElementError(
+            f"{path}: the stored element is damaged ({said}); "
+            "generate it again: mstmm generate FILE"
+        ) from error
+
+
+@cache
+def opened(key: Key, content: str) -> Element:
+    """The element of the store with this hash, ready to be called."""
+    stored = spec(key)
+    assert stored is not None and stored.hash() == content
+    try:
+        element = _compiled(stored)
+    except EnvironmentFailure:  # damaged, and it cannot be built again
+        if stored.kind != "hinge":
+            raise
+        element = None
+    if element is not None:
+        return element
+    if stored.kind == "hinge":
+        return _interpreted(stored)
+    raise EnvironmentFailure(
+        f"{stored.kind} {stored.name!r} is not compiled; install a C compiler and run: "
+        "mstmm generate FILE"
+    )
+
+
+def _compiled(stored: ElementSpec) -> Element | None:
+    """The element from its library, None if there is none.
+
+    A library that is damaged or does not open (of another machine) is built again from its text.
+    """
+    place, order = _library_place(stored), _order(stored)
+    try:
+        built: Built | None = found(place, order.key)
+        return None if built is None else _from_library(stored, built.path)
+    except (Damaged, EnvironmentFailure):
+        remove(place)
+    return _from_library(stored, fetched(place, order, TIMEOUT).path)
+
+
+def _from_library(stored: ElementSpec, library: Path) -> Element:
+    separate = cffi.FFI()
+    separate.cdef(abi.cdef(registry=False))
+    symbol = abi.element_symbol(stored.kind, stored.name)
+    separate.cdef(f"extern mstmm_element {symbol};")  # cffi reads no constant this way
+    try:
+        lib = separate.dlopen(str(library))
+        pointer: Any = separate.addressof(lib, symbol)  # type: ignore[arg-type]
+        address = int(separate.cast("uintptr_t", pointer))
+    except (OSError, AttributeError) as error:
+        raise EnvironmentFailure(
+            f"{library} cannot be opened ({error}); delete it and run: mstmm generate FILE"
+        ) from error
+    ffi, _ = prebuilt.module()
+    element = prebuilt.describe(ffi, ffi.cast("mstmm_element *", address))
+    return replace(element, declared=stored.parameters, owner=(separate, lib))
+
+
+def _interpreted(stored: ElementSpec) -> Element:
+    ffi, _ = prebuilt.module()
+    kernel = next(k for k in stored.kernels if k.name == "hinge")
+    names = {
+        "q": stored.coordinates, "u": stored.speeds, "p": stored.parameters,
+    }  # fmt: skip
+    arrays: dict[str, Any] = {"nq": len(names["q"]), "nu": len(names["u"]), "np": len(names["p"])}
+    kept: list[Any] = []
+    for letter, group in names.items():
+        for what, texts in (
+            ("names", [p.name for p in group]),
+            ("units", [p.unit for p in group]),
+        ):
+            strings = [ffi.new("char[]", t.encode()) for t in texts]
+            array = ffi.new("const char *[]", strings or [ffi.NULL])
+            kept += [strings, array]
+            arrays[f"{letter}_{what}"] = array
+    descriptor = ffi.new("mstmm_element *", arrays)
+    return Element(
+        stored.kind, stored.name, arrays["nq"], arrays["nu"],
+        tuple(p.name for p in stored.parameters), {}, {}, descriptor,
+        tape=compile_tape(kernel), declared=stored.parameters, owner=kept,
+    )  # fmt: skip
+
+
+def needed(scene: Scene) -> list[Key]:
+    """Types of a scene that are not built in."""
+    elements = prebuilt.elements()
+    return sorted(
+        key
+        for key in types(scene)
+        if key not in elements and not (key[0] == "hinge" and key[1] in HINGE_TYPES)
+    )
+
+
+def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpec]]:
+    """Elements and definitions of the store for these types, those that there are."""
+    elements: dict[Key, Element] = {}
+    definitions: dict[Key, ElementSpec] = {}
+    for key in keys:
+        stored = spec(key)
+        if stored is not None:
+            definitions[key] = stored
+            elements[key] = opened(key, stored.hash())
+    return elements, definitions

@@ -1,0 +1,1 @@
+"""Compiled libraries: compilers, the cache, building, testing and opening them."""

@@ -1,0 +1,50 @@
+"""A new library is opened in a process of its own first: what crashes there crashes nobody.
+
+0  opens, has its symbols, and its own test, if it brings one, returned 0
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..host.process import Hanging, run
+
+#: Name of the function `int (void)` that a library may export: 0 if all is right.
+OWN_TEST = "mstmm_self_test"
+
+_TIMEOUT = 60.0
+
+# Without site and with the standard library alone: about 12 ms.
+_SCRIPT = f"""\
+import ctypes, os, sys
+library = ctypes.CDLL(sys.argv[1], os.RTLD_NOW)
+for name in sys.argv[2:]:
+    getattr(library, name)
+test = getattr(library, {OWN_TEST!r}, None)
+if test is not None and test() != 0:
+    sys.exit("its own test found it wrong")
+"""
+
+
+def problem(library: Path, symbols: Sequence[str]) -> str:
+    """What is wrong with a library, in a few words; "" if nothing is, or if it cannot be tried."""
+    if not sys.executable:  # Python inside another program
+        return ""
+    try:
+        ended = run(
+            [sys.executable, "-I", "-S", "-c", _SCRIPT, str(library), *symbols],
+            library.parent,
+            _TIMEOUT,
+        )
+    except Hanging:
+        return f"it did not return within {_TIMEOUT:g} s"
+    except OSError:
+        return ""
+    if ended.code == 0:
+        return ""
+    if ended.code < 0:
+        return f"it crashes ({ended.signal()})"
+    lines = ended.said.splitlines()
+    return lines[-1].strip()[:300] if lines else f"its test ended with code {ended.code}"

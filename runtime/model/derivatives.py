@@ -1,0 +1,181 @@
+"""Exact derivatives of the accelerations: the fused kernel differentiated, not its values.
+
+Forward mode (`mstmm.tangent`): one run of a tangent kernel gives the derivative along one
+direction.  Coordinates are varied by tangent increments dphi, one for each speed: dq = N(q) dphi,
+where qdot = N(q) u.  For coordinates whose rate is their speed that is the coordinate itself; for
+the quaternion of a ball or free hinge it is the rotation vector in outboard axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array, batch
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.hinge_types import HINGE_TYPES
+
+from ..engine.tangents import Tangents
+from ..pack.pack import pack
+from ..pack.slopes import slopes
+from ..pack.structure import structure_of
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+
+#: More bodies than this are not differentiated: work and results grow with their square.
+MOST_BODIES = 1000
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Derivatives of udot and of the rates of the tangent increments; (..., row, column).
+
+    `q`, `u`, `efforts` (..., nu, nu): of the accelerations with respect to the tangent increments
+    of q, the speeds and the efforts; `efforts` is the inverse of the mass matrix on the free
+    coordinates, zero for driven ones.  `t` (..., nu): with respect to time at fixed q and u; driven
+    coordinates move with t.  `parameters[name]` (..., nu): with respect to a number of the scene.
+    `rate_q`, `rate_u` (..., nu, nu): of the rate of the tangent increments (rate_u is 1 on free
+    coordinates, 0 on driven ones; rate_q is zero but for quaternions and users' own speeds).
+    """
+
+    udot: Array
+    q: Array
+    u: Array
+    efforts: Array
+    t: Array
+    rate_q: Array
+    rate_u: Array
+    parameters: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def state_matrix(self) -> Array:
+        """A (..., 2 nu, 2 nu): d/dt (dphi, du) = A (dphi, du) of motions near this one."""
+        return np.block([[self.rate_q, self.rate_u], [self.q, self.u]])
+
+
+class Differentiation:
+    """Derivatives of one model with one set of parameters; kernels are made when asked for."""
+
+    def __init__(self, model: Compiled, names: Sequence[str]) -> None:
+        self._model = model
+        self.names = tuple(names)
+        known = model.known or {}
+        _refuse(model)
+        if names:
+            structure, self.p, self.slopes = slopes(model.scene, known, names)
+        else:
+            structure, self.p = structure_of(pack(model.scene, known), known)
+            self.slopes = np.zeros((len(self.p), 0))
+        self.tangents = Tangents(model.fusion, structure, bool(names))
+        self._memory = np.zeros(structure.n_memory)
+        kinds = [HINGE_TYPES.get(hinge.type) for hinge in model.layout.hinges.values()]
+        self._straight = all(kind is not None and kind.quaternion is None for kind in kinds)
+
+    def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
+        """Derivatives of n states, t (n, 1), q (n, nq), u and efforts (n, nu), by the names of
+        `Derivatives`; (n, row, column), parameters as columns."""
+        nu = self._model.nu
+        states = {
+            "p": self.p[None], "t": t, "q": q, "u": u, "memory": self._memory[None],
+            "efforts": efforts,
+        }  # fmt: skip
+        self.tangents.expect(len(q) * (4 * nu + 1 + len(self.names)))
+        units, columns = np.eye(nu)[None], self.tangents.columns
+        # qdot = N(q) u, so the columns of N are its derivatives with respect to u.
+        increments = columns("u", "qdot", states, units)
+        rows = {
+            "q": columns("q", "udot", states, increments),
+            "u": columns("u", "udot", states, units),
+            "efforts": columns("efforts", "udot", states, units),
+            "t": columns("t", "udot", states, np.ones((1, 1, 1))),
+        }
+        if self.names:
+            rows["parameters"] = columns("p", "udot", states, self.slopes.T[None])
+        found = {name: np.swapaxes(array, 1, 2) for name, array in rows.items()}
+        self._refuse_infinite(found, t)
+        found["rate_q"], found["rate_u"] = self._rates(states, increments)
+        return found
+
+    def _refuse_infinite(self, found: Mapping[str, Array], t: Array) -> None:
+        for name, array in found.items():
+            if not np.isfinite(array).all():
+                state, row, _ = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
+                raise NumericalFailure(
+                    f"the derivative of {self._model.layout.u_names[row]}'s acceleration with "
+                    f"respect to {name} is not finite at t = {t[state, 0]:.9g} s"
+                )
+
+    def _rates(self, states: Mapping[str, Array], n: Array) -> tuple[Array, Array]:
+        """Derivatives of dphi' where q = q(t) + N dphi: N dphi' = (d qdot/dq N - N') dphi + N du.
+
+        `n` holds the columns of N as rows, (states, nu, nq).  Column j of N' is the derivative of
+        qdot(q, u = e_j) along the motion.
+        """
+        count, nu = n.shape[:2]
+        rate_q, rate_u = np.zeros((count, nu, nu)), np.zeros((count, nu, nu))
+        if self._straight:  # N is 1, and 0 where a drive decides
+            return rate_q, n @ np.swapaxes(n, 1, 2)
+        columns = self.tangents.columns
+        bend = columns("q", "qdot", states, n)
+        motion = np.ascontiguousarray(states["u"][:, None] @ n)
+        for j, unit in enumerate(np.eye(nu)):
+            bend[:, j] -= columns("q", "qdot", {**states, "u": unit[None]}, motion)[:, 0]
+        n, bend = np.swapaxes(n, 1, 2), np.swapaxes(bend, 1, 2)
+        for owner in self._model.layout.owners:
+            rows, own = owner.q_slice, owner.u_slice
+            back = np.linalg.pinv(n[:, rows, own])
+            rate_q[:, own, own] = back @ bend[:, rows, own]
+            rate_u[:, own, own] = back @ n[:, rows, own]
+        return rate_q, rate_u
+
+
+def _refuse(model: Compiled) -> None:
+    """SceneError for a scene whose accelerations are no single smooth function."""
+    packed = model.packed
+    if packed.releases:
+        names = ", ".join(f'"{name}"' for name in packed.releases)
+        raise SceneError(
+            f"derivatives: hinge {names} is released during the run, so that the accelerations "
+            "change their form; take the release out"
+        )
+    if packed.model.n_bodies > MOST_BODIES:
+        raise SceneError(
+            f"derivatives: {packed.model.n_bodies} bodies; expected {MOST_BODIES} or fewer, as "
+            "work and results grow with their square"
+        )
+
+
+def derivatives(
+    model: Compiled,
+    differentiation: Differentiation,
+    q: ArrayLike,
+    u: ArrayLike,
+    t: ArrayLike,
+    efforts: ArrayLike | None,
+    udot: Array,
+) -> Derivatives:
+    """`Model.derivatives` of all states of a batch, whose accelerations are known."""
+    nu = model.nu
+    lead, (coordinates, speeds, times, extra) = batch(
+        ("q", q, model.nq), ("u", u, nu), ("t", t, None),
+        ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
+    )  # fmt: skip
+    found = differentiation.at(times[:, None], coordinates, speeds, extra)
+
+    def shaped(name: str, *shape: int) -> Array:
+        return found[name].reshape(*lead, *shape)
+
+    names = differentiation.names
+    columns = shaped("parameters", nu, len(names)) if names else np.zeros((*lead, nu, 0))
+    return Derivatives(
+        udot=udot,
+        t=shaped("t", nu),
+        parameters={name: columns[..., k] for k, name in enumerate(names)},
+        **{name: shaped(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
+    )

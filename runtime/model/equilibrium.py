@@ -1,0 +1,131 @@
+"""Static equilibrium of a model: no effort needed at rest in the free coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+from mstmm.hinge_types import HINGE_TYPES
+
+from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
+from ..pack.layout import refuse_dense
+from ..run.system import SceneSystem
+from .sizes import speed_sizes
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+
+#: Coordinates that a message lists.
+_LISTED = 3
+
+
+class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
+    """q (nq,) of an equilibrium, an array like any other.
+
+    `residuals` are the efforts in N or N*m (of modal coordinates N, or N*m for twist) still missing
+    there, by the names of the free speeds; arrays computed from this one have none.
+    """
+
+    residuals: dict[str, float]
+
+    def __array_finalize__(self, source: object) -> None:
+        self.residuals = {}
+
+
+def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
+    """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
+    refuse_dense(model.nu, "the stiffness matrix")
+    free = free_speeds(model)
+    problem = _problem(model, t, free)
+    try:
+        found = at_rest(problem, q, tolerance)
+    except Undetermined as failure:
+        names = _some([model.layout.u_name(int(free[k])) for k in failure.places])
+        raise NumericalFailure(
+            f"the equilibrium is undetermined along {names}: nothing pushes these coordinates "
+            "back; fix them, drive them or add a stiffness"
+        ) from None
+    except Unsettled as failure:
+        left = _largest(model, free, failure.residual, problem.sizes)
+        raise NumericalFailure(
+            f"no equilibrium found near the start ({failure}); efforts left: {left}; give another "
+            "start, q = ..."
+        ) from None
+    result = _with_drives(model, found, t).view(Equilibrium)
+    efforts = dict(zip(free, problem.needed(found).tolist(), strict=True))
+    result.residuals = {model.layout.u_name(j): effort for j, effort in efforts.items()}
+    return result
+
+
+def free_speeds(model: Compiled) -> list[int]:
+    """Speeds that no drive prescribes."""
+    free = []
+    for number, hinge in enumerate(model.packed.scene.hinges):
+        slots = model.layout.slots(number)
+        drive = hinge.drive or (None,) * slots.nu
+        held = hinge.type == "fixed"
+        free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not held]
+    for slots in model.layout.modal.values():
+        free += range(slots.u, slots.u + slots.nu)
+    return free
+
+
+def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
+    engine, still = model.looped, np.zeros(model.nu)
+    memory, quaternions = engine.start_memory(), model.layout.quaternions
+    straight = _straight_places(model, free)
+
+    def needed(q: Array) -> Array:
+        return np.asarray(engine.inverse_dynamics(t, q, still, still, memory)[free])
+
+    def moved(q: Array, increment: Array) -> Array:
+        if straight is not None:
+            result = q.copy()
+            result[straight] += increment
+            return result
+        speeds = np.zeros(model.nu)
+        speeds[free] = increment
+        result = q + engine.rates(t, q, speeds, memory)
+        for first in quaternions:
+            unit = result[first : first + 4]
+            result[first : first + 4] = unit / np.linalg.norm(unit)
+        return np.asarray(result)
+
+    return Rest(needed, moved, speed_sizes(model)[free])
+
+
+def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:
+    """Places in q whose rates are the free speeds; None where a hinge has others."""
+    places = np.zeros(model.nu, dtype=np.int64)
+    for slots in model.layout.hinges.values():
+        kind = HINGE_TYPES.get(slots.type)
+        if slots.nu and (kind is None or kind.quaternion is not None):
+            return None
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    for slots in model.layout.modal.values():
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    return np.asarray(places[free])
+
+
+def _with_drives(model: Compiled, q: Array, t: float) -> Array:
+    """q with driven coordinates where their drives have them."""
+    return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
+
+
+def _some(names: list[str]) -> str:
+    """All of a few names, the first of many and how many there are besides."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _largest(model: Compiled, free: list[int], residual: Array, sizes: Array) -> str:
+    """The largest efforts by name, counted by their work over a motion of order one."""
+    order = np.argsort(-np.abs(residual * sizes))[:_LISTED]
+    listed = [f"{residual[k]:.3g} along {model.layout.u_name(int(free[k]))}" for k in order]
+    more = len(residual) - len(listed)
+    return ", ".join(listed) + " (N or N*m)" + (f" and {more} smaller" if more > 0 else "")

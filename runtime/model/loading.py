@@ -1,0 +1,120 @@
+"""Results out of files: their scenes are validated and compiled again."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mstmm.errors import MstmmError, SceneError
+from mstmm.extras import missing
+from mstmm.scene import Scene
+
+from ..engine.identity import kernels_hash
+from ..host.files import refuse_special, seal_is_broken
+from ..integrate.steppers import get
+from ..kernels import store
+from ..result.output import provenance
+from ..result.result import Result
+from ..run.stability import check_step
+from ..run.trajectory import Trajectory
+from .model import Model
+from .results import result_of
+
+
+def load_result(path: str | Path) -> Result:
+    """A result saved as NetCDF, with its scene compiled again, so that every quantity is there.
+
+    Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
+    """
+    path = Path(path)
+    refuse_special(path, "result file")
+    try:
+        import h5netcdf  # noqa: F401
+        import xarray
+    except ImportError as error:
+        raise missing("io", "a NetCDF file", error) from None
+    if not path.is_file():
+        raise SceneError(f'result file "{path}": there is no such file')
+    if seal_is_broken(path):  # before HDF5, which such a file may crash or occupy for ever
+        raise SceneError(
+            f'result file "{path}": it is damaged, or was changed since it was written; make it '
+            "again, or write what you changed to another file"
+        )
+    data = _read(xarray, path)
+    if data.attrs.get("format") != "mstmm result" or "scene" not in data:
+        raise SceneError(f'result file "{path}": not a result of mstmm')
+    try:
+        if int(data.attrs["format_version"]) > provenance.FORMAT:
+            raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
+        return _rebuilt(data, path)
+    except MstmmError as error:
+        if str(path) in str(error):
+            raise
+        raise SceneError(f'result file "{path}": {error}') from None
+    except _NOT_OURS as error:
+        raise SceneError(
+            f'result file "{path}": it was changed or damaged ({type(error).__name__}: {error}); '
+            "make it again"
+        ) from None
+
+
+#: What numbers and texts raise that are not as they were written.
+_NOT_OURS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+
+
+def _read(xarray: Any, path: Path) -> Any:
+    """All of a file.  SceneError for whatever the libraries make of one that is cut or overwritten.
+
+    Objects of theirs that are given up half made complain, past every caller, as they go: they go
+    here, unheard.
+    """
+    previous, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        try:
+            with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+                return file.load()
+        except Exception as error:
+            reason = str(error)
+        gc.collect()  # the exception, which held them, is gone
+    finally:
+        sys.unraisablehook = previous
+    raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
+
+
+def _fits(model: Model, run: Trajectory) -> bool:
+    """The sizes of every array follow from the scene and the number of samples."""
+    n, memory = len(run.t), model.packed.n_memory
+    expected = {
+        "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
+    }  # fmt: skip
+    states = [run.last[1:] if run.last is not None else None, run.start]
+    rows = all((q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states))
+    return rows and all(getattr(run, name).shape == shape for name, shape in expected.items())
+
+
+def _rebuilt(data: Any, path: Path) -> Result:
+    """Scene and model as they were; what only the run knew comes from the file.
+
+    Raises one of _NOT_OURS where numbers are missing or of another kind or size.
+    """
+    scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
+    elements, definitions = store.known(store.needed(scene))
+    scene.check_types(definitions)
+    model, run = Model(scene, known=elements), provenance.trajectory(data)
+    if not _fits(model, run):
+        raise SceneError(f'result file "{path}": its states do not fit its scene')
+    if data.attrs["kernels_sha256"] != kernels_hash(model):
+        note = "saved with other kernels: quantities beyond q and u come from the present ones"
+        run = replace(run, notes=(*run.notes, note))
+    step = None
+    if run.settings.step is not None and (run.start is not None or len(run.t)):
+        start = np.concatenate(run.first[1:])
+        engine, tableau = model.looped, get(run.settings.method)
+        step = check_step(engine, tableau, run.settings, start, engine.start_memory())
+    return result_of(model, run, provenance.error(data), step)

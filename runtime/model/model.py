@@ -1,0 +1,259 @@
+"""Model: a compiled scene, and everything that can be asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array, batch, one, pair, real
+from mstmm.errors import NumericalFailure
+from mstmm.scene import Scene
+
+from ..engine.code import Fusing
+from ..engine.compiled import Compiled
+from ..integrate.settings import Settings, checked, times_of
+from ..pack.bodies import Known
+from ..pack.layout import refuse_dense
+from ..pack.packed import Packed
+
+if TYPE_CHECKING:
+    from ..result.result import Result
+    from ..run.batch import BatchResult
+    from .derivatives import Derivatives, Differentiation
+    from .equilibrium import Equilibrium
+
+
+class Model(Compiled):
+    """A scene ready to compute.  Made by `mstmm.compile`.
+
+    `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
+    quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        known: Known | None = None,
+        fusing: Callable[[Packed, Known], Fusing] | None = None,
+        product_accuracy: float | None = None,
+    ) -> None:
+        super().__init__(scene, known, fusing, product_accuracy)
+        self._differentiations: dict[tuple[str, ...], Differentiation] = {}
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
+        q, u = self._start
+        return q.copy(), u.copy()
+
+    @cached_property
+    def _start(self) -> tuple[Array, Array]:
+        """What `initial_state` gives, computed once: a scene does not change."""
+        from ..run.start import initial_state
+
+        return initial_state(self)
+
+    def refuse_undetermined_start(self) -> None:
+        """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
+        from .undetermined import refuse_undetermined_start
+
+        refuse_undetermined_start(self, *self.initial_state())
+
+    def accelerations(
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        t: ArrayLike = 0.0,
+        efforts: ArrayLike | None = None,
+        *,
+        threads: int | None = None,
+    ) -> Array:
+        """udot (..., nu) from q (..., nq), u (..., nu), t (s) and extra efforts (..., nu; N, N*m).
+
+        Driven coordinates take the drive's value whatever q and u say.  A batch (leading axes) goes
+        through vector lanes where there is fused code, and through `threads` threads (None: as many
+        as there are processors); with one engine a state's numbers depend neither on the batch
+        around it nor on the threads, to the last bit.
+
+        Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
+        hinge whose motion is undetermined.
+        """
+        from ..engine.batch import States, accelerations
+
+        extra = () if efforts is None else (("efforts", efforts, self.nu),)
+        lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
+        states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
+        return accelerations(self.looped, self.fusion, states, threads).reshape(*lead, self.nu)
+
+    def inverse_dynamics(
+        self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: ArrayLike = 0.0
+    ) -> Array:
+        """Efforts (..., nu) beyond the laws' own that give `udot`; for driven coordinates the
+        drive's.  q (..., nq), u and udot (..., nu), t (s).
+
+        Newton-Euler inverse dynamics over the tree, O(bodies).  Raises SceneError for a shape that
+        does not fit.
+        """
+        engine = self.looped
+        memory, nu = engine.start_memory(), self.nu
+        lead, (times, coordinates, speeds, rates) = batch(
+            ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
+        )
+        rows = [
+            engine.inverse_dynamics(float(at), a, b, c, memory)
+            for at, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
+        ]
+        return np.array(rows).reshape(*lead, nu)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Symmetric (..., nu, nu) mass matrix at q (..., nq), kg, kg*m, kg*m2; driven coordinates
+        as if free.  Raises SceneError for a shape that does not fit."""
+        refuse_dense(self.nu, "the mass matrix")
+        lead, (states,) = batch(("q", q, self.nq))
+        matrices = [self.looped.mass_matrix(one_state) for one_state in states]
+        return np.array(matrices).reshape(*lead, self.nu, self.nu)
+
+    def equilibrium(
+        self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
+    ) -> Equilibrium:
+        """q (nq,) at which every acceleration vanishes at rest, by Newton from `q` (or the start).
+
+        `tolerance` is how far coordinates may be off: rad, or parts of the length of what they
+        move.  The array found has `residuals`, the efforts still missing by the names of speeds.
+        Where Newton's method fails, what is missing at the start is applied in parts.
+
+        Raises NumericalFailure naming the coordinates that nothing determines, or, with the efforts
+        that are left, if there is no equilibrium near the start.
+        """
+        from .equilibrium import equilibrium
+
+        instead = "call equilibrium for each of several"
+        start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
+        return equilibrium(self, start, real("t", t, "a time in s"), real("tolerance", tolerance))
+
+    def derivatives(
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        t: ArrayLike = 0.0,
+        efforts: ArrayLike | None = None,
+        parameters: Sequence[str] = (),
+    ) -> Derivatives:
+        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers.
+
+        Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
+        respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
+        vectors in outboard axes for quaternions).  No compiler is needed.
+
+        Raises SceneError for a name that the scene does not have and for scenes with releases,
+        NumericalFailure where `accelerations` does and where a derivative does not exist.
+        """
+        from .derivatives import Differentiation, derivatives
+
+        names = tuple(parameters)
+        if names not in self._differentiations:
+            self._differentiations[names] = Differentiation(self, names)
+        udot = self.accelerations(q, u, t, efforts)  # refuses states that have none
+        return derivatives(self, self._differentiations[names], q, u, t, efforts, udot)
+
+    def simulate(
+        self,
+        t_end: float,
+        method: str = "dop853",
+        step: float | None = None,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        output_times: ArrayLike | Sequence[float] | None = None,
+        *,
+        t_start: float = 0.0,
+        initial: tuple[ArrayLike, ArrayLike] | None = None,
+        max_step: float = 0.0,
+        max_steps: int = 0,
+        certify: bool = False,
+        progress: Callable[[float, float], None] | None = None,
+        checkpoint: str | Path | None = None,
+        resume: bool = False,
+    ) -> Result:
+        """Integrate to `t_end` (s).
+
+        Args:
+            method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
+                code), or scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA: SciPy's
+                integrators on the same kernels.
+            step: fixed step in s; otherwise `rtol` and `atol` control the step.
+            output_times: times of the samples (s, increasing); otherwise every accepted step.
+            max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
+            initial: (q, u) instead of the scene's own start.
+            certify: estimate the error by a second, more accurate run.
+            progress: called with (t, t_end) about every 0.1 s.
+            checkpoint: file that keeps the run every 30 s, when it is interrupted, and when it has
+                ended, until the result is saved.
+            resume: continue from that file, if it is there, bit for bit.
+
+        Returns a Result, also after a failure: `success`, `message` and everything computed so far.
+        Raises SceneError for settings that make no sense.
+        """
+        from .results import simulate
+
+        settings = checked(
+            Settings(
+                t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
+                max_steps,
+            )
+        )  # fmt: skip
+        q, u = self.initial_state() if initial is None else pair("initial", initial)
+        instead = "simulate_batch takes many"
+        return simulate(
+            self, settings, one("initial q", q, self.nq, instead),
+            one("initial u", u, self.nu, instead),
+            certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
+        )  # fmt: skip
+
+    def simulate_batch(
+        self,
+        initial_states: tuple[ArrayLike, ArrayLike],
+        parameters: Mapping[str, ArrayLike] | None = None,
+        *,
+        t_end: float,
+        output_times: ArrayLike | Sequence[float] | None = None,
+        method: str = "dop853",
+        step: float | None = None,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        t_start: float = 0.0,
+        max_step: float = 0.0,
+        max_steps: int = 0,
+        threads: int | None = None,
+    ) -> BatchResult:
+        """Integrate n independent trajectories to `t_end` (s).
+
+        Args:
+            initial_states: q (n, nq) and u (n, nu); one of them may be a single row for all.
+            parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
+            output_times: times of the samples (s, increasing); otherwise `t_end` alone.
+            threads: as many as the machine has processors if not given.
+            method, step, rtol, atol, t_start, max_step, max_steps: as in `simulate`.
+
+        Trajectories run side by side in the lanes of vectors where the scene has neither events,
+        releases, twist springs nor drives, and over threads.  The numbers of one depend on no
+        other: not on the size of the batch, its neighbours or the threads, to the last bit.  A
+        trajectory that fails has `success` False, a message, and nan where it did not come.
+
+        Raises SceneError for settings, shapes or parameters that make no sense.
+        """
+        from ..run.batch import prepared, simulate_batch
+
+        settings = Settings(
+            t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps
+        )
+        settings, q, u = prepared(self, settings, initial_states)
+        return simulate_batch(
+            self, settings, q, u, {} if parameters is None else parameters, threads
+        )
+
+
+__all__ = ["Model", "NumericalFailure"]

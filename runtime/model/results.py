@@ -1,0 +1,70 @@
+"""From a compiled scene to a result, by a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from mstmm.arrays import Array
+
+from ..engine.compiled import Compiled
+from ..integrate.settings import Settings
+from ..result.result import Result
+from ..run.checkpoint import Checkpoint
+from ..run.error_estimate import ErrorEstimate
+from ..run.execution import Watch, first_run, second_run
+from ..run.stability import StepCheck
+from ..run.trajectory import Trajectory
+
+
+def result_of(
+    model: Compiled,
+    run: Trajectory,
+    error: ErrorEstimate | None = None,
+    step: StepCheck | None = None,
+) -> Result:
+    """The result of a run: with elastic responses where the model has one-way bodies."""
+    expanded = model.packed.expanded
+    rigid = None if expanded is None else expanded.rigidified
+    if rigid is None or not rigid.one_way:
+        return Result(model, run, error, step)
+    from ..result.one_way.result import OneWayResult
+
+    return OneWayResult(model, run, error, step)
+
+
+def simulate(
+    model: Compiled,
+    settings: Settings,
+    q: Array,
+    u: Array,
+    *,
+    certify: bool,
+    progress: Callable[[float, float], None] | None,
+    checkpoint: str | Path | None,
+    resume: bool,
+) -> Result:
+    """One run, and a second one where its error is asked for; see `Model.simulate`."""
+    watch = Watch(progress, settings, runs=2 if certify else 1)
+    if checkpoint is not None:
+        watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
+    run, step = first_run(model, settings, q, u, watch, resume)
+    run = replace(run, start=(q, u))
+    error = second_run(model, run, q, u, watch) if certify and run.success else None
+    if watch.notes:
+        run = replace(run, notes=(*run.notes, *watch.notes))
+    result = result_of(model, run, error, step)
+    result.checkpoint = watch.checkpoint
+    return result
+
+
+def certified(result: Result, progress: Callable[[float, float], None] | None) -> Result:
+    """The same result with its error estimated by a second, more accurate run from the start."""
+    run, watch = result.trajectory, Watch(progress, result.settings, runs=2)
+    _, q, u = run.first
+    error = second_run(result.model, run, q, u, watch)
+    noted = replace(run, notes=(*run.notes, *watch.notes))
+    made = result_of(result.model, noted, error, result.certificate.step)
+    made.checkpoint = result.checkpoint
+    return made

@@ -1,0 +1,38 @@
+"""Motions of order one, by coordinate: what a step in it is small or large beside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..flexible.sizes import modal_sizes, radius_of_gyration
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+
+def speed_sizes(model: Compiled) -> Array:
+    """(nu,) of every speed: 1 rad, a length of the scene in m, the size of a modal coordinate."""
+    layout, sizes = model.layout, np.ones(model.nu)
+    length = scene_length(model)
+    for slots in layout.hinges.values():
+        along = [unit.startswith("m") for unit in slots.u_units]
+        sizes[slots.u_slice] = np.where(along, length, 1.0)
+    for name, slots in layout.modal.items():
+        sizes[slots.u_slice] = modal_sizes(model.flexible[name])
+    return sizes
+
+
+def scene_length(model: Compiled) -> float:
+    """The largest distance within a body or from one hinge to the next, m; 1 if all are zero."""
+    scene = model.scene
+    places = [hinge.position for hinge in scene.hinge]
+    places += [chain.position for chain in scene.chain]
+    for body in (*scene.body, *(one for chain in scene.chain for one in chain.body)):
+        places += [body.center_of_mass, *(end.position for end in body.ends.values())]
+    lengths = [float(np.linalg.norm(place)) for place in places]
+    lengths += [radius_of_gyration(body) for body in model.flexible.values()]
+    return max(lengths, default=0.0) or 1.0

@@ -1,0 +1,1 @@
+"""A scene becomes the arrays of the looped engine, in internal frames."""

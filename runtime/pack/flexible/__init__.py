@@ -1,0 +1,1 @@
+"""Flexible bodies become nodes, or rigid bodies, of the scene that the sweep visits."""

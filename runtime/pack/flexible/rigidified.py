@@ -1,0 +1,249 @@
+"""Flexible bodies made rigid: the level of model below the coupled one, and the first step of
+linear elastodynamics.
+
+A body whose `model` is "rigid" or "one-way" becomes a rigid body with the mass, mass centre,
+inertia and ends of the undeformed one.  Of a one-way body every end on which something acts becomes
+a massless body welded to it, "blade/tip": the load of that weld is all that acts there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.expression import Expression, parse
+from mstmm.rotations import Matrix, to_quaternion
+from mstmm.scene import Body, End, Hinge, Load, Scene, Spring, split
+from mstmm.scene_skeleton import rigid_beam
+
+from ...flexible.modal_body import ModalBody
+from ...flexible.modal_port import ModalPort
+
+if TYPE_CHECKING:
+    from mstmm.scene_beam import Beam
+    from mstmm.scene_elastic import Elastic
+
+    from ...flexible.elastic.ports import Port
+
+
+#: What `compile(flexibility=)` takes, and the `model` it gives every flexible body.
+LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
+
+
+@dataclass
+class Rigidified:
+    """A scene whose flexible bodies are all coupled ones.
+
+    Attributes:
+        nodes: "blade.tip" -> the body welded there, "blade/tip".
+        one_way: the modal bodies of those that respond one way.
+        held: the end by which each of them is held.
+    """
+
+    scene: Scene
+    nodes: dict[str, str] = field(default_factory=dict)
+    one_way: dict[str, ModalBody] = field(default_factory=dict)
+    held: dict[str, str] = field(default_factory=dict)
+
+
+def with_level(scene: Scene, flexibility: str | None) -> Scene:
+    """The scene with one level of model for all flexible bodies; None leaves it as it is.
+
+    SceneError for a level that does not exist.
+    """
+    if flexibility is None:
+        return scene
+    if flexibility not in LEVELS:
+        known = ", ".join(LEVELS)
+        raise SceneError(f"flexibility {flexibility!r} is not known; there are: {known}")
+    level = {"model": LEVELS[flexibility]}
+    fields = {key: getattr(scene, key) for key in type(scene).model_fields}
+    fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
+    fields["elastic"] = tuple(body.model_copy(update=level) for body in scene.elastic)
+    return Scene.model_construct(**fields)
+
+
+def rigidified(scene: Scene) -> Rigidified:
+    """The scene with rigid bodies in place of those whose model is "rigid" or "one-way".
+
+    SceneError for a viscous drag, which rigid bodies do not have.
+    """
+    stiff: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
+    stiff += [b for b in scene.elastic if b.model != "flexible"]
+    return _Rigidifying(scene, stiff).run() if stiff else Rigidified(scene)
+
+
+class _Rigidifying:
+    """One walk over the bodies to be made rigid."""
+
+    def __init__(self, scene: Scene, stiff: list[Beam | Elastic]) -> None:
+        self.scene, self.stiff = scene, {body.name: body for body in stiff}
+        self.made = Rigidified(scene)
+        self.bodies: dict[str, Body] = {}
+        self.welds: list[Hinge] = []
+
+    def run(self) -> Rigidified:
+        for name, body in self.stiff.items():
+            self._body(name, body)
+        scene, names = self.scene, self.stiff
+        fields = {key: getattr(scene, key) for key in type(scene).model_fields}
+        fields |= {
+            "beam": tuple(beam for beam in scene.beam if beam.name not in names),
+            "elastic": tuple(body for body in scene.elastic if body.name not in names),
+            "body": (*scene.body, *self.bodies.values()),
+            "hinge": (*map(self._hinge, scene.hinge), *self.welds),
+            "chain": tuple(
+                chain.model_copy(update={"inboard": self._node(chain.inboard)})
+                for chain in scene.chain
+            ),
+            "load": tuple(map(self._load, scene.load)),
+            "spring": tuple(map(self._spring, scene.spring)),
+        }  # fmt: skip
+        self.made.scene = Scene.model_construct(**fields)
+        return self.made
+
+    def _body(self, name: str, body: Beam | Elastic) -> None:
+        modal = _modal(self.scene, body) if body.model == "one-way" else None
+        rigid = _rigid(body, modal)
+        ends = dict(rigid.ends)
+        for load in self._spread(name):
+            ends[load.name] = End(position=(_middle(load, self._length(name)), 0.0, 0.0))
+        self.bodies[name] = rigid.model_copy(update={"ends": ends})
+        if modal is None:
+            return
+        self.made.one_way[name] = modal
+        self.made.held[name] = next(
+            (h.outboard_end for h in self.scene.hinge if h.outboard_body == name), next(iter(ends))
+        )
+        used = dict.fromkeys(split(reference)[1] for reference in self._references(name))
+        for end in (*used, *(load.name for load in self._spread(name))):
+            self._weld(name, end)
+
+    def _weld(self, name: str, end: str) -> None:
+        node = f"{name}/{end}"
+        massless = Body(name="end", mass=0.0)
+        self.bodies[node] = massless.model_copy(update={"name": node})
+        weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="end")
+        update = {"name": node, "inboard": f"{name}.{end}", "outboard": node}
+        self.welds.append(weld.model_copy(update=update))
+        self.made.nodes[f"{name}.{end}"] = node
+
+    # --- references -----------------------------------------------------------------------------
+
+    def _references(self, name: str) -> Iterator[str]:
+        """Ends of a body on which something acts, but for the hinge that holds it."""
+        references = [hinge.inboard for hinge in self.scene.hinge]
+        references += [chain.inboard for chain in self.scene.chain]
+        references += [load.on for load in self.scene.load if load.force_per_length is None]
+        references += [end for spring in self.scene.spring for end in (spring.from_, spring.to)]
+        yield from (reference for reference in references if split(reference)[0] == name)
+
+    def _spread(self, name: str) -> list[Load]:
+        return [
+            load
+            for load in self.scene.load
+            if load.force_per_length is not None and split(load.on)[0] == name
+        ]
+
+    def _length(self, name: str) -> float:
+        return float(next(beam.length for beam in self.scene.beam if beam.name == name))
+
+    def _node(self, reference: str) -> str:
+        return self.made.nodes.get(reference, reference)
+
+    def _hinge(self, hinge: Hinge) -> Hinge:
+        return hinge.model_copy(update={"inboard": self._node(hinge.inboard)})
+
+    def _spring(self, spring: Spring) -> Spring:
+        ends = {"from_": self._node(spring.from_), "to": self._node(spring.to)}
+        return spring.model_copy(update=ends)
+
+    def _load(self, load: Load) -> Load:
+        name = split(load.on)[0]
+        if name not in self.stiff:
+            return load
+        update: dict[str, object] = {"axes": name if load.axes == "body" else load.axes}
+        if load.force_per_length is None:
+            return load.model_copy(update=update | {"on": self._node(load.on)})
+        first, last = load.span or (0.0, self._length(name))
+        force = tuple(_times(entry, last - first) for entry in load.force_per_length)
+        on = self._node(f"{name}.{load.name}")
+        return load.model_copy(
+            update=update | {"on": on, "force": force, "force_per_length": None, "span": None}
+        )
+
+
+def _middle(load: Load, length: float) -> float:
+    first, last = load.span or (0.0, length)
+    return (first + last) / 2
+
+
+def _times(entry: Expression, length: float) -> Expression:
+    return entry if entry.is_zero else parse(f"{length!r} * ({entry.text})")
+
+
+def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
+    from mstmm.scene_beam import Beam
+
+    from ...flexible.beam.bodies import beam_body
+    from ...flexible.elastic.bodies import modal_body
+
+    if isinstance(body, Beam):  # its run has no mass points: the tree carries one rigid body
+        return beam_body(scene, body.model_copy(update={"quadrature": False}))
+    return modal_body(body, scene)
+
+
+def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
+    from mstmm.scene_beam import Beam
+
+    from ...flexible.elastic.bodies import rigid_of
+
+    if isinstance(body, Beam):
+        if body.viscous_drag:
+            raise SceneError(
+                f'beam "{body.name}": viscous_drag needs model = "flexible", found '
+                f'"{body.model}", a rigid body in the run; leave one of them out'
+            )
+        return rigid_beam(body)
+    if modal is not None:
+        turning = np.trace(modal.second) * np.eye(3) - modal.second
+        return _rigid_body(body.name, modal.mass, modal.first, turning, modal.ports)
+    j, ports = rigid_of(body)
+    first = np.array([j[5, 1], j[3, 2], j[4, 0]])
+    return _rigid_body(body.name, float(j[0, 0]), first, j[3:, 3:], ports)
+
+
+def matrix_of(array: Array) -> Matrix:
+    """A rotation matrix as the scene's tables hold it."""
+    (a, b, c), (d, e, f), (g, h, i) = array.tolist()
+    return ((a, b, c), (d, e, f), (g, h, i))
+
+
+def _rigid_body(
+    name: str,
+    mass: float,
+    first: Array,
+    turning: Array,
+    ports: Mapping[str, ModalPort] | Mapping[str, Port],
+) -> Body:
+    """A rigid body with first moments and inertia (3, 3) about the origin of its axes."""
+    center = first / mass
+    lever = float(center @ center) * np.eye(3) - np.outer(center, center)
+    j = turning - mass * lever
+    ends = {
+        end: End(
+            position=tuple(map(float, port.position)),
+            orientation=to_quaternion(matrix_of(port.rotation)),
+        )
+        for end, port in ports.items()
+    }
+    entries = (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2])
+    return Body(
+        name=name, mass=mass, center_of_mass=tuple(map(float, center)),
+        inertia=tuple(map(float, entries)), ends=ends, allow_unphysical_inertia=True,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""What a run gave: quantities, certificate, files, tables and pictures."""

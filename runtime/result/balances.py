@@ -1,0 +1,175 @@
+"""What a run should have kept: energy less work, and the momentum that nothing outside changes.
+
+Neither is the error of the motion, but both find wrong steps and wrong laws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.scene import Hinge, Scene
+
+from .evidence import Drift
+from .flexible.momentum import undeformed
+from .record import Record
+
+#: A hinge load counts as zero below this part of the largest one.
+_ZERO = 1e-9
+
+#: Part of the stored energy against which rounding is judged where hardly anything moves.
+_AT_REST = 1e-8
+
+#: Bodies that are looked at to learn how far a scene reaches.
+_SOME = 30
+
+
+def _largest(values: Array) -> float:
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
+
+def _change(values: Array) -> float:
+    """Largest change (n,) from the first sample, of those that can be evaluated; nan where one of
+    them is beyond what numbers hold, or none is left."""
+    known = values[~np.isnan(values)]
+    if not len(known) or not np.isfinite(known).all():
+        return np.nan
+    return float(np.max(np.abs(known - known[0])))
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+def energy(result: Record) -> Drift:
+    """T + V - W against the largest sum of what was exchanged: T, changes of V, W.
+
+    At rest under load nothing is exchanged: then against a part of what is stored.
+    """
+    parts, work = result.energies(), result.work
+    with np.errstate(all="ignore"):  # what overflows is told by what it leaves
+        residual = sum(parts.values(), -work)
+        overflows = any(np.isinf(part).any() for part in (*parts.values(), work))
+        exchanged = parts["kinetic"] + np.abs(work)
+        for name in ("gravity", "springs"):
+            exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
+        stored = _largest(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
+    scale = max(_largest(exchanged), _AT_REST * stored)
+    change = np.nan if overflows else _change(residual)
+    return Drift("energy", "J", change if len(residual) else 0.0, scale, "exchanged")
+
+
+# --- momentum -------------------------------------------------------------------------------------
+
+
+def momentum(result: Record) -> list[Drift]:
+    """Drift of the components of momentum that nothing outside the scene changes.
+
+    Components that are zero throughout are left out.  Angular momentum is taken about the origin,
+    or about the one point of the ground through which a scene is held.  Scales: sqrt(2 m T), and
+    the larger of the largest angular momentum and that times the scene's reach.
+    """
+    scene, found = result.model.scene, list[Drift]()
+    flexible = result.model.flexible
+    dragged = any(body.drag is not None for body in flexible.values())
+    if not len(result.t) or dragged or not _isolated(scene):
+        return found
+    bodies = scene.skeleton.bodies
+    some = range(0, len(bodies), max(1, len(bodies) // _SOME))
+    names = [bodies.name(i) for i in some]
+    result._observed.fetch(names)
+    reach = max((_largest(result.position(name)) for name in names), default=0.0)
+    pivot, about = _pivot(result, reach)
+    reach = max((_largest(result.position(name) - pivot) for name in names), default=0.0)
+    kinetic = _largest(result.energies()["kinetic"])
+    force, moment = _support(result, reach, kinetic, pivot)
+    mass = sum(body.mass for body in scene.body)
+    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
+    mass += sum(undeformed(body)[0] for body in flexible.values())
+    linear, angular = result.momentum(), result.angular_momentum()
+    angular = angular - np.cross(pivot, linear)
+    speed = np.sqrt(2 * kinetic) * np.sqrt(mass)
+    scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
+    for k, axis in enumerate("xyz"):
+        others = [g for j, g in enumerate(scene.gravity) if j != k]
+        if scene.gravity[k] == 0 and force[k] and linear[:, k].any():
+            change = _change(linear[:, k])
+            found.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "that moves"))
+        if not any(others) and moment[k] and angular[:, k].any():
+            name, change = f"angular momentum {axis}{about}", _change(angular[:, k])
+            found.append(Drift(name, "kg*m2/s", change, scale, "that turns"))
+    return found
+
+
+def _isolated(scene: Scene) -> bool:
+    """Nothing but hinges and gravity acts between the scene and the ground."""
+    loads = any(
+        not e.is_zero
+        for load in scene.load
+        for e in (*load.force, *load.moment, *(load.force_per_length or ()))
+    )
+    springs = any("ground" in (spring.from_, spring.to) for spring in scene.spring)
+    return not loads and not springs and all(_passive(hinge) for hinge in _roots(scene))
+
+
+def _roots(scene: Scene) -> list[Hinge]:
+    """Hinges on the ground."""
+    firsts = zip(scene.chain, scene.hinges.starts, strict=False)
+    return [
+        *(hinge for hinge in scene.hinge if hinge.inboard_body == "ground"),
+        *(scene.hinges[first] for chain, first in firsts if chain.inboard == "ground"),
+    ]
+
+
+def _passive(hinge: Hinge) -> bool:
+    acts = any(
+        e.stiffness or e.damping or not e.effort.is_zero or e.inertia
+        or e.friction.acts or e.limits.acts
+        for e in hinge.law.entries()
+    )  # fmt: skip
+    return not acts and hinge.drive is None and hinge.release is None
+
+
+def _pivot(result: Record, reach: float) -> tuple[Array, str]:
+    """The point (3,) about which angular momentum is taken, and how its name says so.
+
+    The point of the only hinge on the ground, where it stays; else the origin.
+    """
+    roots = _roots(result.model.scene)
+    if len(roots) == 1 and roots[0].type not in _FREE:
+        places = result.position(roots[0].outboard)
+        place, size = places[0], reach + _largest(places[0])
+        if np.isfinite(place).all() and _largest(places - place) <= _ZERO * size:
+            return place, f' about "{roots[0].name}"' if place.any() else ""
+    return np.zeros(3), ""
+
+
+#: Types of hinges that carry nothing where their laws do not act.
+_FREE = ("free", "elastic")
+
+
+def _support(
+    result: Record, reach: float, kinetic: float, pivot: Array
+) -> tuple[list[bool], list[bool]]:
+    """Which components of force, and of moment about the pivot, the ground never passes on.
+
+    Judged against the largest loads of the scene and against its motion, whose kinetic energy is
+    what moments turn and forces move: where nothing else acts, loads are rounding.
+    """
+    scene = result.model.scene
+    roots = _roots(scene)
+    if all(hinge.type in _FREE for hinge in roots):
+        return [True] * 3, [True] * 3
+    force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
+    largest = result._observed.largest_loads()
+    sizes = (
+        max(largest[0], kinetic / reach if reach > 0 else 0.0),
+        max(largest[1] + largest[0] * reach, kinetic),
+    )
+    for hinge in roots:
+        f = result.force(hinge.name)
+        force = force + f
+        place = result.position(hinge.outboard) - pivot
+        moment = moment + result.moment(hinge.name) + np.cross(place, f)
+    zero = [[_largest(x[:, k]) <= _ZERO * size for k in range(3)]
+            for x, size in zip((force, moment), sizes, strict=True)]  # fmt: skip
+    return zero[0], zero[1]

@@ -1,0 +1,243 @@
+"""Certificate of a run: what its numbers themselves say about how far they can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..run.error_estimate import ANGLE, PART, ErrorEstimate
+from ..run.stability import StepCheck
+from .conditioning import LARGEST, PivotLoss, SingularDistance
+from .evidence import Drift, Give
+from .flexible import certify
+from .flexible.certify import Flexibility
+from .verdict import ACCURACY, DRIFT, Verdict
+
+#: Pivot loss and singular measure that bring a warning; of drifts see `verdict`.
+LOSS, SINGULAR = 1e8, 1e-3
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What vouches for a run.
+
+    Attributes:
+        energy: residual of kinetic + potential energy - work (J), against the energy exchanged.
+        momentum: drift of every component of linear and angular momentum that is conserved.
+        quaternion_residual: largest | |quaternion| - 1 | in the samples before they were settled.
+        pivot: the worst loss of digits in the sweep: about 1e-16 times its ratio.
+        singular: the closest approach to coordinates that fail (gimbal).
+        step: the fixed step against the fastest motion at the start; None for adaptive runs.
+        stability_limited: the method's stability, not its accuracy, set many of the steps.
+        sum_of_local_errors: in the mixed units of q and u; NOT the error of the result, which may
+            be larger by any factor.
+        error: estimate of the error from a second run; None unless asked for (certify=True).
+        finite: every number of q and u is finite.
+        too_large: the scene has too many bodies for the pivots to be looked at.
+        samples: how many samples there are; balances need two.
+        end: the run's own message.
+        flexible: how far the model of each flexible body was from the end of its range.
+        give: of the stiffest spring, which the estimated error does not count; None without one.
+        failures: why the run, or some of its samples, cannot be used at all.
+        models: where models of the scene are outside their range whatever the run.
+        unseen: of expressions of the scene, what the steps may have passed over.
+    """
+
+    energy: Drift
+    momentum: tuple[Drift, ...]
+    quaternion_residual: float
+    pivot: PivotLoss | None
+    singular: SingularDistance | None
+    step: StepCheck | None
+    stability_limited: bool
+    sum_of_local_errors: float | None
+    error: ErrorEstimate | None
+    finite: bool
+    end: str
+    too_large: bool = False
+    samples: int = 2
+    flexible: tuple[Flexibility, ...] = ()
+    give: Give | None = None
+    failures: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
+
+    def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
+        """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
+        angles as a part of how far they went) and `balance` (relative, of energy and momentum)."""
+        return _verdict(self, accuracy, balance)
+
+    @property
+    def trusted(self) -> bool:
+        """True where balances, error and models were looked at and all stay within bounds."""
+        return self.verdict().trusted
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the numbers, one sentence each."""
+        return tuple(_doubts(self))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What asks for attention: doubts, and advice; empty for a clean run."""
+        return (*self.doubts, *_advice(self))
+
+    @property
+    def predictable_until(self) -> float | None:
+        """Time (s) after which two accurate runs part; None if they do not, or were not made."""
+        return None if self.error is None else self.error.horizon
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, verdict: bool = True) -> str:
+        """All of it as lines, a name and what is to be said of it; the verdict first."""
+        few = "not determined: one sample tells of no change; ask for more output times"
+        rows = [("verdict", str(self.verdict()))] if verdict else []
+        rows.append(("run", self.end))
+        rows.append(("energy balance", few if self.samples < 2 else str(self.energy)))
+        if self.samples > 1:
+            rows += [(d.name, str(d)) for d in self.momentum]
+        if self.quaternion_residual:
+            rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
+        if self.pivot is not None:
+            rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
+        elif self.too_large:
+            rows.append(("pivot ratio", f"not computed for more than {LARGEST} bodies"))
+        if self.singular is not None:
+            rows.append(
+                ("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"')
+            )
+        if self.step is not None:
+            rows.append(("h |lambda| at the start", f"{self.step.product:.3g}"))
+        if self.sum_of_local_errors is not None:
+            rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
+        rows += certify.rows(self.flexible)
+        rows += _error_rows(self)
+        rows += [("warning", text) for text in self.warnings]
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
+
+
+# --- verdict --------------------------------------------------------------------------------------
+
+
+def _verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:
+    """The verdict within bounds: `accuracy` of the error in rad, of coordinates that are no angles
+    as a part of how far they went; `balance` of energy and momentum, relative."""
+    against = list(c.failures) + [
+        f"{d.name} changes by {d}, more than the {balance:g} asked for"
+        for d in (c.energy, *c.momentum)
+        if balance < d.relative <= DRIFT
+    ]
+    missing = []
+    if c.samples < 2:
+        missing.append("one sample tells nothing of energy and momentum")
+    if c.error is None:
+        missing.append("no second run has told its error (certify=True)")
+    else:
+        against += _inaccurate(c, accuracy)
+    against += c.doubts
+    words = f"{accuracy:g} rad or {accuracy:.3g} of the motion"
+    return Verdict(
+        tuple(dict.fromkeys(against)), tuple(missing),
+        f"errors within {words}, balances within {balance:g}",
+    )  # fmt: skip
+
+
+def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
+    """Units of coordinates whose estimated error, over the whole run, exceeds what was asked."""
+    assert c.error is not None
+    found = []
+    for unit, values in c.error.q.items():
+        worst = float(values.max(initial=0.0))
+        limit = accuracy if unit == "rad" else accuracy * c.error.moved.get(unit, 0.0)
+        if worst > limit > 0:
+            part = "" if unit == "rad" else f" of {c.error.moved[unit]:.2g} {unit} of motion"
+            found.append(f"the error of q may be {worst:.1e} {unit or '1'}{part}{_until(c.error)}")
+    return found
+
+
+def _until(error: ErrorEstimate) -> str:
+    return "" if error.horizon is None else f" (predictable until {error.horizon:.4g} s)"
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def _doubts(c: Certificate) -> list[str]:
+    found = [] if c.finite else ["the states hold numbers that are not finite"]
+    found += c.unseen
+    found += [
+        f"{d.name} cannot be balanced: it is beyond what numbers hold, or no sample gives it"
+        for d in (c.energy, *c.momentum)
+        if not d.known
+    ]
+    found += [
+        f"{d.name} is not kept: it changes by {d}; the tolerance or the step is too coarse"
+        for d in (c.energy, *c.momentum)
+        if d.relative > DRIFT
+    ]
+    if c.pivot is not None and c.pivot.ratio > LOSS:
+        found.append(
+            f'hinge "{c.pivot.hinge}" carries {c.pivot.ratio:.0e} times what its motion feels (a '
+            f"heavy body behind light ones): accelerations may err by {1e-16 * c.pivot.ratio:.0e} "
+            "of their size; where the root is free, make the heavy body the first one"
+        )
+    if c.singular is not None and c.singular.measure < SINGULAR:
+        found.append(
+            f'hinge "{c.singular.hinge}" comes within {c.singular.measure:.0e} of the angle '
+            f"at which its coordinates fail, at t = {c.singular.time:.6g} s; use a ball hinge"
+        )
+    if c.step is not None and c.step.warning:
+        found.append(c.step.warning)
+    return [*found, *certify.warnings(c.flexible), *c.models]
+
+
+def _advice(c: Certificate) -> list[str]:
+    if not c.stability_limited:
+        return []
+    return [
+        "many steps were as long as the stability of the explicit method allows: the scene is "
+        "stiff for it (scipy-Radau or scipy-BDF may be faster), or the fixed step is too long"
+    ]
+
+
+def _error_rows(c: Certificate) -> list[tuple[str, str]]:
+    error = c.error
+    if error is None:
+        return [("error", "not estimated (certify=True makes a second run)")]
+    rows = []
+    until = "" if error.horizon is None else f" up to t = {error.horizon:.6g} s"
+    for kind in ("q", "u"):
+        at_all = "; " + _values(error.whole(kind)) + " over the whole run" if until else ""
+        values = _values(error.largest(kind))
+        if values:
+            about = f" (from a second run, {error.reference})" if kind == "q" else ""
+            rows.append((f"error of {kind}, at most", f"{values}{until}{at_all}{about}"))
+    rows.append(("what this covers", _covered(c)))
+    if error.horizon is not None:
+        rows.append((
+            "predictable until",
+            f"t = {error.horizon:.6g} s: later the two runs differ by more than {ANGLE:g} rad or "
+            f"{PART:.0%} of the motion, and errors have no meaning",
+        ))  # fmt: skip
+    if error.tenfold is not None:
+        rows.append(("growth of errors", f"tenfold every {error.tenfold:.3g} s"))
+    return rows
+
+
+def _values(errors: dict[str, float]) -> str:
+    return ", ".join(f"{value:.1e} {unit or '1'}" for unit, value in errors.items())
+
+
+def _covered(c: Certificate) -> str:
+    """What the estimated error is the error of, and what it is not."""
+    parts = ["the integration in time, not how well the scene stands for what is meant"]
+    if c.flexible:
+        parts.append("not the shapes and frames of flexible bodies, whose rows say how far they go")
+    if c.give is not None:
+        parts.append(
+            "not what springs give by where they stand for constraints: the stiffest, "
+            f"{c.give.spring}, by up to {c.give.largest:.1e} m"
+        )
+    return "; ".join(parts)

@@ -1,0 +1,39 @@
+"""The certificate of a run, made from its record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..run.error_estimate import ErrorEstimate
+from ..run.stability import StepCheck
+from . import gives
+from .balances import energy, momentum
+from .certificate import Certificate
+from .conditioning import LARGEST, pivot_loss, singular_distance
+from .flexible import certify
+from .record import Record
+
+
+def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | None) -> Certificate:
+    """The certificate of a result; `error` and `step` are what only the run itself could tell."""
+    run, statistics = result.trajectory, result.statistics
+    return Certificate(
+        energy=energy(result),
+        momentum=tuple(momentum(result)),
+        quaternion_residual=run.norm_residual,
+        pivot=pivot_loss(result.model, run),
+        singular=singular_distance(result.model, run),
+        step=step,
+        stability_limited=statistics is not None and statistics.stability_limited,
+        sum_of_local_errors=None if statistics is None else statistics.sum_local_error,
+        error=error,
+        finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
+        end=result.message,
+        too_large=len(result.model.scene.bodies) > LARGEST,
+        samples=len(result.t),
+        flexible=certify.flexibilities(result._flexible),
+        give=gives.stiffest(result),
+        failures=() if result.success else (result.message,),
+        models=result._outside(),
+        unseen=result.trajectory.unseen,
+    )

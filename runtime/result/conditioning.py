@@ -1,0 +1,214 @@
+"""Numbers that say how well a computation was conditioned: pivots of the sweep, singular angles.
+
+The sweep hands S - S H D^-1 H^T S inwards: the inertia S of what a hinge carries without what the
+hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken
+off (a heavy tip behind light links), digits are lost.  How many follows from the rounding of every
+S, carried inwards as the sweep carries S itself: the accelerations err by about 1e-16 times its
+part in D over D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+from mstmm.scene import Hinge
+
+from ..kernels import prebuilt
+from ..pack.bodies import kernel_type
+from ..pack.packed import Packed
+from .flexible.pivots import ModalPivots
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..run.trajectory import Trajectory
+
+
+#: Samples of a run at which the pivots are looked at.
+SAMPLES = 12
+
+#: Bodies times samples of that look, at most, but for one sample.
+_WORK = 20_000
+
+#: Scenes with more bodies than this are not looked at: it would take longer than the run.
+LARGEST = 200_000
+
+_UPPER = np.triu_indices(6)
+
+
+@dataclass(frozen=True)
+class PivotLoss:
+    """The worst ratio of rounding (in units of 1e-16) to pivot in a run: which hinge, when (s)."""
+
+    ratio: float
+    hinge: str
+    time: float
+
+
+@dataclass(frozen=True)
+class SingularDistance:
+    """The smallest measure of a hinge whose coordinates fail where it vanishes (gimbal: |cos|)."""
+
+    measure: float
+    hinge: str
+    time: float
+
+
+# --- pivots ---------------------------------------------------------------------------------------
+
+
+def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
+    """The worst of some samples spread over the run; None where nothing moves freely, and for
+    scenes of more than LARGEST bodies."""
+    if not len(run.t) or not model.nu or len(model.scene.bodies) > LARGEST:
+        return None
+    worst, pivots = PivotLoss(0.0, "", 0.0), _Pivots(model)
+    count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))
+    for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
+        one = slice(k, k + 1)
+        seen = model.looped.observe(
+            run.t[one], run.q[one], run.u[one], run.memory[one], parts=("udot",)
+        )
+        if seen.failures:
+            continue
+        try:
+            ratios = pivots.ratios(model.looped.workspace_array(), run.memory[k])
+        except np.linalg.LinAlgError:  # numbers that overflow in products, or underflow
+            continue
+        place = int(ratios.argmax())
+        if ratios[place] > worst.ratio:
+            hinge = model.looped.hinge_name(place)
+            worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]))
+    return worst if worst.hinge else None
+
+
+class _Pivots:
+    """Where the engine keeps inertias and motion subspaces of all n bodies."""
+
+    def __init__(self, model: Compiled) -> None:
+        packed, lib = model.packed, model.looped.lib
+        records = packed.records
+        self.parents = records.column("parent").astype(np.int64)
+        count = len(self.parents)
+        speeds = records.column("nu").astype(np.int64)[:, None]
+        blocks = records.column("block").astype(np.int64)[:, None]
+        self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
+        self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
+        self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
+        column = np.arange(6)
+        self.there = column < speeds  # (n, 6): the columns of H that exist
+        first = blocks + lib.MSTMM_BLOCK_FIXED + 10 * speeds
+        rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
+        self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
+        self.release = records.column("release").astype(np.int64)
+        self.rotor = _pointed(packed, "rotor", "real *", count)
+        self.imposed = _pointed(packed, "imposed_mask", "int *", count) != 0
+        self.modal = ModalPivots(packed)
+
+    def ratios(self, numbers: Array, memory: Array) -> Array:
+        """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.
+
+        Every body adds diag |S| to E, the rounding of its S in units of 1e-16, and passes on
+        X^T P^T E P X, P = 1 - H D^-1 H^T S.  The ratio is H^T E H / pivot of D.
+        """
+        S = np.zeros((len(self.parents), 6, 6))
+        S[:, _UPPER[0], _UPPER[1]] = numbers[self.inertia]
+        S = S + np.triu(S, 1).transpose(0, 2, 1)
+        free = self.there & ~(self.imposed & ~self._released(memory)[:, None])
+        H = np.where(free[:, None, :], numbers[self.subspace], 0.0)
+        D = H.transpose(0, 2, 1) @ S @ H + (self.rotor * free + ~free)[:, :, None] * np.eye(6)
+        inverse = np.linalg.inv(D)
+        given_way = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
+        turn = numbers[self.turn].reshape(-1, 3, 3)
+        carried = _carried_motion(turn, numbers[self.shift])
+        E = np.abs(np.diagonal(S, axis1=1, axis2=2))[:, :, None] * np.eye(6)
+        self.modal.through(numbers, S, carried, self.parents, E)
+        passed = given_way @ carried
+        for i in range(len(self.parents) - 1, -1, -1):
+            parent = self.parents[i]
+            if parent >= 0:
+                E[parent] += passed[i].T @ E[i] @ passed[i]
+        rounding = np.sum(H * (E @ H), axis=1)
+        pivots = 1.0 / np.diagonal(inverse, axis1=1, axis2=2)
+        ratios = np.where(free, rounding / np.maximum(np.abs(pivots), 1e-300), 0.0)
+        return np.asarray(ratios.max(axis=1))
+
+    def _released(self, memory: Array) -> NDArray[np.bool_]:
+        known = np.append(memory, 0.0)
+        return np.asarray(known[self.release] != 0.0) & (self.release >= 0)
+
+
+def _pointed(packed: Packed, field: str, pointer: str, count: int) -> Array:
+    """(n, 6) numbers per speed to which a field of the bodies' records points."""
+    addresses, first, which = np.unique(
+        packed.records.column(field), return_index=True, return_inverse=True
+    )
+    rows, speeds = np.zeros((len(addresses), 6)), packed.records.column("nu")[first]
+    for row, address, nu in zip(rows, addresses.tolist(), speeds.tolist(), strict=True):
+        row[:nu] = packed.ffi.unpack(packed.ffi.cast(pointer, address), nu) if nu else []
+    return np.asarray(rows[which.reshape(count)])
+
+
+def _carried_motion(turn: Array, shift: Array) -> Array:
+    """(n, 6, 6): twist of P in its own axes from that of the parent with the hinge locked."""
+    back = turn.transpose(0, 2, 1)
+    moved = np.zeros((len(turn), 6, 6))
+    moved[:, :3, :3] = moved[:, 3:, 3:] = back
+    moved[:, :3, 3:] = back @ np.cross(np.eye(3), shift[:, None, :]).transpose(0, 2, 1)
+    return moved
+
+
+# --- coordinates that fail ------------------------------------------------------------------------
+
+
+def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | None:
+    """The smallest measure over all samples and hinges that have one; None without such hinges.
+
+    A change of sign between two samples counts as zero: the coordinates failed in between.
+    """
+    found: list[SingularDistance] = []
+    for group in model.layout.groups:
+        for k in range(min(group.count, len(group.hinges))):
+            function = _measure(model, model.packed.scene.hinges[group.first + k])
+            if function is None:
+                continue
+            for number in range(group.first + k, group.first + group.count, len(group.hinges)):
+                measures = _measures(model, run, number, function)
+                if len(measures):
+                    found.append(_smallest(model, run, number, measures))
+    return min(found, key=lambda one: one.measure, default=None)
+
+
+def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) -> SingularDistance:
+    k = int(np.abs(measures).argmin())
+    changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
+    k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
+    return SingularDistance(value, model.packed.scene.hinges.name(number), float(run.t[k]))
+
+
+def _measure(model: Compiled, hinge: Hinge) -> Any:
+    """The kernel `singularity` of a hinge's type, None if it has none."""
+    packed = model.packed
+    key = ("hinge", kernel_type(hinge, packed.releases))
+    element = (model.known or {}).get(key) or prebuilt.elements().get(key)
+    function = None if element is None else element.functions.get("singularity")
+    if function is None:
+        return None
+    return packed.ffi.cast("int (*)(const double *, const double *, double *)", function)
+
+
+def _measures(model: Compiled, run: Trajectory, number: int, call: Any) -> Array:
+    """The measure of one hinge at every sample."""
+    packed = model.packed
+    ffi, slots = packed.ffi, packed.layout.slots(number)
+    p = packed.model.bodies[packed.topology.place_of_hinge(number)].hinge_p
+    coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
+    measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
+    for k, row in enumerate(coordinates):
+        if call(p, ffi.from_buffer("double[]", row), pointer) == 0:
+            measures[k] = pointer[0]
+    return measures[np.isfinite(measures)]

@@ -1,0 +1,126 @@
+"""Flexible bodies of a run: their motion, and what acts on their sections, from the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.scene import split
+from mstmm.scene_errors import near
+
+from .loads import LineLoad, PointLoad
+from .motion import Motion
+
+if TYPE_CHECKING:
+    from mstmm.scene import Load
+
+    from ...engine.compiled import Compiled
+    from ...flexible.modal_body import ModalBody
+    from ..observed import Observed
+
+
+class FlexibleBodies:
+    """Motions of the flexible bodies over the samples of a run, made when they are asked for."""
+
+    def __init__(self, model: Compiled, observed: Observed) -> None:
+        self.model, self.observed, self.run = model, observed, observed.run
+        self.known: Mapping[str, ModalBody] = model.flexible
+        self._motions: dict[str, Motion] = {}
+
+    def body(self, name: str, what: str) -> ModalBody:
+        """The numbers of a flexible body; SceneError for another body, or none, of this name."""
+        found = self.known.get(name)
+        if found is not None:
+            return found
+        listed = ", ".join(f'"{x}"' for x in self.known)
+        if name in self.observed.references:
+            there = f"the flexible ones are {listed}" if listed else "the scene has no flexible one"
+            raise SceneError(f'"{name}": {what} is known of flexible bodies only; {there}')
+        hint = near(name, self.known)
+        raise SceneError(f'"{name}": there is no such flexible body in the scene{hint}')
+
+    def motion(self, name: str, what: str = "its motion") -> Motion:
+        """Motion of one flexible body."""
+        if name not in self._motions:
+            body = self.body(name, what)
+            slots = self.model.layout.modal[name]
+            points = self.observed.points(name)
+            self._motions[name] = Motion(
+                body, self.run.t, self.run.q[:, slots.q_slice], self.run.u[:, slots.u_slice],
+                self.observed.columns("udot", (slots.u_slice,)), points[:, 0:3],
+                points[:, 15:24].reshape(-1, 3, 3), points[:, 3:6], points[:, 9:12],
+                points[:, 6:9], points[:, 12:15],
+            )  # fmt: skip
+        return self._motions[name]
+
+    def coupled_start(self) -> tuple[Compiled, Array]:
+        """A model in which all of them are coupled, and its q at the start of the run."""
+        return self.model, self.run.first[1]
+
+    @cached_property
+    def gravity(self) -> Array:
+        """(3,) m/s2, inertial axes."""
+        return np.array(self.model.scene.gravity)
+
+    # --- what acts on a body --------------------------------------------------------------------
+
+    def held_end(self, name: str) -> str:
+        """The end through which a body hangs on the tree."""
+        for hinge in self.model.scene.hinge:
+            body, end = split(hinge.outboard)
+            if body == name:
+                return end
+        raise SceneError(f'"{name}": no hinge holds this body')
+
+    def held_place(self, name: str) -> float:
+        """The x in m of the section through which a beam hangs on the tree."""
+        return float(self.known[name].ports[self.held_end(name)].position[0])
+
+    def at_end(self, name: str, end: str) -> tuple[Array, Array] | None:
+        """Force and moment (n, 3) of the outside on a port of a body, at the section's point,
+        inertial axes; None where nothing is attached.  Not known of the end that is held."""
+        place = self.observed.engine.packed.hinge_position.get(f"{name}/{end}")
+        if place is None:
+            return None
+        load = self.observed.columns("loads", (place,))
+        return -load[:, :3], -load[:, 3:]
+
+    def end_loads(self, name: str) -> dict[str, tuple[Array, Array]]:
+        """Port -> force and moment (n, 3) of the outside on it, inertial axes, of all but the held
+        end."""
+        held, found = self.held_end(name), dict[str, tuple[Array, Array]]()
+        for port in self.known[name].ports:
+            load = None if port == held else self.at_end(name, port)
+            if load is not None:
+                found[port] = load
+        return found
+
+    def point_loads(self, name: str) -> list[PointLoad]:
+        """What acts at sections of a beam, but for the end that is held."""
+        body, lines = self.known[name], {load.name for load in self._spread(name)}
+        found = []
+        for port, load in self.end_loads(name).items():
+            if port not in lines:
+                found.append(PointLoad(float(body.ports[port].position[0]), *load))
+        return found
+
+    def line_loads(self, name: str) -> list[LineLoad]:
+        """Loads per length on a beam."""
+        shapes, found = self.known[name].shapes, []
+        for load in self._spread(name):
+            acting = self.at_end(name, load.name)
+            if shapes is not None and acting is not None:
+                first, last = load.span or (0.0, shapes.length)
+                found.append(LineLoad(first, last, *acting))
+        return found
+
+    def _spread(self, name: str) -> list[Load]:
+        return [
+            load for load in self.model.scene.load
+            if load.on == name and load.force_per_length is not None
+        ]  # fmt: skip

@@ -1,0 +1,234 @@
+"""What a flexible body did over a run: its floating frame, its modal coordinates, its sections.
+
+Arrays have the time first.  A section at x of a beam stands at r0 + phi eta - 1/2 eta^T g eta
+against the floating frame, turned by exp(Psi~), Psi = theta eta - 1/2 eta^T h eta (the kernel
+`section`); s is the displacement along the beam, v and w across, to first order
+Psi = (twist, -w', v').
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array, numbers
+from mstmm.errors import SceneError
+
+if TYPE_CHECKING:
+    from ...flexible.beam.ports import BeamShapes
+    from ...flexible.beam.shape_fields import ShapeValues
+    from ...flexible.modal_body import ModalBody
+
+
+#: A section may lie this part of the length beyond the ends: rounding of the user's numbers.
+_BEYOND = 1e-9
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of one flexible body over n samples.
+
+    Attributes:
+        body: its numbers.
+        t: (n,) s.
+        eta, etad, etadd: (n, modes) modal coordinates, speeds and accelerations.
+        position: (n, 3) m, origin of the floating frame, inertial axes.
+        rotation: (n, 3, 3), frame axes to inertial axes.
+        velocity, spin: (n, 3) m/s and rad/s, of the frame, inertial axes.
+        acceleration, spin_rate: (n, 3) m/s2 and rad/s2, of the frame, inertial axes.
+    """
+
+    body: ModalBody
+    t: Array
+    eta: Array
+    etad: Array
+    etadd: Array
+    position: Array
+    rotation: Array
+    velocity: Array
+    spin: Array
+    acceleration: Array
+    spin_rate: Array
+
+    def some(self, samples: Any) -> Motion:
+        """The same at some samples: a slice or indices."""
+        arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        kept = {name: arrays[name] for name in _ARRAYS}
+        return Motion(self.body, **kept)
+
+    @property
+    def shapes(self) -> BeamShapes:
+        """Shapes along the axis of a beam; SceneError for a body that has none."""
+        return shapes_of(self.body, "what is along its axis")
+
+    # --- the floating frame in its own axes -----------------------------------------------------
+
+    def inward(self, vectors: Array) -> Array:
+        """(n, 3) or (n, m, 3) inertial components -> frame components."""
+        return np.einsum("tji,t...j->t...i", self.rotation, vectors)
+
+    def outward(self, vectors: Array) -> Array:
+        """(n, 3) or (n, m, 3) frame components -> inertial components."""
+        return np.einsum("tij,t...j->t...i", self.rotation, vectors)
+
+    @cached_property
+    def frame_velocity(self) -> Array:
+        """(n, 3) velocity of the frame's origin, frame axes."""
+        return self.inward(self.velocity)
+
+    @cached_property
+    def frame_spin(self) -> Array:
+        """(n, 3) angular velocity of the frame, frame axes."""
+        return self.inward(self.spin)
+
+    @cached_property
+    def frame_acceleration(self) -> Array:
+        """(n, 3) acceleration of the frame's origin, frame axes."""
+        return self.inward(self.acceleration)
+
+    @cached_property
+    def frame_spin_rate(self) -> Array:
+        """(n, 3) angular acceleration of the frame, frame axes."""
+        return self.inward(self.spin_rate)
+
+
+_ARRAYS = (
+    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "spin", "acceleration",
+    "spin_rate",
+)  # fmt: skip
+
+
+# --- places along a beam --------------------------------------------------------------------------
+
+
+def shapes_of(body: ModalBody, what: str) -> BeamShapes:
+    """Shapes of a beam along its axis; SceneError for a body that has no axis."""
+    if body.shapes is None:
+        raise SceneError(
+            f'"{body.name}": {what} is known along beams; this body is elastic by its matrices: '
+            "ask for the position of its ends and for modal_energy instead"
+        )
+    return body.shapes
+
+
+def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
+    """x in m as (m,); SceneError for a place off the beam or a number that is none."""
+    length = float(shapes_of(body, what).length)
+    places = np.atleast_1d(numbers(f'{what} of "{body.name}": x', x))
+    if places.ndim != 1:
+        raise SceneError(f"{what}: x has shape {places.shape}, expected one number or (m,)")
+    off = ~((places >= -_BEYOND * length) & (places <= length * (1 + _BEYOND)))
+    if off.any():
+        raise SceneError(
+            f'{what} of "{body.name}": x = {places[off][0]:g} m lies off the beam; '
+            f"expected 0 to {length:g} m"
+        )
+    return np.asarray(np.clip(places, 0.0, length))
+
+
+def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
+    """Values of the shapes at x (m,), kept for the next who asks for the same places, if they are
+    not too many."""
+    if len(places) * shapes.n > _MOST_KEPT:
+        return shapes.at(places)
+    return _kept(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
+
+
+#: Values of shapes at sections that are kept.
+_MOST_KEPT = 2**17
+
+
+@lru_cache(maxsize=16)
+def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
+    return shapes.at(np.frombuffer(places))
+
+
+def deflection(motion: Motion, places: Array) -> Array:
+    """(n, m, 3) elastic displacement in m of the axis at x, frame axes, second order included."""
+    first = to_first_order(values_at(motion.shapes, places).phi, motion.eta)
+    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., :3]
+
+
+def turns(motion: Motion, places: Array) -> Array:
+    """(n, m, 3) rotation vectors in rad of the sections against the frame, second order included:
+    to first order twist, -w', v'."""
+    first = to_first_order(values_at(motion.shapes, places).theta, motion.eta)
+    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., 3:]
+
+
+def to_first_order(field: Array, modal: Array) -> Array:
+    """(n, m, 3) of a field (m, 3, modes) and modal coordinates or their rates (n, modes)."""
+    flat = field.reshape(-1, field.shape[-1])
+    return np.asarray((modal @ flat.T).reshape(len(modal), *field.shape[:-1]))
+
+
+def drawn(motion: Motion, places: Array, a: str, b: str, carried: bool = False) -> Array:
+    """(n, m, 6) displacement and rotation a^T g b of second order at x, for a and b among eta, etad
+    and etadd; zeros of a linear beam; `carried` as in `SecondOrder`."""
+    if not motion.shapes.stiffening:
+        return np.zeros((len(motion.t), len(places), 6))
+    field = motion.shapes.second_order
+    return field.of(places, getattr(motion, a), getattr(motion, b), carried)
+
+
+def slope(motion: Motion, places: Array) -> Array:
+    """(n, m, 2) slopes v', w' of the axis against the frame's x axis."""
+    turned = turns(motion, places)
+    return np.stack([turned[:, :, 2], -turned[:, :, 1]], axis=2)
+
+
+def curvature(motion: Motion, places: Array) -> Array:
+    """(n, m, 2) curvature in 1/m about y, -w'', and about z, v''."""
+    bent = values_at(motion.shapes, places).curvature[:, 1:]
+    return np.einsum("mak,tk->tma", bent, motion.eta)
+
+
+def shape(motion: Motion, places: Array) -> Array:
+    """(n, m, 3) inertial positions in m of the deflected axis."""
+    at_rest = np.zeros((len(places), 3))
+    at_rest[:, 0] = places
+    local = at_rest + deflection(motion, places)
+    return motion.position[:, None, :] + motion.outward(local)
+
+
+def section_rotations(turned: Array) -> Array:
+    """(..., 3, 3) rotations exp(Psi~) of rotation vectors (..., 3), section to frame axes.
+
+    1 + sinc(t) Psi~ + 1/2 sinc(t/2)^2 Psi~ Psi~, t = |Psi|: no small angle needs a case of its own.
+    """
+    angle = np.linalg.norm(turned, axis=-1)[..., None, None]
+    skew = tilde(turned)
+    first = np.sinc(angle / np.pi) * skew
+    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (skew @ skew)
+    return np.asarray(np.eye(3) + first + second)
+
+
+def tilde(v: Array) -> Array:
+    """(..., 3, 3) matrices of the cross product with v (..., 3)."""
+    zero = np.zeros(v.shape[:-1])
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
+    return np.stack(rows, axis=-1).reshape(*v.shape[:-1], 3, 3)
+
+
+def elastic_moment(motion: Motion, places: Array) -> Array:
+    """(n, m, 2) bending moments in N*m of the curvature of the shapes: about y and about z."""
+    sections = motion.shapes.sections(places)
+    stiffness = np.stack([sections.EI_y, sections.EI_z], axis=1)
+    return curvature(motion, places) * stiffness
+
+
+def elastic_force(motion: Motion, places: Array) -> Array:
+    """(n, m) axial force EA s' in N of the axial shapes; SceneError for a beam without them."""
+    at = values_at(motion.shapes, places)
+    if not at.stretch.any():
+        raise SceneError(
+            f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
+            'take source = "equilibrium"'
+        )
+    stretch = np.einsum("mk,tk->tm", at.stretch, motion.eta)
+    return np.asarray(stretch * motion.shapes.sections(places).EA)

@@ -1,0 +1,74 @@
+"""How motion is carried through flexible bodies, for the judgement of the sweep's pivots.
+
+With its modes condensed a body that its frame carries by delta answers with etadd = -G delta, so a
+section moves by X delta + H etadd; where the frame follows the section that is held, the frame
+itself by delta + H etadd.  The rounding of the body's own inertia counts in frame and modes alike.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+if TYPE_CHECKING:
+    from ...pack.packed import Packed
+
+
+class ModalPivots:
+    """Where gains and subspaces of the flexible bodies stand in the workspace.
+
+    Places as `templates/engine_modal.c.jinja` has them: of a body S_rf (6, n), the same re-based,
+    ..., the gain (n, 7) from 25 n, S_ff (n, n) from 32 n; of a section its subspace (6, n) from
+    6 n.
+    """
+
+    def __init__(self, packed: Packed) -> None:
+        self.frames: dict[int, tuple[int, int, int | None]] = {}
+        self.sections: dict[int, int] = {}
+        null, count = packed.ffi.NULL, packed.topology.count if packed.flexible else 0
+        for i in range(count):
+            body = packed.model.bodies[i]
+            place = None if body.section == null else int(body.section.place)
+            if body.modal != null:
+                self.frames[i] = (int(body.modal.n), int(body.modal.place), place)
+            elif place is not None:
+                self.sections[i] = place
+
+    def through(
+        self, numbers: Array, S: Array, carried: Array, parents: NDArray[np.int64], E: Array
+    ) -> None:
+        """Change in place: `carried` (m, 6, 6), the motion of each body from that of its parent, to
+        what it is with the modes giving way, and the rounding `E` (m, 6, 6) of each flexible body.
+
+        `S` (m, 6, 6) are the inertias with the modes condensed.
+        """
+        answers = {i: self._answer(numbers, i) for i in self.frames}
+        for i, parent in enumerate(parents.tolist()):
+            if parent in answers:
+                gain, moved = answers[parent]
+                own = carried[i] @ moved
+                if i in self.sections:
+                    n = len(gain)
+                    first = self.sections[i] + 6 * n
+                    own = own - numbers[first : first + 6 * n].reshape(6, n) @ gain
+                carried[i] = own
+        for i, (n, place, inward) in self.frames.items():
+            gain, moved = answers[i]
+            first = place + (0 if inward is None else 6 * n)
+            rows = numbers[first : first + 6 * n].reshape(6, n)
+            whole = np.abs(np.diag(S[i] + rows @ gain))
+            modal = np.abs(np.diag(numbers[place + 32 * n : place + 32 * n + n * n].reshape(n, n)))
+            E[i] = moved.T @ (whole[:, None] * moved) + gain.T @ (modal[:, None] * gain)
+
+    def _answer(self, numbers: Array, i: int) -> tuple[Array, Array]:
+        """G (n, 6), and the motion (6, 6) of the frame itself."""
+        n, place, inward = self.frames[i]
+        gain = numbers[place + 25 * n : place + 32 * n].reshape(n, 7)[:, :6]
+        if inward is None:
+            return gain, np.eye(6)
+        subspace = numbers[inward + 6 * n : inward + 12 * n].reshape(6, n)
+        return gain, np.eye(6) - subspace @ gain

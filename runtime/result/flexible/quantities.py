@@ -1,0 +1,169 @@
+"""Results of flexible bodies, and momenta of any body: the part of `Result` that is about them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from . import energy as observe_energy
+from . import motion as observe
+from .bodies import FlexibleBodies
+from .loads import section_loads
+from .momentum import Momenta
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...engine.compiled import Compiled
+    from ..observed import Observed
+    from .motion import Motion
+
+
+#: Where bending moments and axial forces come from.
+SOURCES = ("equilibrium", "shapes")
+
+
+class FlexibleResults:
+    """Quantities along beams and of flexible bodies; part of `Result`.
+
+    `x` is a place along the beam in m, an array of m places, or the name of an end ("tip").  For
+    one place the arrays are (n, ...), for several (n, m, ...).  SceneError for a place off the
+    beam, a body that is not there, and a body that has no such quantity.
+    """
+
+    model: Compiled
+    _observed: Observed
+
+    @cached_property
+    def _flexible(self) -> FlexibleBodies:
+        return FlexibleBodies(self.model, self._observed)
+
+    @cached_property
+    def _momenta(self) -> Momenta:
+        return Momenta(self._flexible)
+
+    def _along(
+        self, body: str, x: ArrayLike | str, what: str, get: Callable[[Motion, Array], Array]
+    ) -> Array:
+        motion = self._flexible.motion(body, what)
+        if isinstance(x, str):
+            x = self._end(motion, x, what)
+        places = observe.stations(motion.body, x, what)
+        values = get(motion, places)
+        return values[:, 0] if np.ndim(x) == 0 else values
+
+    @staticmethod
+    def _end(motion: Motion, end: str, what: str) -> float:
+        observe.shapes_of(motion.body, what)
+        port = motion.body.ports.get(end)
+        if port is None:
+            known = ", ".join(motion.body.ports)
+            raise SceneError(f'{what}: "{motion.body.name}" has no end "{end}"; it has {known}')
+        return float(port.position[0])
+
+    # --- along beams ----------------------------------------------------------------------------
+
+    def deflection(self, body: str, x: ArrayLike | str) -> Array:
+        """Elastic displacement (n, 3) in m of the axis at x against the floating frame, in its
+        axes; with the shortening that bending brings, unless the beam has stiffening = false."""
+        return self._along(body, x, "deflection", observe.deflection)
+
+    def slope(self, body: str, x: ArrayLike | str) -> Array:
+        """Slopes (n, 2) of the axis at x against the floating frame: v' and w', of the deflections
+        along y and z."""
+        return self._along(body, x, "slope", observe.slope)
+
+    def curvature(self, body: str, x: ArrayLike | str) -> Array:
+        """Curvature (n, 2) in 1/m at x about y, -w'', and about z, v''."""
+        return self._along(body, x, "curvature", observe.curvature)
+
+    def section_force(self, body: str, x: ArrayLike | str) -> Array:
+        """Force (n, 3) in N of the part beyond x on the part before it, in the axes of the section:
+        axial (tension positive), shear along y and z.  From equilibrium."""
+        return self._along(body, x, "section_force", lambda m, p: self._loads(m, p)[0])
+
+    def section_moment(self, body: str, x: ArrayLike | str) -> Array:
+        """Moment (n, 3) in N*m of the part beyond x on the part before it about the deflected axis,
+        in the axes of the section: torque, bending about y and z.  From equilibrium."""
+        return self._along(body, x, "section_moment", lambda m, p: self._loads(m, p)[1])
+
+    def bending_moment(self, body: str, x: ArrayLike | str, source: str = "equilibrium") -> Array:
+        """Bending moments (n, 2) in N*m at x about y and z, of the part beyond on the part before.
+
+        From "equilibrium": inertia, gravity and loads of the free side added up.  From "shapes":
+        -EI_y w'' and EI_z v'', which cannot be better than the shapes' curvature.
+        """
+        if _source(source) == "equilibrium":
+            return self.section_moment(body, x)[..., 1:]
+        return self._along(body, x, "bending_moment", observe.elastic_moment)
+
+    def axial_force(self, body: str, x: ArrayLike | str, source: str = "equilibrium") -> Array:
+        """Axial force (n,) in N at x, tension positive.
+
+        From "equilibrium" as `section_force`, also where the axis does not stretch; from "shapes"
+        EA s', of beams with axial modes.
+        """
+        if _source(source) == "equilibrium":
+            return self.section_force(body, x)[..., 0]
+        return self._along(body, x, "axial_force", observe.elastic_force)
+
+    def _loads(self, motion: Motion, places: Array) -> tuple[Array, Array]:
+        flexible, name = self._flexible, motion.body.name
+        return section_loads(
+            motion, places, flexible.gravity, flexible.held_place(name),
+            flexible.point_loads(name), flexible.line_loads(name),
+        )  # fmt: skip
+
+    def shape(self, body: str, points: int = 41) -> Array:
+        """Inertial positions (n, points, 3) in m of the deflected axis at evenly spaced places."""
+        if points < 2:
+            raise SceneError(f"shape: points = {points}: expected 2 or more")
+        motion = self._flexible.motion(body, "shape")
+        length = observe.shapes_of(motion.body, "shape").length
+        return observe.shape(motion, np.linspace(0.0, length, points))
+
+    # --- of a flexible body ---------------------------------------------------------------------
+
+    def modal_energy(self, body: str) -> Array:
+        """Energy (n, modes) in J of each mode: strain, and kinetic of the motion against the
+        floating frame: 1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k."""
+        return observe_energy.modal_energy(self._flexible.motion(body, "modal_energy"))
+
+    def strain_energy(self, body: str) -> Array:
+        """Strain energy (n,) in J."""
+        return observe_energy.strain_energy(self._flexible.motion(body, "strain_energy"))
+
+    # --- of any body ----------------------------------------------------------------------------
+
+    def momentum_of(self, body: str) -> Array:
+        """Linear momentum (n, 3) in kg*m/s of one body, rigid or flexible."""
+        return self._momenta.of(body).linear
+
+    def angular_momentum_of(self, body: str) -> Array:
+        """Angular momentum (n, 3) in kg*m2/s of one body about its own mass centre."""
+        return self._momenta.of(body).angular
+
+    def center_of_mass(self, body: str) -> Array:
+        """Position (n, 3) in m of the mass centre of one body, deformed as it is."""
+        return self._momenta.of(body).center
+
+    def equivalent_velocity(self, body: str) -> Array:
+        """Velocity (n, 3) in m/s that a rigid body of this mass and momentum would have, p/m."""
+        return self._momenta.of(body).velocity
+
+    def equivalent_spin(self, body: str) -> Array:
+        """Angular velocity (n, 3) in rad/s of a rigid body of this angular momentum about the mass
+        centre, with the inertia of the undeformed body in the axes of the floating frame."""
+        return self._momenta.of(body).spin
+
+
+def _source(source: str) -> str:
+    if source not in SOURCES:
+        raise SceneError(f'source = "{source}": expected "equilibrium" or "shapes"')
+    return source

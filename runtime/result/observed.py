@@ -1,0 +1,220 @@
+"""What the states of a run show, computed in batches when first asked for, and kept.
+
+One batch of the engine gives everything at once for a run of usual size; where that would not fit
+into memory, each body and each kind of quantity is a batch of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.scene import split
+from mstmm.scene_all import SceneTables
+from mstmm.scene_body import BodyTable
+from mstmm.scene_errors import near
+
+from ..engine.calls import PARTS, Probe
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..pack.layout import Layout
+    from ..run.trajectory import Trajectory
+
+
+#: Numbers of one batch, about 130 MB.
+_BATCH = 2**24
+
+#: Bodies and ends of a scene up to which all of them are observed together.
+_TOGETHER = 1000
+
+
+class Observed:
+    """Arrays over the samples of a trajectory.  Rows that cannot be evaluated are nan.
+
+    `failures` holds one sentence for each such row, as far as they have been met.
+    """
+
+    def __init__(self, model: Compiled, run: Trajectory) -> None:
+        self.engine, self.run = model.looped, run
+        self.failures: tuple[str, ...] = ()
+        self.references = References(model.scene.skeleton)
+        self._points: dict[str, Array] = {}
+        self._parts: dict[str, Array] = {}
+
+    def points(self, reference: str) -> Array:
+        """(n, 24): motion of "body" or "body.end", see `Observation`."""
+        if reference not in self._points:
+            known = self.references.canonical(reference)
+            if known is None and split(reference)[0] != "ground":
+                raise SceneError(self.unknown(reference))
+            self._observe("points", known or reference)
+            self._points[reference] = self._points[known or reference]
+        return self._points[reference]
+
+    def node(self, name: str) -> Array:
+        """(n, 24): as `points` of a body of the engine's own scene, such as a point mass of a beam
+        "blade/point 1", or of any body of the user's."""
+        if name not in self._points:
+            self._seen([name], ("points",))
+        return self._points[name]
+
+    def fetch(self, references: Sequence[str]) -> None:
+        """Observe these bodies and ends in one go, where they are asked for one after another."""
+        if len(self.references) > _TOGETHER:
+            missing = [name for name in references if name not in self._points]
+            if missing and len(self.run.t) * 24 * len(missing) <= _BATCH:
+                self._seen(missing, ("points",))
+
+    def part(self, name: str) -> Array:
+        """loads, efforts, udot or sums, see `Observation`."""
+        if name not in self._parts:
+            self._observe(name, None)
+        return self._parts[name]
+
+    def columns(self, name: str, which: Any) -> Array:
+        """Some columns `which` of loads, efforts or udot; of large ones no more is kept."""
+        return np.concatenate([part[(slice(None), *which)] for part in self._pieces(name)])
+
+    def largest_loads(self) -> tuple[float, float]:
+        """The largest component of force (N) and of moment (N*m) of any hinge."""
+        found = [0.0, 0.0]
+        for part in self._pieces("loads"):
+            for k in (0, 1):
+                numbers = part[:, :, 3 * k : 3 * k + 3]
+                numbers = np.abs(numbers[np.isfinite(numbers)])
+                found[k] = max(found[k], float(np.max(numbers, initial=0.0)))
+        return found[0], found[1]
+
+    def _pieces(self, name: str) -> Iterator[Array]:
+        """A part, piece by piece in time where all of it would not fit into memory."""
+        width = {"loads": 6 * self.engine.packed.topology.count}.get(name, self.engine.nu)
+        run, rows = self.run, max(1, _BATCH // max(1, width))
+        if name in self._parts or len(run.t) <= rows:
+            yield self.part(name)
+            return
+        for first in range(0, len(run.t), rows):
+            some = slice(first, first + rows)
+            seen = self.engine.observe(
+                run.t[some], run.q[some], run.u[some], run.memory[some], (), (name,)
+            )
+            self.failures = self.failures or seen.failures
+            yield getattr(seen, name)
+
+    def unknown(self, reference: str) -> str:
+        """That there is no such body or end, and what is near."""
+        body = split(reference)[0]
+        if self.references.bodies.of_chain(body) and self.references.bodies.find(body) is None:
+            return f'"{reference}": {self.references.bodies.missing(body)}'
+        hint = near(reference, self.references)
+        return f'"{reference}": there is no such body or end in the scene{hint}'
+
+    def _observe(self, part: str, reference: str | None) -> None:
+        run = self.run
+        bodies, nu = self.engine.packed.topology.count, self.engine.nu
+        size = len(run.t) * (24 * len(self.references) + 6 * bodies + 2 * nu + 10)
+        together = size <= _BATCH and len(self.references) <= _TOGETHER
+        parts = PARTS if together else (part,)
+        if not together or (reference is not None and reference not in self.references):
+            wanted = [] if reference is None else [reference]
+        else:
+            wanted = list(self.references)
+        self._seen(wanted, parts)
+
+    def _seen(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+        run = self.run
+        probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
+        seen = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
+        if "efforts" in parts:
+            _no_efforts_on_modes(seen.efforts, self.engine.packed.layout)
+        for array in (seen.points, *(getattr(seen, name) for name in PARTS)):
+            array.flags.writeable = False
+        self.failures = self.failures or seen.failures
+        for i, name in enumerate(wanted):
+            self._points[name] = seen.points[:, i]
+        self._parts |= {name: getattr(seen, name) for name in parts if name != "points"}
+
+
+def _no_efforts_on_modes(efforts: Array, layout: Layout) -> None:
+    """Laws and drives act on hinges: on modes they put nothing."""
+    for slots in layout.modal.values():
+        efforts[:, slots.u_slice] = 0.0
+
+
+class References(Collection[str]):
+    """Every body and every end of the scene: "rod1", "rod1.tip".
+
+    `scene` is the skeleton: flexible bodies count as bodies with ends like all others.
+    """
+
+    def __init__(self, scene: SceneTables) -> None:
+        self.scene, self.bodies = scene, scene.bodies
+
+    def canonical(self, reference: str) -> str | None:
+        """The reference with the number of a chain's member; None if there is no such end."""
+        name, at = split(reference)
+        number = self.bodies.find(name)
+        ends = self.bodies.ends(name)
+        if number is None or ends is None or (at and at not in ends):
+            return None
+        return self.bodies.name(number) + (f".{at}" if at else "")
+
+    def __contains__(self, reference: object) -> bool:
+        return isinstance(reference, str) and self.canonical(reference) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        for body in self.scene.body:
+            yield from _with_ends(body.name, body)
+        for chain in self.scene.chain:
+            for k in range(chain.count):
+                yield from _with_ends(f"{chain.name}[{k}]", chain.body_of(k))
+
+    def __len__(self) -> int:
+        found = sum(1 + len(body.ends) for body in self.scene.body)
+        for chain in self.scene.chain:
+            repeats, rest = divmod(chain.count, len(chain.body))
+            ends = [1 + len(body.ends) for body in chain.body]
+            found += repeats * sum(ends) + sum(ends[:rest])
+        return found
+
+
+def _with_ends(name: str, body: BodyTable) -> Iterator[str]:
+    yield name
+    for end in body.ends:
+        yield f"{name}.{end}"
+
+
+def quaternions(matrices: Array) -> Array:
+    """Unit quaternions (n, 4), w, x, y, z, of rotation matrices (n, 9), row by row.
+
+    The largest of the four components is found first, so that no division is by a small number
+    (Shepperd, J. Guidance and Control 1 (1978) 223-224).  The sign is continuous over the rows and
+    w >= 0 in the first one.
+    """
+    r = matrices.reshape(-1, 3, 3)
+    x, y, z = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    squares = np.stack([1 + x + y + z, 1 + x - y - z, 1 - x + y - z, 1 - x - y + z], axis=1)
+    pick = np.argmax(np.nan_to_num(squares), axis=1)
+    a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    d, e, f = r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1]
+    w2, x2, y2, z2 = squares.T
+    rows = np.stack([
+        np.stack([w2, a, b, c], 1), np.stack([a, x2, d, e], 1),
+        np.stack([b, d, y2, f], 1), np.stack([c, e, f, z2], 1),
+    ], 1)  # fmt: skip
+    q = rows[np.arange(len(r)), pick]
+    q /= np.sqrt(np.sum(q * q, axis=1, keepdims=True))
+    return np.asarray(q * continuous_signs(q)[:, None])
+
+
+def continuous_signs(q: Array) -> Array:
+    """Signs (n,) that make neighbouring quaternions point the same way; +w first."""
+    if not len(q):
+        return np.ones(0)
+    steps = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)
+    first = -1.0 if q[0, 0] < 0 else 1.0
+    return np.asarray(first * np.concatenate([[1.0], np.cumprod(steps)]))

@@ -1,0 +1,206 @@
+"""Superposition: small elastic motions of bodies on the rigid motion of a tree.
+
+A small motion moves the point that is at r by a + psi x r (inertial axes) and turns what is there
+by psi.  Hinges pass it on as it is, for their coordinates are those of the rigid run; a flexible
+body adds that of its section on the way out, less that of the section by which it is held, as far
+as the hinge there holds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.scene import split
+
+from .response import Response, rigidity, split_node
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge
+
+    from ...engine.compiled import Compiled
+    from ...flexible.modal_port import ModalPort
+    from ..observed import Observed
+
+
+#: Hinges whose outboard side may turn about their axis alone, about any axis, and may go anywhere.
+_ABOUT_AXIS = ("pin", "screw", "cylindrical", "planar")
+_ABOUT_ALL = ("ball", "universal", "gimbal", "free", "elastic")
+_ANYWHERE = ("free", "elastic")
+
+
+@dataclass(frozen=True)
+class Jet:
+    """A vector over time, its rate and its second rate, (n, 3) each, inertial axes."""
+
+    value: Array
+    rate: Array
+    second: Array
+
+    def __add__(self, other: Jet) -> Jet:
+        return Jet(self.value + other.value, self.rate + other.rate, self.second + other.second)
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.value, -self.rate, -self.second)
+
+    def cross(self, other: Jet) -> Jet:
+        """self x other."""
+        a, b = self, other
+        return Jet(
+            np.cross(a.value, b.value),
+            np.cross(a.rate, b.value) + np.cross(a.value, b.rate),
+            np.cross(a.second, b.value)
+            + 2 * np.cross(a.rate, b.rate)
+            + np.cross(a.value, b.second),
+        )
+
+
+@dataclass(frozen=True)
+class SmallMotion:
+    """a + psi x r of every point r."""
+
+    origin: Jet
+    turn: Jet
+
+    def __add__(self, other: SmallMotion) -> SmallMotion:
+        return SmallMotion(self.origin + other.origin, self.turn + other.turn)
+
+    def __neg__(self) -> SmallMotion:
+        return SmallMotion(-self.origin, -self.turn)
+
+
+class Superposition:
+    """Small motions of all nodes of a tree, from the responses of its one-way bodies."""
+
+    def __init__(self, model: Compiled, rigid: Observed, responses: Mapping[str, Response]) -> None:
+        self.model, self.rigid, self.responses = model, rigid, responses
+        self.known = rigidity(model)
+        packed = rigid.engine.packed
+        self.parents = packed.topology.parents
+        self.names = packed.scene.bodies
+        self.order = packed.topology.order
+        self._sections: dict[tuple[str, str], SmallMotion] = {}
+        self._held: dict[str, SmallMotion] = {}
+
+    def moved(self, reference: str) -> Array:
+        """(n, 24): motion of "body" or "body.end" with the elastic motions on its way, as
+        `Observed.points`."""
+        points = self.rigid.points(reference)
+        small = self.on_way(reference)
+        return points if small is None else _superposed(points, small)
+
+    def on_way(self, reference: str) -> SmallMotion | None:
+        """The small motion at a reference; None where no one-way body is on its way."""
+        place = self.rigid.engine.packed.end(reference)[0]
+        body, end = split(reference)
+        found: SmallMotion | None = None
+        exit_ = end if body in self.responses else ""
+        while place >= 0:
+            name = self.names.name(self.order[place])
+            if "/" in name and split_node(name)[0] in self.responses:
+                exit_ = split_node(name)[1]
+            if name in self.responses:
+                here = -self.held(name)
+                if exit_:
+                    here = here + self.section(name, exit_)
+                found, exit_ = here if found is None else found + here, ""
+            place = self.parents[place]
+        return found
+
+    def section(self, name: str, end: str) -> SmallMotion:
+        """Small motion of a section of a one-way body against its rigid place."""
+        if (name, end) not in self._sections:
+            self._sections[name, end] = self._section(name, self.known.one_way[name].ports[end])
+        return self._sections[name, end]
+
+    def _section(self, name: str, port: ModalPort) -> SmallMotion:
+        points, moves = self.rigid.points(name), self.responses[name]
+        none = np.zeros((len(points), 3))
+        place = _origin(points) + _turned(points, none + port.position, none, none)
+        rates = (moves.eta, moves.etad, moves.etadd)
+        shift = _turned(points, *(eta @ port.phi.T for eta in rates))
+        turn = _turned(points, *(eta @ port.theta.T for eta in rates))
+        return SmallMotion(shift + -turn.cross(place), turn)
+
+    def held(self, name: str) -> SmallMotion:
+        """The part of the held section's small motion that the hinge there does not allow."""
+        if name not in self._held:
+            self._held[name] = self._constrained(name)
+        return self._held[name]
+
+    def _constrained(self, name: str) -> SmallMotion:
+        end = self.known.held[name]
+        port, hinge = self.known.one_way[name].ports[end], self._holder(name)
+        shift, turn = port.phi, port.theta
+        if hinge is None or hinge.type in _ANYWHERE:
+            shift = np.zeros_like(shift)
+        turn = _not_free(hinge, np.asarray(port.rotation)) @ turn
+        return self._section(name, _with(port, shift, turn))
+
+    def _holder(self, name: str) -> Hinge | None:
+        return next((h for h in self.model.scene.hinge if h.outboard_body == name), None)
+
+
+def _with(port: ModalPort, phi: Array, theta: Array) -> ModalPort:
+    from dataclasses import replace
+
+    return replace(port, phi=phi, theta=theta)
+
+
+def _not_free(hinge: Hinge | None, rotation: Array) -> Array:
+    """(3, 3) projection of rotations, body axes, on those that a hinge holds."""
+    driven = hinge is not None and hinge.drive is not None and None not in hinge.drive
+    if hinge is not None and (driven or hinge.type in ("fixed", "prismatic")):
+        return np.eye(3)
+    if hinge is None or hinge.type not in _ABOUT_AXIS:
+        return np.zeros((3, 3))
+    axis = rotation @ np.array(hinge.unit_axis)
+    return np.eye(3) - np.outer(axis, axis)
+
+
+def _origin(points: Array) -> Jet:
+    return Jet(points[:, 0:3], points[:, 3:6], points[:, 6:9])
+
+
+def _turned(points: Array, value: Array, rate: Array, second: Array) -> Jet:
+    """A vector of body components over time, in inertial axes."""
+    turned = points[:, 15:24].reshape(-1, 3, 3)
+    spin, spin_rate = points[:, 9:12], points[:, 12:15]
+    here, rate, second = (np.einsum("tij,tj->ti", turned, v) for v in (value, rate, second))
+    carried = np.cross(spin, here)
+    return Jet(
+        here,
+        carried + rate,
+        np.cross(spin_rate, here) + np.cross(spin, carried) + 2 * np.cross(spin, rate) + second,
+    )
+
+
+def _superposed(points: Array, small: SmallMotion) -> Array:
+    """Points (n, 24) with a small motion: places to first order, rotations exp(psi~) R."""
+    place = _origin(points)
+    place = place + small.origin + small.turn.cross(place)
+    spin, spin_rate, turn = points[:, 9:12], points[:, 12:15], small.turn
+    found = np.array(points)
+    found[:, 0:9] = np.concatenate([place.value, place.rate, place.second], axis=1)
+    found[:, 9:12] = spin + turn.rate + np.cross(turn.value, spin)
+    found[:, 12:15] = (
+        spin_rate + turn.second + np.cross(turn.rate, spin) + np.cross(turn.value, spin_rate)
+    )
+    rotation = points[:, 15:24].reshape(-1, 3, 3)
+    found[:, 15:24] = (_exponential(turn.value) @ rotation).reshape(-1, 9)
+    return found
+
+
+def _exponential(vectors: Array) -> Array:
+    """(n, 3, 3) rotations by rotation vectors (n, 3)."""
+    angle = np.linalg.norm(vectors, axis=1)
+    x, y, z = vectors.T
+    none = np.zeros_like(x)
+    tilde = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
+    first, second = np.sinc(angle / np.pi), np.sinc(angle / (2 * np.pi)) ** 2 / 2
+    return np.asarray(np.eye(3) + first[:, None, None] * tilde
+                      + second[:, None, None] * (tilde @ tilde))  # fmt: skip

@@ -1,0 +1,250 @@
+"""One-way linear elastodynamics: the elastic response of bodies to a run in which they are rigid.
+
+Jing, Stephansson, section 2.7.1: rigid bodies first, then each body's deformation under the inertia
+and interaction forces found, then superposition.  The second step is the second line of (2.82),
+
+    M_ff etadd + D etad + K eta = Q_f - M_fr ydd_r        (and the centrifugal load of the run)
+
+on n oscillators per body, which are solved exactly for loads sampled from the rigid run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+from mstmm.scene import split
+
+from ...flexible.modal_kernels import kernel
+from ...flexible.records import moments_of
+from ...kernels.vectorized import evaluate
+from ...run.execution import Watch, first_run
+from ..observed import Observed
+from .oscillators import Cells, Oscillators
+
+if TYPE_CHECKING:
+    from ...engine.compiled import Compiled
+    from ...flexible.modal_body import ModalBody
+    from ...pack.flexible.rigidified import Rigidified
+    from ...run.trajectory import Trajectory
+
+
+#: Steps of the loads' polynomials at smooth edges, of the largest load, that end the refinement.
+TOLERANCE = 1e-7
+FIRST_CELLS, MOST_CELLS = 32, 4096
+
+#: Two edges so near to each other, as part of the run, are one.
+_APART = 1e-9
+
+
+@dataclass(frozen=True)
+class Response:
+    """Modal coordinates (n, modes) in m or rad, their rates and second rates, over the samples."""
+
+    eta: Array
+    etad: Array
+    etadd: Array
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a one-way run took besides the rigid run itself.
+
+    evaluations: right-hand sides of the rigid runs from which loads were sampled; samples: states
+    at which loads were computed; cells: intervals on each of which they are one polynomial;
+    oscillators: modal coordinates of all bodies; error: largest step of the loads between cells, of
+    the largest load.
+    """
+
+    evaluations: int
+    samples: int
+    cells: int
+    oscillators: int
+    error: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.oscillators} oscillators over {self.cells} cells, loads at {self.samples} "
+            f"states of {self.evaluations} evaluations (loads to {self.error:.1g})"
+        )
+
+
+@dataclass(frozen=True)
+class OneWay:
+    """Responses of the one-way bodies over a run, and what they cost."""
+
+    responses: Mapping[str, Response]
+    cost: Cost
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence where the loads were too rough for their polynomials."""
+        if self.cost.error <= 10 * TOLERANCE:
+            return ()
+        return (
+            f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
+            f"cells (steps of {self.cost.error:.1g} of the largest); simulate a shorter time",
+        )
+
+
+def respond(model: Compiled, run: Trajectory) -> OneWay:
+    """Responses of every one-way body at the samples of a run of the rigid bodies.
+
+    The rigid run is repeated from its start with samples where the loads are wanted, twice as many
+    each time until their polynomials join.  Raises NumericalFailure where it cannot be repeated.
+    """
+    rigid = rigidity(model)
+    total = sum(body.n for body in rigid.one_way.values())
+    times, cells, spent = _times(model, run), FIRST_CELLS, 0
+    if times[-1] == times[0]:
+        return OneWay(_at_start(model, run), Cost(0, 0, 0, total, 0.0))
+    while True:
+        grid = Cells.between(times, cells)
+        sampled = _sampled(model, run, grid)
+        spent += sampled.statistics.evaluations
+        observed = Observed(model, sampled)
+        loads = {
+            name: grid.polynomials(_finite(modal_loads(model, body, observed), name, observed))
+            for name, body in rigid.one_way.items()
+        }
+        error = max((_error(rigid.one_way[n], grid, p) for n, p in loads.items()), default=0.0)
+        if error <= TOLERANCE or 2 * cells > MOST_CELLS:
+            break
+        cells *= 2
+    responses = {
+        name: _response(model, body, grid, loads[name], run.t)
+        for name, body in rigid.one_way.items()
+    }
+    count = len(grid.lengths)
+    return OneWay(responses, Cost(spent, len(grid.samples), count, total, error))
+
+
+def rigidity(model: Compiled) -> Rigidified:
+    """What became of the bodies that are rigid in a model's runs."""
+    expanded = model.packed.expanded
+    assert expanded is not None and expanded.rigidified is not None
+    return expanded.rigidified
+
+
+def _times(model: Compiled, run: Trajectory) -> Array:
+    """Times of the start and the last sample, and those between at which loads may jump
+    or become narrow."""
+    first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
+    events = run.t[np.flatnonzero(run.event)]
+    known = model.packed.time_map(first, last)
+    between = [t for t in (*known.breaks, *known.starts, *events) if first < t < last]
+    times = np.unique([first, *between, last])
+    apart = np.diff(times) > _APART * (last - first)  # a time may lie between two breaks
+    return np.append(times[:-1][apart], last)
+
+
+def _sampled(model: Compiled, run: Trajectory, grid: Cells) -> Trajectory:
+    s, (t, q, u) = run.settings, run.first
+    times = tuple(grid.samples.tolist())
+    settings = replace(s, t_start=t, t_end=times[-1], output_times=times, first_step=0.0)
+    repeated, _ = first_run(model, settings, q, u, Watch(None, settings))
+    if not repeated.success:
+        raise NumericalFailure(
+            f"one-way response: the run could not be repeated: {repeated.message}"
+        )
+    return _without_events(repeated, grid)
+
+
+def _without_events(run: Trajectory, grid: Cells) -> Trajectory:
+    """A run's rows at the times asked for alone."""
+    rows = np.searchsorted(run.t, grid.samples)
+    keys = ("t", "q", "u", "memory", "work", "event")
+    return replace(run, **{key: getattr(run, key)[rows] for key in keys})
+
+
+def _error(body: ModalBody, grid: Cells, loads: Array) -> float:
+    """Largest step at smooth edges, of the largest load, both as static deflections."""
+    largest = np.max(np.abs(loads[:, 0]), axis=0, initial=0.0)
+    stiffness = np.diag(body.K)
+    whole = float(np.max(largest / stiffness, initial=0.0))
+    return float(np.max(grid.jumps(loads) / stiffness)) / whole if whole > 0 else 0.0
+
+
+def modal_loads(model: Compiled, body: ModalBody, observed: Observed) -> Array:
+    """(n, modes) in N: what acts on the shapes of a body that moves rigidly, less its inertia."""
+    rigid, packed = rigidity(model), observed.engine.packed
+    points = observed.points(body.name)
+    turned = points[:, 15:24].reshape(-1, 3, 3)
+
+    def inward(vectors: Array) -> Array:
+        return np.asarray(np.einsum("tji,tj->ti", turned, vectors))
+
+    spin, spin_rate = inward(points[:, 9:12]), inward(points[:, 12:15])
+    carried = inward(points[:, 6:9] - np.array(model.scene.gravity))
+    still = np.zeros((len(points), body.n))
+    given = {
+        **moments_of(body), "K": body.K, "D": body.D, "eta": still, "etad": still,
+        "motion": np.concatenate([spin, spin_rate, carried], axis=1),
+    }  # fmt: skip
+    loads = -evaluate(kernel("residual"), given, body.n)["e_f"]
+    held = rigid.held[body.name]
+    acting = [(held, _held_by(model, body.name), 1.0)]
+    welds = [node for node in rigid.nodes.values() if split_node(node)[0] == body.name]
+    acting += [(split_node(node)[1], node, -1.0) for node in welds]
+    for end, hinge, sign in acting:
+        if hinge is None:
+            continue
+        load = sign * observed.columns("loads", (packed.hinge_position[hinge],))
+        port = body.ports[end]
+        loads = loads + inward(load[:, :3]) @ port.phi + inward(load[:, 3:]) @ port.theta
+    return np.asarray(loads)
+
+
+def _finite(loads: Array, name: str, observed: Observed) -> Array:
+    if not np.isfinite(loads).all():
+        why = next(iter(observed.failures), "they are beyond what numbers hold")
+        raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {why}')
+    return loads
+
+
+def split_node(node: str) -> tuple[str, str]:
+    """("blade", "tip") of "blade/tip"."""
+    body, _, end = node.partition("/")
+    return body, end
+
+
+def _held_by(model: Compiled, name: str) -> str | None:
+    hinges = model.scene.hinge
+    return next((h.name for h in hinges if split(h.outboard)[0] == name), None)
+
+
+def _response(
+    model: Compiled, body: ModalBody, grid: Cells, loads: Array, times: Array
+) -> Response:
+    oscillators = Oscillators(body.K, body.D, body.Mff)
+    return Response(*oscillators.motion(grid, loads, _start(model, body, loads[0, 0]), times))
+
+
+def _start(model: Compiled, body: ModalBody, load: Array) -> tuple[Array, Array]:
+    """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
+    if _starts_static(model, body.name):
+        return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
+    return body.eta, body.etad
+
+
+def _starts_static(model: Compiled, name: str) -> bool:
+    scene = model.scene
+    return any(b.initial.static for b in (*scene.beam, *scene.elastic) if b.name == name)
+
+
+def _at_start(model: Compiled, run: Trajectory) -> dict[str, Response]:
+    """Responses of a run whose samples, if there are any, all stand at its beginning."""
+    found, observed = {}, Observed(model, run)
+    for name, body in rigidity(model).one_way.items():
+        loads = modal_loads(model, body, observed)
+        rows = [(*_start(model, body, load), load) for load in loads]
+        states = np.array(rows).reshape(len(rows), 3, body.n)
+        eta, etad = states[:, 0], states[:, 1]
+        forces = states[:, 2] - eta @ body.K.T - etad @ body.D.T
+        found[name] = Response(eta, etad, np.asarray(np.linalg.solve(body.Mff, forces.T).T))
+    return found

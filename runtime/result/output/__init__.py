@@ -1,0 +1,1 @@
+"""Ways out of a result: Datasets, files, tables and pictures."""

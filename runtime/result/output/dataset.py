@@ -1,0 +1,132 @@
+"""A result as one xarray Dataset: every quantity with its dimensions, unit and long name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.extras import missing
+from mstmm.hinge_types import effort_unit
+
+from ..flexible import dataset as flexible
+from ..quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
+from . import provenance
+
+if TYPE_CHECKING:
+    from ..record import Record
+
+
+#: Speeds of a scene up to which everything about every body and hinge is written out.
+MOST_SPEEDS = 5000
+_EVERYTHING = ("body", "hinge", "flexible", "mode")
+
+
+def dataset(result: Record) -> Any:
+    """`xarray.Dataset` with dimensions time, coordinate, speed, hinge, body, axis, component.
+
+    `body` holds bodies and their ends ("rod1", "rod1.tip"), `coordinate` and `speed` the entries of
+    q and u ("shoulder.angle", "shoulder.angle_rate"), whose units differ and stand beside them.
+    Beyond MOST_SPEEDS speeds motions of bodies and loads of hinges are left out: they follow from
+    the states, and a loaded result computes those that are asked for.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise missing("io", "an xarray Dataset", error) from None
+    variables, labels = _states(result), _labels(result)
+    if result.model.nu <= MOST_SPEEDS:
+        variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
+    else:
+        labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
+    variables |= _sums(result) | provenance.variables(result)
+    return xarray.Dataset(variables, labels, provenance.attributes(result))
+
+
+Variable = tuple[tuple[str, ...], Any, dict[str, str]]
+
+
+def _words(values: list[str]) -> Any:
+    return np.array(values, dtype=object) if values else np.array([], dtype="<U1")
+
+
+def _about(unit: str, long_name: str) -> dict[str, str]:
+    return {"units": unit or "1", "long_name": long_name}
+
+
+def _common(units: list[str]) -> str:
+    """The unit of an array whose columns may have different ones."""
+    return (units[0] or "1") if len(set(units)) == 1 else "see the units beside the labels"
+
+
+def _labels(result: Record) -> dict[str, Variable]:
+    layout = result.model.layout
+    owners = list(layout.owners)
+    q_units = [unit or "1" for h in owners for unit in h.q_units]
+    u_units = [unit or "1" for h in owners for unit in h.u_units]
+    udot = [f"{h.name}.{acceleration_name(n)}" for h in owners for n in h.u_names]
+    plain: dict[str, tuple[str, list[str], str]] = {
+        "coordinate": ("coordinate", layout.q_names, "coordinate of a hinge or a mode"),
+        "coordinate_units": ("coordinate", q_units, "unit of the coordinate"),
+        "speed": ("speed", layout.u_names, "speed of a hinge or a mode"),
+        "speed_units": ("speed", u_units, "unit of the speed"),
+        "acceleration_name": ("speed", udot, "name of the speed's rate"),
+        "effort_units": ("speed", [effort_unit(u) for u in u_units], "unit of the effort"),
+        "hinge": ("hinge", list(layout.hinges), "hinge"),
+        "body": ("body", list(result._observed.references), "body or end of a body"),
+        "axis": ("axis", ["x", "y", "z"], "inertial axis"),
+        "component": ("component", ["w", "x", "y", "z"], "component of a quaternion"),
+        **flexible.labels(result),
+    }
+    found: dict[str, Variable] = {"time": (("time",), result.t, _about("s", "time"))}
+    for name, (dim, words, long_name) in plain.items():
+        found[name] = ((dim,), _words(words), {"long_name": long_name})
+    return found
+
+
+def _states(result: Record) -> dict[str, Variable]:
+    owners = list(result.model.layout.owners)
+    q_units = [unit for h in owners for unit in h.q_units]
+    u_units = [unit for h in owners for unit in h.u_units]
+    by_speed, efforts = ("time", "speed"), [effort_unit(unit) for unit in u_units]
+    rates = [rate_unit(unit) for unit in u_units]
+    effort = result._observed.part("efforts")
+    return {
+        "q": (("time", "coordinate"), result.q, _about(_common(q_units), "hinge coordinates")),
+        "u": (by_speed, result.u, _about(_common(u_units), "hinge speeds")),
+        "udot": (by_speed, result.udot, _about(_common(rates), "rates of the hinge speeds")),
+        "effort": (by_speed, effort, _about(_common(efforts), "efforts of laws and drives")),
+    }
+
+
+def _bodies(result: Record) -> dict[str, Variable]:
+    names = result._observed.references
+    found: dict[str, Variable] = {}
+    for kind, about in BODY.items():
+        columns = [result._quantities.of_body(name, kind) for name in names]
+        values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
+        last = "component" if kind == "orientation" else "axis"
+        found[kind] = (("time", "body", last), values, _about(about.unit, about.long_name))
+    return found
+
+
+def _hinges(result: Record) -> dict[str, Variable]:
+    names = list(result.model.layout.hinges)
+    found: dict[str, Variable] = {}
+    for kind, about in HINGE.items():
+        columns = [result._quantities.of_hinge(name, kind) for name in names]
+        values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
+        long_name = f"{about.long_name}, inertial axes"
+        found[kind] = (("time", "hinge", "axis"), values, _about(about.unit, long_name))
+    return found
+
+
+def _sums(result: Record) -> dict[str, Variable]:
+    found: dict[str, Variable] = {}
+    for name, (unit, long_name, _) in SUMS.items():
+        values = result._quantities.sum(name)
+        dims = ("time", "axis") if values.ndim == 2 else ("time",)
+        found[name.replace(".", "_")] = (dims, values, _about(unit, long_name))
+    work = result.quantity("work")
+    found["work"] = (("time",), work.values, _about("J", work.long_name))
+    return found

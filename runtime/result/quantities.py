@@ -1,0 +1,287 @@
+"""Quantities of a run by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy".
+
+Every name gives values over time with their unit and one label per column.  Axes are inertial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.hinge_types import effort_unit
+from mstmm.scene_errors import near
+
+from ..pack.layout import HingeSlots
+from .flexible.names import add_body
+from .kinds import Kind
+from .names import Quantity, Table, Values
+from .observed import quaternions
+
+if TYPE_CHECKING:
+    from .flexible.quantities import FlexibleResults
+    from .observed import Observed
+
+
+_XYZ, _WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
+
+
+#: Quantities of a body or an end, in the order of `Observation.points`.
+BODY = {
+    "position": Kind("m", "position of the origin", _XYZ, _XYZ),
+    "velocity": Kind("m/s", "velocity of the origin", _XYZ, ("vx", "vy", "vz")),
+    "acceleration": Kind("m/s2", "acceleration of the origin", _XYZ, ("ax", "ay", "az")),
+    "orientation": Kind("", "quaternion, body to inertial axes", _WXYZ, ("qw", "qx", "qy", "qz")),
+    "angular_velocity": Kind("rad/s", "angular velocity", _XYZ, ("wx", "wy", "wz")),
+    "angular_acceleration": Kind(
+        "rad/s2", "angular acceleration", _XYZ, ("alphax", "alphay", "alphaz")
+    ),
+}  # fmt: skip
+
+#: Loads of the inboard on the outboard side of a hinge.
+HINGE = {
+    "force": Kind("N", "force of the inboard on the outboard side", _XYZ, ("fx", "fy", "fz")),
+    "moment": Kind(
+        "N*m", "moment of the inboard on the outboard side at P", _XYZ, ("mx", "my", "mz")
+    ),
+}  # fmt: skip
+
+#: Sums over the scene: unit, long name, columns of `Observation.sums`.
+SUMS: dict[str, tuple[str, str, slice]] = {
+    "energy": ("J", "total energy", slice(0, 3)),
+    "energy.kinetic": ("J", "kinetic energy", slice(0, 1)),
+    "energy.gravity": ("J", "potential energy of gravity", slice(1, 2)),
+    "energy.springs": ("J", "energy of springs and of deformed bodies", slice(2, 3)),
+    "power": ("W", "power of everything that is not stored", slice(3, 4)),
+    "momentum": ("kg*m/s", "linear momentum", slice(4, 7)),
+    "angular_momentum": ("kg*m2/s", "angular momentum about the inertial origin", slice(7, 10)),
+}
+
+#: Quantities whose time derivatives are quantities too.
+RATES = {
+    "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
+}  # fmt: skip
+
+_COLUMNS = {
+    "position": slice(0, 3), "velocity": slice(3, 6), "acceleration": slice(6, 9),
+    "angular_velocity": slice(9, 12), "angular_acceleration": slice(12, 15),
+}  # fmt: skip
+
+
+class Quantities:
+    """Every quantity of a run by its name, from the states and what they show.
+
+    Names are made per owner, a hinge, a body, an end or the scene (""), when they are asked for.
+    """
+
+    def __init__(
+        self, observed: Observed, builtin: Collection[str], flexible: FlexibleResults
+    ) -> None:
+        self.observed, self.run, self._builtin = observed, observed.run, builtin
+        self._flexible = flexible
+        self.layout = observed.engine.packed.layout
+        self._orientations: dict[str, Array] = {}
+        self._tables: dict[str, Table] = {}
+
+    # --- of bodies ------------------------------------------------------------------------------
+
+    def of_body(self, reference: str, kind: str) -> Array:
+        """(n, 3), or (n, 4) for the orientation."""
+        points = self.observed.points(reference)
+        if kind != "orientation":
+            return points[:, _COLUMNS[kind]]
+        if reference not in self._orientations:
+            self._orientations[reference] = quaternions(points[:, 15:24])
+        return self._orientations[reference]
+
+    # --- of hinges ------------------------------------------------------------------------------
+
+    def slots(self, hinge: str) -> HingeSlots:
+        """Place of a hinge in q and u; SceneError with the nearest name if there is none."""
+        found = self.layout.hinges.get(hinge)
+        if found is None:
+            hinges = self.observed.references.scene.hinges
+            if hinges.of_chain(hinge):
+                raise SceneError(f'"{hinge}": {hinges.missing(hinge)}')
+            hint = near(hinge, self.layout.hinges)
+            raise SceneError(f'"{hinge}": there is no such hinge in the scene{hint}')
+        return found
+
+    def of_hinge(self, hinge: str, kind: str) -> Array:
+        """force or moment (n, 3)."""
+        if hinge in self.layout.modal:
+            raise SceneError(
+                f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
+                "that holds it"
+            )
+        self.slots(hinge)
+        place = self.observed.engine.packed.hinge_position[hinge]
+        first = 0 if kind == "force" else 3
+        return self.observed.columns("loads", (place, slice(first, first + 3)))
+
+    def effort(self, hinge: str) -> Array:
+        """(n, nu): what laws and drives put in along the speeds."""
+        return self.observed.columns("efforts", (self.slots(hinge).u_slice,))
+
+    def sum(self, name: str) -> Array:
+        """One of SUMS: (n,) or (n, 3)."""
+        columns = SUMS[name][2]
+        values = self.observed.part("sums")[:, columns]
+        if name == "energy":
+            return np.asarray(values.sum(axis=1))
+        return values[:, 0] if columns.stop - columns.start == 1 else values
+
+    # --- by name --------------------------------------------------------------------------------
+
+    def get(self, name: str) -> Quantity:
+        """The quantity of this name; SceneError with the nearest name if there is none."""
+        parts = name.split(".")
+        owners = [".".join(parts[:k]) for k in range(1, len(parts))]
+        for owner in ["", *(x for x in owners if self._owns(x))]:
+            entry = self.of(owner).entries.get(name)
+            if entry is not None:
+                return entry()
+        known = [n for x in owners if self._owns(x) for n in self.of(x).entries]
+        hint = near(name, known or self._every())
+        raise SceneError(f'"{name}": there is no such quantity{hint}')
+
+    def names(self) -> list[str]:
+        """Every name there is."""
+        return list(self._every())
+
+    def _every(self) -> Iterator[str]:
+        return (name for owner in self.owners() for name in self.of(owner).entries)
+
+    def scalars(self) -> list[str]:
+        """One name for every number there is per sample, in the order of a wide table."""
+        return [name for owner in self.owners() for name in self.of(owner).scalars]
+
+    def owners(self) -> Iterator[str]:
+        """Hinges, bodies and ends, and the scene itself."""
+        yield from self.layout.hinges
+        yield from self.observed.references
+        yield ""
+
+    def of(self, owner: str) -> Table:
+        """Names of one owner."""
+        if owner not in self._tables:
+            table = Table({}, [])
+            if owner in self.layout.hinges and owner not in self.layout.modal:
+                self._hinge(table, self.layout.hinges[owner])
+            elif owner:
+                self._body(table, owner)
+            else:
+                self._scene(table)
+            self._tables[owner] = table
+        return self._tables[owner]
+
+    def _owns(self, owner: str) -> bool:
+        return owner in self.layout.hinges or owner in self.observed.references
+
+    def _body(self, table: Table, reference: str) -> None:
+        for kind, about in BODY.items():
+            rates = RATES.get(kind)
+            table.vector(
+                f"{reference}.{kind}", reference, about, self._bound(self.of_body, reference, kind),
+                None if rates is None else self._bound(self.of_body, reference, rates),
+            )  # fmt: skip
+        if reference in self.layout.modal:
+            self._modal(table, self.layout.modal[reference])
+        add_body(table, self._flexible, reference)
+
+    def _modal(self, table: Table, body: HingeSlots) -> None:
+        """Modal coordinates of a flexible body, their speeds and accelerations: blade.y1."""
+        q, u = body.q_slice, body.u_slice
+        group = _Group(table, body.name, "flexible body")
+        rates = [rate_unit(unit) for unit in body.u_units]
+        accelerations = [acceleration_name(name) for name in body.u_names]
+
+        def udot() -> Array:
+            return self.observed.columns("udot", (u,))
+
+        def speeds() -> Array:
+            return self.run.u[:, u]
+
+        group.add("q", "coordinate", body.q_names, body.q_units, lambda: self.run.q[:, q], speeds)
+        group.add("u", "speed", body.u_names, body.u_units, speeds, udot)
+        group.add("udot", "acceleration", accelerations, rates, udot)
+
+    def _scene(self, table: Table) -> None:
+        for name, (unit, long_name, columns) in SUMS.items():
+            get = self._summed(name)
+            if name == "energy" or columns.stop - columns.start == 1:
+                table.scalar(name, unit, long_name, get)
+            else:
+                table.vector(name, "the scene", Kind(unit, long_name, _XYZ, ()), get)
+        about = "work of everything that is not stored"
+        power = self._summed("power")
+        table.scalar("work", "J", about, lambda: self.run.work, rates=power)
+
+    def _hinge(self, table: Table, hinge: HingeSlots) -> None:
+        """q, u, their rates and efforts by the hinge's own names and by number; loads."""
+        q, u = hinge.q_slice, hinge.u_slice
+        efforts = [f"effort_{name.removesuffix('_rate')}" for name in hinge.u_names]
+        efforts = ["effort"] if len(efforts) == 1 else efforts
+        units = [effort_unit(unit) for unit in hinge.u_units]
+        rate_units = [rate_unit(unit) for unit in hinge.u_units]
+        accelerations = [acceleration_name(name) for name in hinge.u_names]
+        simple = hinge.quaternion is None and hinge.type in self._builtin
+
+        def udot() -> Array:
+            return self.observed.columns("udot", (u,))
+
+        def speeds() -> Array:
+            return self.run.u[:, u]
+
+        group = _Group(table, hinge.name)
+        group.add("q", "coordinate", hinge.q_names, hinge.q_units, lambda: self.run.q[:, q],
+                  speeds if simple else None)  # fmt: skip
+        group.add("u", "speed", hinge.u_names, hinge.u_units, speeds, udot)
+        group.add("udot", "acceleration", accelerations, rate_units, udot)
+        group.add("effort", "effort", efforts, units, lambda: self.effort(hinge.name))
+        for kind, about in HINGE.items():
+            get = self._bound(self.of_hinge, hinge.name, kind)
+            table.vector(f"{hinge.name}.{kind}", hinge.name, about, get)
+
+    def _summed(self, name: str) -> Values:
+        return lambda: self.sum(name)
+
+    @staticmethod
+    def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:
+        return lambda: method(name, kind)
+
+
+@dataclass
+class _Group:
+    """Columns of one hinge under their own names and by number: shoulder.angle, shoulder.q[0]."""
+
+    table: Table
+    hinge: str
+    word: str = "hinge"
+
+    def add(
+        self, short: str, word: str, names: Sequence[str], units: Sequence[str], get: Values,
+        rates: Values | None = None,
+    ) -> None:  # fmt: skip
+        """One kind of quantity, one name and unit per column."""
+        for k, (name, unit) in enumerate(zip(names, units, strict=True)):
+            full, long_name = f"{self.hinge}.{name}", f"{word} {name} of {self.word} {self.hinge}"
+            self.table.scalar(full, unit, long_name, get, k, rates)
+            self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
+        if len(names) == 1 and names[0] != short:
+            self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]
+
+
+def acceleration_name(speed: str) -> str:
+    """Name of a speed's derivative: angle_rate -> angle_acceleration, vx -> vx_dot."""
+    stem = speed.removesuffix("_rate")
+    return f"{stem}_acceleration" if stem != speed else f"{speed}_dot"
+
+
+def rate_unit(unit: str) -> str:
+    """Unit of the time derivative: m/s -> m/s2."""
+    return f"{unit}2" if unit.endswith("/s") else f"{unit or '1'}/s"

@@ -1,0 +1,221 @@
+"""What a run gave: named, labelled quantities over time, with units."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene_flexible_checks import short_beams
+
+from ..engine.compiled import Compiled
+from ..integrate.loop import Statistics
+from ..integrate.settings import Settings
+from ..pack.layout import HingeSlots
+from ..run.checkpoint import Checkpoint
+from ..run.error_estimate import ErrorEstimate
+from ..run.stability import StepCheck
+from ..run.trajectory import Trajectory
+from .certificate import Certificate
+from .flexible.quantities import FlexibleResults
+from .names import Quantity
+from .observed import Observed
+from .quantities import Quantities
+
+#: States below this have finite energies in any scene that stands for something.
+_MODEST = 1e60
+
+
+class Record(FlexibleResults, ABC):
+    """What a run gave: states, and everything that follows from them, over the sample times.
+
+    Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
+    Quantities beyond q and u are computed in one batch when the first of them is asked for, and
+    kept (their arrays are read-only).  Where a sample cannot be evaluated they are nan and
+    `warnings` says so.
+
+    Attributes:
+        model: the model that ran.
+        t: (n,) s.  Equal neighbours stand just before and just after an event.
+        q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
+        u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
+        event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
+        status: why it ended; None if it was interrupted.
+        statistics: counts of the integrator; None for runs of other integrators.
+        settings: how the run was made.
+        checkpoint: the file that keeps the run until its result is saved; None without one.
+    """
+
+    def __init__(
+        self,
+        model: Compiled,
+        run: Trajectory,
+        error: ErrorEstimate | None = None,
+        step: StepCheck | None = None,
+    ) -> None:
+        self.model, self.trajectory = model, run
+        self._error, self._step = error, step
+        self.checkpoint: Checkpoint | None = None
+        self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
+        self.status = run.status
+        self.statistics: Statistics | None = run.statistics
+        self.settings: Settings = run.settings
+        self._observed = Observed(model, run)
+        self._quantities = Quantities(self._observed, HINGE_TYPES, self)
+
+    @property
+    def success(self) -> bool:
+        """True if the run reached its end or was stopped by an event, with finite numbers: states,
+        energies and momenta of every sample.  It does not say that they are right: see `trusted`.
+        """
+        return self.trajectory.success and not self._unusable
+
+    @property
+    def message(self) -> str:
+        """Why the run ended, as a sentence; and which of its samples cannot be used."""
+        text, unusable = self.trajectory.message, self._unusable
+        return f"{text}, but {unusable}" if unusable and self.trajectory.success else text
+
+    @cached_property
+    def _unusable(self) -> str:
+        """What cannot be computed of finite states; "" if everything can."""
+        run = self.trajectory
+        if not self.model.flexible and max(_size(run.q), _size(run.u), _size(run.work)) < _MODEST:
+            return ""
+        sums = self._observed.part("sums")
+        failing = np.isnan(sums).any(axis=1)
+        if self._observed.failures and failing.any():
+            count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
+            return f"{count}: {self._observed.failures[0]}"
+        finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
+        return "" if finite else "its energies or momenta are beyond what numbers hold"
+
+    @property
+    def last_state(self) -> tuple[float, Array, Array]:
+        """(t, q, u) of the last good state: the end, or what a failure left."""
+        kept = self.trajectory.last
+        return (float(self.t[-1]), self.q[-1], self.u[-1]) if kept is None else kept
+
+    @property
+    @abstractmethod
+    def certificate(self) -> Certificate:
+        """What vouches for the numbers."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is worth knowing before the numbers are used, one sentence each."""
+        scene, found = self.model.scene.warnings, self.certificate.warnings
+        notes, failures = self.trajectory.notes, self._observed.failures
+        return tuple(dict.fromkeys((*scene, *notes, *found, *failures)))
+
+    def _outside(self) -> tuple[str, ...]:
+        """Models of the scene that are outside their range whatever the run."""
+        return tuple(short_beams(self.model.scene))
+
+    # --- bodies and ends ------------------------------------------------------------------------
+
+    def position(self, reference: str) -> Array:
+        """Position (n, 3) in m of "rod1" (its origin) or "rod1.tip".
+
+        Here and below: SceneError, with the nearest name, for one that is not in the scene.
+        """
+        return self._quantities.of_body(reference, "position")
+
+    def velocity(self, reference: str) -> Array:
+        """Velocity (n, 3) in m/s."""
+        return self._quantities.of_body(reference, "velocity")
+
+    def acceleration(self, reference: str) -> Array:
+        """Acceleration (n, 3) in m/s2, gravity not subtracted."""
+        return self._quantities.of_body(reference, "acceleration")
+
+    def orientation(self, reference: str) -> Array:
+        """Unit quaternion (n, 4), w, x, y, z, of the user's axes to inertial axes.
+
+        Its sign is continuous over time and w >= 0 in the first sample.
+        """
+        return self._quantities.of_body(reference, "orientation")
+
+    def angular_velocity(self, reference: str) -> Array:
+        """Angular velocity (n, 3) in rad/s."""
+        return self._quantities.of_body(reference, "angular_velocity")
+
+    def angular_acceleration(self, reference: str) -> Array:
+        """Angular acceleration (n, 3) in rad/s2."""
+        return self._quantities.of_body(reference, "angular_acceleration")
+
+    # --- hinges ---------------------------------------------------------------------------------
+
+    def coordinate(self, hinge: str) -> Array:
+        """Coordinates (n, nq) of one hinge; of a flexible body the modal ones."""
+        return self.q[:, self._quantities.slots(hinge).q_slice]
+
+    def speed(self, hinge: str) -> Array:
+        """Speeds (n, nu) of one hinge; of a flexible body the modal ones."""
+        return self.u[:, self._quantities.slots(hinge).u_slice]
+
+    def force(self, hinge: str) -> Array:
+        """Force (n, 3) in N of the inboard on the outboard side of a hinge, inertial axes."""
+        return self._quantities.of_hinge(hinge, "force")
+
+    def moment(self, hinge: str) -> Array:
+        """Moment (n, 3) in N*m of the inboard on the outboard side about P, inertial axes."""
+        return self._quantities.of_hinge(hinge, "moment")
+
+    def effort(self, hinge: str) -> Array:
+        """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
+        return self._quantities.effort(hinge)
+
+    def layout(self, hinge: str) -> HingeSlots:
+        """Names, units and places of a hinge's coordinates and speeds."""
+        return self._quantities.slots(hinge)
+
+    @property
+    def udot(self) -> Array:
+        """Accelerations (n, nu) of the hinge speeds, m/s2, rad/s2."""
+        return self._observed.part("udot")
+
+    # --- sums -----------------------------------------------------------------------------------
+
+    def energy(self) -> Array:
+        """Total energy (n,) in J: kinetic, gravity (zero at the inertial origin), springs."""
+        return self._quantities.sum("energy")
+
+    def energies(self) -> dict[str, Array]:
+        """The three parts of the energy, (n,) each in J: kinetic, gravity, springs."""
+        names = ("kinetic", "gravity", "springs")
+        return {name: self._quantities.sum(f"energy.{name}") for name in names}
+
+    def power(self) -> Array:
+        """Power (n,) in W of everything that is not stored: dampers, efforts, loads, drives."""
+        return self._quantities.sum("power")
+
+    @property
+    def work(self) -> Array:
+        """Integral (n,) of `power` in J from the start."""
+        return self.trajectory.work
+
+    def momentum(self) -> Array:
+        """Linear momentum (n, 3) in kg*m/s of the whole scene."""
+        return self._quantities.sum("momentum")
+
+    def angular_momentum(self) -> Array:
+        """Angular momentum (n, 3) in kg*m2/s of the whole scene about the inertial origin."""
+        return self._quantities.sum("angular_momentum")
+
+    # --- by name --------------------------------------------------------------------------------
+
+    def names(self) -> tuple[str, ...]:
+        """Every name that `quantity`, `plot` and `table` take."""
+        return tuple(self._quantities.names())
+
+    def quantity(self, name: str) -> Quantity:
+        """Values with unit by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy"."""
+        return self._quantities.get(name)
+
+
+def _size(values: Array) -> float:
+    return float(np.max(np.abs(values), initial=0.0))

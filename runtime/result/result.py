@@ -1,0 +1,95 @@
+"""Result of a run: its quantities, what vouches for them, and the ways out of it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from .certificate import Certificate
+from .record import Record
+
+
+class Result(Record):
+    """What a run gave: states, and everything that follows from them, over the sample times.
+
+    Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
+    Quantities beyond q and u are computed in one batch when the first of them is asked for, and
+    kept (their arrays are read-only).  Where a sample cannot be evaluated they are nan and
+    `warnings` says so.
+
+    Attributes:
+        model: the model that ran.
+        t: (n,) s.  Equal neighbours stand just before and just after an event.
+        q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
+        u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
+        event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
+        status: why it ended; None if it was interrupted.
+        statistics: counts of the integrator; None for runs of other integrators.
+        settings: how the run was made.
+        checkpoint: the file that keeps the run until its result is saved; None without one.
+    """
+
+    @property
+    def trusted(self) -> bool:
+        """True where nothing speaks against the numbers: a success whose balances and estimated
+        error (certify=True) are within bounds and whose models stayed within their range.
+
+        `certificate.verdict(accuracy, balance)` takes bounds of your own and gives the reasons.
+        """
+        return self.certificate.trusted
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
+        from .certify import certificate
+
+        return certificate(self, self._error, self._step)
+
+    def pictures(self) -> tuple[str, ...]:
+        """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
+        them), "blade.shape", "blade.deflection" (along the beam), "blade.modal_energy"."""
+        from .flexible.pictures import names
+
+        return tuple(names(self))
+
+    # --- out ------------------------------------------------------------------------------------
+
+    def to_xarray(self) -> Any:
+        """`xarray.Dataset` of every quantity with dimensions, units and provenance (extra: io)."""
+        from .output.dataset import dataset
+
+        return dataset(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write ".nc" (NetCDF, extra: io) or ".csv" (a column per number); returns the path.
+
+        The file appears under its name when it is whole; then the checkpoint of a run that has
+        ended is removed.  EnvironmentFailure if the extra is missing or the file cannot be written.
+        """
+        from .output.storage import save
+
+        saved = save(self, Path(path))
+        if self.checkpoint is not None and self.status is not None:
+            self.checkpoint.remove()
+        return saved
+
+    def table(self, *names: str, rows: int = 12) -> str:
+        """A text table of some samples; by default of every hinge coordinate and the energy."""
+        from .output.table import table
+
+        return table(self, names, rows)
+
+    def plot(self, *names: str, path: str | Path | None = None, title: str | None = None) -> Any:
+        """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
+
+        Names of `pictures` draw flexible bodies.  Without names, the hinge coordinates, and the
+        shapes and tip deflections of flexible bodies.  With `path`, also written there (.png, .svg,
+        .pdf).
+        """
+        from .output.plot import plot
+
+        return plot(self, names, None if path is None else Path(path), title)
+
+    def __repr__(self) -> str:
+        return f"<Result: {self.trajectory.message}; {len(self.t)} samples>"

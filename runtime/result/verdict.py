@@ -1,0 +1,47 @@
+"""The verdict on a run: may its numbers be used?  What a certificate holds, in one sentence."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ..run.error_estimate import ANGLE
+
+#: Relative drift of energy or momentum up to which a run is trusted unless other bounds are asked.
+DRIFT = 1e-5
+
+#: Error up to which a run is trusted: rad of an angle, part of the motion of other coordinates.
+ACCURACY = ANGLE
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """May the numbers of a run be used, within the bounds that were asked for?
+
+    Attributes:
+        against: what speaks against them, one sentence each.
+        missing: what nobody has looked at.
+        bounds: what was asked for, in words.
+    """
+
+    against: tuple[str, ...]
+    missing: tuple[str, ...]
+    bounds: str
+
+    @property
+    def trusted(self) -> bool:
+        """True only where everything was looked at and nothing speaks against the run."""
+        return not self.against and not self.missing
+
+    def __str__(self) -> str:
+        if self.against:
+            more = len(self.against) - 1
+            others = f" (and {more} more, see below)" if more else ""
+            return f"NOT trusted: {_first_clause(self.against[0])}{others}"
+        if self.missing:
+            return f"not judged: {'; '.join(self.missing)}; nothing seen speaks against it"
+        return f"trusted: {self.bounds}, and no model left its range"
+
+
+def _first_clause(sentence: str) -> str:
+    return re.split(r";|(?<=\)): |: split ", sentence)[0]

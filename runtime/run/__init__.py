@@ -1,0 +1,1 @@
+"""One run or many: the scene as a system, from its start to its trajectory."""

@@ -1,0 +1,243 @@
+"""Many independent runs of a model: side by side in the lanes of vectors, and on several threads.
+
+Where the scene has compiled code and neither events, releases, memory nor drives, every thread
+advances as many trajectories at a time as a vector has lanes, each with its own error control.
+Other scenes run one trajectory after the other on every thread.  Which way is taken depends on the
+scene and the machine alone, so that the numbers of a trajectory depend neither on the size of the
+batch, nor on its neighbours, nor on the number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.arrays import Array, batch, by_name, numbers, pair, threads_of
+from mstmm.errors import MstmmError, SceneError
+
+from ..integrate.loop import Failure, Run, Status, failure_text
+from ..integrate.settings import Settings, checked
+from ..integrate.steppers import get
+from ..pack.switches import has_switches
+from .lanes import Lanes, run_lanes
+from .simulate import advance, make_run, said, settled, trajectory
+from .system import SceneCode, SceneSystem
+from .threads import on_threads
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..kernels.fused import FusedLibrary
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What n runs gave.
+
+    Attributes:
+        t: (m,) output times in s.
+        q: (n, m, nq) coordinates, nan at times that a trajectory did not reach.
+        u: (n, m, nu) speeds, likewise.
+        success: (n,) True where a run reached its end, or an event stopped it.
+        messages: n sentences; for a failure cause, time and element.
+        evaluations: (n,) calls of the right-hand side.
+        engine: how it was computed, in words.
+    """
+
+    t: Array
+    q: Array
+    u: Array
+    success: NDArray[np.bool_]
+    messages: tuple[str, ...]
+    evaluations: NDArray[np.int64]
+    engine: str
+
+    def __repr__(self) -> str:
+        return f"<BatchResult: {int(self.success.sum())} of {len(self.success)} runs succeeded>"
+
+
+@dataclass
+class _Rows:
+    """The arrays of a batch, filled by whoever runs a trajectory."""
+
+    samples: Array  # (n, m, nq + nu)
+    success: NDArray[np.bool_]
+    messages: list[str]
+    evaluations: NDArray[np.int64]
+
+
+def simulate_batch(
+    model: Compiled,
+    settings: Settings,
+    q: Array,
+    u: Array,
+    parameters: Mapping[str, ArrayLike],
+    threads: int | None,
+) -> BatchResult:
+    """See `Model.simulate_batch`; settings hold the output times."""
+    n, times = len(q), np.asarray(settings.output_times)
+    library = _lanes(model)
+    models = _models(model, parameters, n)
+    count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
+    rows = _Rows(
+        np.full((n, len(times), model.nq + model.nu), np.nan),
+        np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64),
+    )  # fmt: skip
+    ours = np.array([library is not None and m.fusion.lanes is library for m in models], bool)
+    if library is not None and ours.any():
+        _side_by_side(model, library, models, settings, q, u, np.flatnonzero(ours), rows, count)
+    alone = np.flatnonzero(~ours)
+    if len(alone):
+        _one_by_one(models, settings, q, u, alone, rows, count)
+    how = "one after the other" if library is None else f"{library.lanes} side by side"
+    nq = model.nq
+    return BatchResult(
+        times, rows.samples[..., :nq].copy(), rows.samples[..., nq:].copy(), rows.success,
+        tuple(rows.messages), rows.evaluations, f"{how} on {count} threads",
+    )  # fmt: skip
+
+
+def _models(model: Compiled, parameters: Mapping[str, ArrayLike], n: int) -> list[Compiled]:
+    """The model of each trajectory; equal numbers share one.
+
+    Raises SceneError for a name or a value that the scene refuses, naming the trajectory.
+    """
+    if not parameters:
+        return [model] * n
+    columns = {}
+    for name, values in by_name("parameters", parameters).items():
+        column = numbers(f'parameter "{name}"', values)
+        if column.shape not in ((), (n,)):
+            raise SceneError(f'parameter "{name}" has shape {column.shape}, expected ({n},)')
+        columns[name] = np.broadcast_to(column, (n,))
+    made: dict[tuple[float, ...], Compiled] = {}
+    found = []
+    for i in range(n):
+        row = tuple(float(column[i]) for column in columns.values())
+        if row not in made:
+            try:
+                made[row] = model.with_parameters(dict(zip(columns, row, strict=True)))
+            except SceneError as error:
+                raise SceneError(f"trajectory {i}: {error}") from None
+        found.append(made[row])
+    return found
+
+
+def _lanes(model: Compiled) -> FusedLibrary | None:
+    """Code for several states side by side, where trajectories can be run on it."""
+    packed = model.packed
+    if has_switches(packed.scene):
+        return None
+    if packed.n_memory or packed.scene.event or packed.releases or packed.model.n_drives:
+        return None
+    return model.fusion.ready_lanes(math.inf)
+
+
+def _side_by_side(
+    model: Compiled, library: FusedLibrary, models: list[Compiled], settings: Settings,
+    q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
+) -> None:  # fmt: skip
+    engine = model.looped
+    systems = [SceneSystem(engine, with_power=False) for _ in range(threads)]
+    start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
+    start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
+    numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])
+    lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu)
+    samples, outcomes = run_lanes(lanes, start)
+    for place, (i, outcome) in enumerate(zip(which, outcomes, strict=True)):
+        rows.samples[i] = samples[place]
+        status = Status(outcome.status)
+        rows.evaluations[i] = outcome.evaluations
+        rows.success[i] = status is Status.FINISHED
+        rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome)
+    flat = rows.samples[which].reshape(-1, model.nq + model.nu)
+    flat, _ = settled(systems[0], np.zeros(len(flat)), flat, np.zeros((len(flat), 1)))
+    rows.samples[which] = flat.reshape(len(which), -1, model.nq + model.nu)
+
+
+def _lanes_message(
+    model: Compiled, library: FusedLibrary, system: SceneSystem, outcome: Any
+) -> str:
+    status = Status(outcome.status)
+    if status is Status.FINISHED:
+        return f"finished at t = {outcome.t:.9g} s"
+    last = f"; last good state at t = {outcome.t:.9g} s"
+    if status is Status.RHS_FAILED:
+        reason, element, code = library.failures[outcome.code - 1]
+        failure = model.looped.ffi.new("mstmm_failure *", [reason, element, code])
+        return model.looped.failure_text(failure, outcome.fail_time) + last
+    component = None if outcome.component < 0 else int(outcome.component)
+    failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
+    way_out = "simulate this one alone to learn the cause" if status is Status.NOT_FINITE else ""
+    return failure_text(failure, system.components(), cause=way_out) + last
+
+
+def _one_by_one(
+    models: list[Compiled], settings: Settings, q: Array, u: Array,
+    which: NDArray[np.int64], rows: _Rows, threads: int,
+) -> None:  # fmt: skip
+    compiled = {id(m): _scalar(m) for m in models}
+    stop = threading.Event()
+
+    def look(_: Run) -> None:
+        if stop.is_set():
+            raise _Stopped
+
+    def run(i: int) -> None:
+        try:
+            _alone(models[i], compiled[id(models[i])], settings, q[i], u[i], i, rows, look)
+        except _Stopped:
+            return
+        except MstmmError as error:  # this trajectory's own affair
+            rows.messages[i] = str(error)
+
+    on_threads(run, which.tolist(), threads, stop)
+
+
+class _Stopped(Exception):
+    """The batch has ended."""
+
+
+def _scalar(model: Compiled) -> SceneCode | None:
+    library = model.fusion.ready(math.inf)
+    return None if library is None else SceneCode(library, None, model.fusion.numbers)
+
+
+def _alone(
+    model: Compiled, compiled: SceneCode | None, settings: Settings, q: Array, u: Array,
+    i: int, rows: _Rows, look: Callable[[Run], None],
+) -> None:  # fmt: skip
+    system = SceneSystem(model.looped, compiled, with_power=False)
+    run = make_run(system, settings, q, u)
+    status = advance(run, look)
+    found = trajectory(system, run, settings, status, said(system, run, status))
+    places = np.searchsorted(np.asarray(settings.output_times), found.t)
+    rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
+    rows.success[i], rows.messages[i] = found.success, found.message
+    rows.evaluations[i] = found.statistics.evaluations
+
+
+def prepared(
+    model: Compiled, settings: Settings, initial: tuple[ArrayLike, ArrayLike]
+) -> tuple[Settings, Array, Array]:
+    """(settings with output times, q (n, nq), u (n, nu)) of a batch; SceneError for a misfit."""
+    settings = checked(settings)
+    if not settings.t_end > settings.t_start:
+        raise SceneError(f"t_end = {settings.t_end:g}: expected a time in s, after t_start")
+    if settings.output_times is None:
+        settings = replace(settings, output_times=(settings.t_end,))
+    if not settings.output_times:
+        raise SceneError("output_times: expected one time in s or more")
+    if settings.step is None and not get(settings.method).adaptive:
+        raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
+    q, u = pair("initial_states", initial)
+    lead, (q_rows, u_rows) = batch(("initial q", q, model.nq), ("initial u", u, model.nu))
+    if len(lead) > 1:
+        raise SceneError(f"initial_states have {len(lead)} leading axes, expected one: (n, nq)")
+    return settings, q_rows, u_rows

@@ -1,0 +1,116 @@
+"""Why a run ended, in words: the expression, the element or the speed that is behind it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ..engine.culprit import culprit
+from ..engine.engine import Engine
+from ..flexible.definiteness import is_definite_at
+from ..flexible.support import Supports
+from ..integrate.loop import Run, Status
+from ..pack.packed import Packed
+from .notes import endless
+
+if TYPE_CHECKING:
+    from .system import SceneSystem
+
+
+#: What a run ends with where call-backs of the scene fail; their code says how.
+_EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED)
+
+
+#: States looked at past the last good one lie this many times farther ahead each, up to this part
+#: of the time: a run ends within rounding of the place where an expression stops being a number.
+_FARTHER, _FARTHEST = 4.0, 1e-9
+
+
+def message_of(system: SceneSystem, run: Run) -> str:
+    """How a run ended or stands, as a sentence."""
+    failure = run.failure
+    cause = "" if failure is None else cause_of(system, failure.status, run.t, run.y, failure.time)
+    if failure is not None and failure.code and failure.status in _EVALUATIONS:
+        text = cause or system.engine.failure_text(system.run.failure, failure.time)
+        return f"{text}; last good state at t = {run.t:.9g} s"
+    message = run.message(system.components(), system.event_names, cause)
+    sticks = failure is not None and failure.status is Status.TOO_MANY_STEPS
+    if sticks and run.chatter is not None:
+        return f"{message}; {endless(system, run.chatter)}"
+    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
+    message += busiest(system, run.t, run.y) if work else ""
+    small = failure is not None and failure.status is Status.STEP_TOO_SMALL
+    return message + (_indefinite(system, run.y) if small else "")
+
+
+def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at: float) -> str:
+    """The expression that stopped a run whose last good state is (t, y); empty if none did."""
+    if status not in (Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED):
+        return ""
+    engine = system.engine
+    q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
+    return _culprit_ahead(engine, t, q, u, system.memory, failed_at)
+
+
+def _culprit_ahead(
+    engine: Engine, t: float, q: Array, u: Array, memory: Array, failed_at: float
+) -> str:
+    """The same at the last good state of a run, or where its rates lead from there; `failed_at` is
+    the time of the trial that failed."""
+    found = culprit(engine, t, q, u)
+    if found:
+        return found
+    try:
+        qdot, udot = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
+    except NumericalFailure:
+        return ""
+    ahead = max(failed_at - t, 4 * math.ulp(t))
+    farthest = max(2 * ahead, _FARTHEST * max(1.0, abs(t)))
+    while ahead <= farthest and not found:
+        found = culprit(engine, t + ahead, q + ahead * qdot[0], u + ahead * udot[0])
+        ahead *= _FARTHER
+    return found
+
+
+def _indefinite(system: SceneSystem, y: Array) -> str:
+    """Which mass matrices were lost, in words: the reason of many a step that is too small."""
+    packed = system.engine.packed
+    if not packed.flexible:
+        return ""
+    lost = _indefinite_bodies(packed, y[: system.engine.nq])
+    names = ", ".join(f'"{name}"' for name in lost[:3]) + (", ..." if len(lost) > 3 else "")
+    return (
+        f"; the mass matrix of flexible body {names} is not positive definite at its deflection: "
+        'leave frame = "auto" and quadrature = "auto", or split the body'
+        if lost
+        else ""
+    )
+
+
+def _indefinite_bodies(packed: Packed, q: Array) -> list[str]:
+    """Names of the flexible bodies whose mass matrix is not positive definite at q (nq,)."""
+    expanded, supports = packed.expanded, Supports(packed.described)
+    return [
+        name
+        for name, body in packed.flexible.items()
+        if expanded is not None and not body.points and not is_definite_at(
+            body, body.ports[expanded.held[name]], supports.of(name),
+            q[packed.layout.modal[name].q_slice][None],
+        )
+    ]  # fmt: skip
+
+
+def busiest(system: SceneSystem, t: float, y: Array) -> str:
+    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
+    engine = system.engine
+    q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
+    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
+    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
+    if not rates.any():
+        return ""
+    return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"

@@ -1,0 +1,171 @@
+"""Making the runs behind a Result: the run itself, checkpoints, the second run for its error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import MstmmError, SceneError
+
+from ..host.interruptible import interruptible
+from ..integrate.loop import Run, Samples, Status
+from ..integrate.settings import Settings
+from ..integrate.steppers import get
+from . import engine_choice as compiled_run
+from . import second_opinion
+from .checkpoint import Checkpoint, State
+from .error_estimate import ErrorEstimate, alike, compare, tighter
+from .simulate import advance, make_run, said, trajectory
+from .stability import StepCheck, check_step
+from .system import SceneSystem
+from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+Progress = Callable[[float, float], None]
+
+#: Seconds of wall time between checkpoints.
+CHECKPOINT_EVERY = 30.0
+
+
+class Watch:
+    """What goes on beside a run: progress, checkpoints, and notes of what went wrong with those.
+
+    With two runs, each counts for half of the time that progress tells.
+    """
+
+    def __init__(self, progress: Progress | None, settings: Settings, runs: int = 1) -> None:
+        self.progress, self.settings, self.runs = progress, settings, runs
+        self.run, self.notes = 0, list[str]()
+        self.checkpoint: Checkpoint | None = None
+        self.engine = compiled_run.LOOPED
+        self._saved = time.monotonic()
+
+    def tell(self, t: float) -> None:
+        """The run is at time t.  A callback that raises is not called again; the run goes on."""
+        if self.progress is None:
+            return
+        start, end = self.settings.t_start, self.settings.t_end
+        try:
+            self.progress(start + ((t - start) + self.run * (end - start)) / self.runs, end)
+        except Exception as error:
+            self.progress = None
+            self.notes.append(f"progress was switched off: {type(error).__name__}: {error}")
+
+    def look(self, run: Run, earlier: Samples | None) -> None:
+        """Between slices of a run: progress, and a checkpoint when one is due."""
+        self.tell(run.t)
+        if time.monotonic() - self._saved > CHECKPOINT_EVERY:
+            self.save(run, earlier)
+
+    def save(self, run: Run, earlier: Samples | None, message: str = "") -> None:
+        """A checkpoint now, with how the run has ended if it has.
+
+        If it cannot be written the run goes on and a note says so.
+        """
+        if self.checkpoint is not None and self.run == 0:
+            try:
+                words = {"engine": np.array(self.engine), "message": np.array(message)}
+                self.checkpoint.save({**run.state(), **words}, _joined(earlier, run.samples))
+            except (MstmmError, MemoryError) as error:
+                note = f"no checkpoint: {error or 'there is not enough memory'}"
+                if note not in self.notes:
+                    self.notes.append(note)
+        self._saved = time.monotonic()
+
+
+def _joined(earlier: Samples | None, samples: Samples) -> Samples:
+    return samples if earlier is None else Samples.joined([earlier, samples])
+
+
+def first_run(
+    model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
+) -> tuple[Trajectory, StepCheck | None]:
+    """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
+    if settings.method in second_opinion.METHODS:
+        if watch.checkpoint is not None:
+            raise SceneError(f"method {settings.method!r} keeps no checkpoints; use dop853")
+        return second_opinion.integrate(model, settings, q, u, watch.tell), None
+    state, earlier = _continued(watch.checkpoint) if resume else (None, None)
+    recorded = None if state is None else str(state["engine"])
+    engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
+    system = SceneSystem(engine, compiled)
+    start = system.start(settings.t_start, q, u)
+    step = check_step(engine, get(settings.method), settings, start, system.memory)
+    run = make_run(system, settings, q, u)
+    message = "" if run.status is Status.RUNNING else said(system, run, run.status)
+    if state is not None and earlier is not None and watch.checkpoint is not None:
+        message = _restored(run, state, earlier, watch.checkpoint)
+    look = 0 if compiled else compiled_run.look_after(model, settings)
+    status: Status | None = run.status
+    if status is Status.RUNNING and run.statistics.steps < look:
+        watch.engine = compiled_run.LOOPED
+        status, message = _advanced(system, run, watch, earlier, look)
+        if status is Status.RUNNING:
+            compiled = compiled_run.worth_compiling(model, settings, run)
+        if compiled is not None:
+            system, earlier = SceneSystem(engine, compiled), None
+            run = make_run(system, settings, q, u)
+    watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
+    if status is Status.RUNNING:
+        status, message = _advanced(system, run, watch, earlier)
+    found = trajectory(system, run, settings, status, message, earlier)
+    if step is not None and status is not None and not found.success:
+        found = replace(found, message=step.blamed(found.message))
+    return found, step
+
+
+def _advanced(
+    system: SceneSystem, run: Run, watch: Watch, earlier: Samples | None, steps: int = 0
+) -> tuple[Status | None, str]:
+    """Advance a run and keep what it became: no interrupt comes between the two."""
+    with interruptible():
+        status = advance(run, lambda now: watch.look(now, earlier), steps)
+        message = said(system, run, status)
+        if status is not Status.RUNNING:
+            watch.save(run, earlier, "" if status is None else message)
+    return status, message
+
+
+def _restored(run: Run, state: State, earlier: Samples, checkpoint: Checkpoint) -> str:
+    """Put a run where its checkpoint was taken; returns how it had ended, "" if it had not."""
+    try:
+        run.restore(state)
+        ended = run.status is not Status.RUNNING
+    except ValueError:  # a status that does not exist
+        raise checkpoint.damaged("a state that no run can have") from None
+    if not run.fits(earlier):
+        raise checkpoint.damaged("samples of another size")
+    return str(state["message"]) if ended else ""
+
+
+def _continued(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | None]:
+    """State and samples of a run that was interrupted; None where there is none."""
+    if checkpoint is None or not checkpoint.exists():
+        return None, None
+    return checkpoint.load()
+
+
+def second_run(
+    model: Compiled, first: Trajectory, q: Array, u: Array, watch: Watch
+) -> ErrorEstimate | None:
+    """Error of `first` by a more accurate run; None, with a note, if that leads nowhere."""
+    known = model.packed.time_map(first.settings.t_start, first.settings.t_end)
+    settings, reference = tighter(first, known.breaks.tolist())
+    watch.run = 1
+    second, _ = first_run(model, settings, q, u, watch)
+    if not second.success:
+        why = "it was interrupted" if second.status is None else second.message
+        watch.notes.append(f"the second run, for the error, did not reach the end: {why}")
+    if alike(first, second):
+        watch.notes.append("no error estimate: the second run made the very steps of the first one")
+        return None
+    if not len(np.intersect1d(first.t, second.t)) or second.status is None:
+        return None
+    return compare(model.layout, first, second, reference, q)

@@ -1,0 +1,95 @@
+"""Trajectories in the lanes of vectors, on threads: a thin hold on `engine_lanes.c`."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from ..engine.engine import Engine
+from ..integrate.loop import Status
+from ..integrate.settings import Settings
+from ..integrate.steppers import get
+from ..integrate.tableau_in_c import c_tableau
+from ..kernels.fused import FusedLibrary
+from .simulate import SLICE
+from .system import SceneSystem
+from .threads import on_threads
+
+
+@dataclass
+class Lanes:
+    """What all trajectories share, and a system per thread for what it settles."""
+
+    engine: Engine
+    library: FusedLibrary
+    settings: Settings
+    systems: list[SceneSystem]
+    numbers: Array  # (n, np)
+    width: int
+
+
+def run_lanes(lanes: Lanes, start: Array) -> tuple[Array, Any]:
+    """Samples (n, times, width), nan where a trajectory did not come, and n `mstmm_outcome`."""
+    ffi, lib, settings = lanes.engine.ffi, lanes.engine.lib, lanes.settings
+    n, times = len(start), np.asarray(settings.output_times, dtype=np.float64)
+    samples, last = np.full((n, len(times), lanes.width), np.nan), np.zeros((n, lanes.width))
+    outcomes = ffi.new("mstmm_outcome[]", n)
+    many = ffi.new("mstmm_many *")
+    kept = _problem(lanes, many.problem, times)
+    many.n, many.outcomes = n, outcomes
+    arrays = [lanes.engine.pointer(array) for array in (start, samples, last)]
+    many.y0, many.samples, many.last = arrays
+    numbers = lanes.engine.pointer(lanes.numbers)
+    stop = threading.Event()
+    groups = [_group(lanes, many, system, numbers, kept) for system in lanes.systems]
+    for group in groups:
+        if lib.mstmm_group_start(group):
+            raise SceneError("simulate_batch: check t_end, above t_start, and the tolerances")
+
+    def work(group: Any) -> None:
+        while not stop.is_set():
+            if lib.mstmm_group_advance(group, SLICE) == Status.FINISHED:
+                return
+
+    on_threads(work, groups, len(groups), stop)
+    return samples, outcomes
+
+
+def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
+    """Fills the run that all trajectories copy; returns what it points to."""
+    engine, settings = lanes.engine, lanes.settings
+    atol = np.full(lanes.width, float(settings.atol))
+    known = engine.packed.time_map(settings.t_start, settings.t_end)
+    arrays = [np.array(x) for x in (atol, known.breaks, times, known.starts, known.longest)]
+    pointers = [engine.pointer(array) for array in arrays]
+    run.tableau = c_tableau(engine.ffi, get(settings.method))
+    run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
+    run.fixed_step = settings.step or 0.0
+    run.max_step, run.max_steps = settings.max_step, settings.max_steps
+    run.first_step = settings.first_step
+    run.atol, run.breaks, run.outputs, run.bound_starts, run.bounds = pointers
+    run.n_breaks, run.n_outputs, run.n_bounds = len(known.breaks), len(times), len(known.starts)
+    return [*arrays, *pointers]
+
+
+def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: list[Any]) -> Any:
+    """`mstmm_group *` of one thread, with workspace and system of its own."""
+    ffi, lib = lanes.engine.ffi, lanes.engine.lib
+    group, system = ffi.new("mstmm_group *"), ffi.new("mstmm_system *")
+    view = ffi.new("mstmm_scene_lanes *")
+    view.fused, view.p, view.settle = lanes.library.descriptor, numbers, settling.run
+    view.p_stride = lanes.numbers.shape[1]
+    scratch = np.zeros(max(1, lib.mstmm_lanes_numbers(view.fused)))
+    view.numbers = lanes.engine.pointer(scratch)
+    lib.mstmm_scene_lanes_system(view, system, group)
+    group.many = many
+    workspace = np.zeros(max(1, lib.mstmm_group_size(system, many.problem.tableau)))
+    group.workspace = lanes.engine.pointer(workspace)
+    kept += [system, view, scratch, workspace]
+    return group

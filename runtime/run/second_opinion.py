@@ -1,0 +1,455 @@
+"""SciPy's integrators on the very same compiled call-backs: a second opinion on every run.
+
+The classes behind `scipy.integrate.solve_ivp` are driven step by step, so that breaks, events,
+releases, output times and Ctrl-C mean what they mean in the C loop.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from functools import cache
+from threading import RLock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from ..engine.jacobian import Jacobian
+from ..host.interruptible import interruptible
+from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
+from ..integrate.settings import Settings
+from .crossings import Crossings, Sight, dip, just_before
+from .endings import busiest, cause_of
+from .notes import endless, unseen
+from .simulate import split, tolerances
+from .system import SceneSystem
+from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+
+#: Method of `simulate` -> name of SciPy's class.
+METHODS = {f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")}
+
+#: Those that solve equations in every step, and take their Jacobian.
+_IMPLICIT = ("Radau", "BDF", "LSODA")
+
+#: Points inside a step at which events are looked at.
+_LOOKS = np.linspace(0.0, 1.0, 9)[1:]
+
+
+#: Steps in a row that do not move the time: the integrator has given up without saying so.
+_STUCK = 20
+
+#: LSODA before SciPy 1.17 keeps its state in one place for the whole process: one run at a time.
+_ONE_LSODA = RLock()
+
+#: Two breaks so near to each other, as part of the time or the run, are one.
+_GAP = 2.0**-39
+
+
+class _Ended(Exception):
+    """The run is over before its end: why, and a sentence."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status, self.message = status, message
+
+
+class Equations:
+    """The call-backs of a model, taken from the C structure and called from Python."""
+
+    def __init__(self, model: Compiled) -> None:
+        self.engine = model.looped
+        self.scene = SceneSystem(self.engine)
+        self.calls = self.scene.system
+        self.ffi = self.engine.ffi
+        self.bounds = (-np.inf, np.inf)
+        self.failure, self.evaluations = "", 0
+        memory = self.scene.memory
+        self._jacobian = cache(lambda: Jacobian(model, self.scene.with_power, memory, self.rates))
+
+    def rates(self, t: float, y: Array) -> Array:
+        """dy/dt; nan where it cannot be evaluated, which makes SciPy try a smaller step."""
+        state, rates = np.ascontiguousarray(y, dtype=np.float64), np.empty(len(y))
+        code = self.calls.rhs(self.calls.context, self._inside(t), self._c(state), self._c(rates))
+        self.evaluations += 1
+        if code:
+            self.failure = self.engine.failure_text(self.scene.run.failure, t)
+            rates[:] = np.nan
+        return rates
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """d(dy/dt)/dy, (n, n)."""
+        return self._jacobian()(self._inside(t), np.ascontiguousarray(y, dtype=np.float64))
+
+    def _inside(self, t: float) -> float:
+        """A break is never seen itself."""
+        return min(max(t, self.bounds[0]), self.bounds[1])
+
+    def _c(self, array: Array) -> Any:
+        return self.ffi.from_buffer("double[]", array)
+
+    def events(self, t: float, y: Array) -> Array:
+        """Values of the events; negative where they are not true."""
+        return self.watched(t, y)[: self.calls.n_events]
+
+    def watched(self, t: float, y: Array) -> Array:
+        """Values of the events, and behind them the margins of switches."""
+        values = np.empty(self.calls.n_events + self.calls.n_switches)
+        state = np.ascontiguousarray(y)
+        if len(values) and self.calls.events(
+            self.calls.context, t, self._c(state), self._c(values)
+        ):
+            text = self.engine.failure_text(self.scene.run.failure, t)
+            raise _Ended(Status.EVENT_FAILED, text)
+        return values
+
+    def remember(self, t: float, y: Array) -> Array:
+        """After a step: memory of turns brought up to date; the settled state."""
+        state = np.array(y)
+        if self.calls.accept != self.ffi.NULL:  # where there is something to settle
+            self.calls.accept(self.calls.context, t, self._c(state))
+        return state
+
+    def fire(self, event: int, t: float, y: Array) -> int:
+        return int(self.calls.fire(self.calls.context, event, t, self._c(np.array(y))))
+
+
+def integrate(
+    model: Compiled, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
+) -> Trajectory:
+    """One run by SciPy.
+
+    Raises SceneError for a fixed step or an unknown method.
+    """
+    if settings.step is not None:
+        raise SceneError(f"method {settings.method!r} chooses its own steps: leave step out")
+    alone: AbstractContextManager[object] = nullcontext()
+    if METHODS[settings.method] == "LSODA":
+        alone = _ONE_LSODA
+    with alone:
+        return _Loop(model, settings, tell).run(q, u)
+
+
+class _Loop:
+    """Steps, breaks, events and samples of one run."""
+
+    def __init__(self, model: Compiled, settings: Settings, tell: Callable[[float], None]) -> None:
+        self.system, self.settings, self.tell = Equations(model), settings, tell
+        self.rows: list[tuple[float, Array, Array, int]] = []
+        self.outputs = None if settings.output_times is None else deque(settings.output_times)
+        self.steps = self.fired = 0
+        self.sizes: list[float] = []
+        self.t, self.last = settings.t_start, np.zeros(0)
+        self.flag = [False]
+        calls = self.system.calls
+        self.n_events = int(calls.n_events)
+        self.truth = np.zeros(self.n_events, dtype=bool)
+        self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
+        self.sight = Sight(settings.t_start, settings.t_end)
+        self.known = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
+
+    def run(self, q: Array, u: Array) -> Trajectory:
+        scene, settings = self.system.scene, self.settings
+        y = scene.start(settings.t_start, q, u)
+        self.last, self.atol = y, tolerances(scene, settings, y)
+        stops = np.union1d(self.known.breaks, self.known.starts).tolist()
+        inner = [b for b in stops if settings.t_start < b < settings.t_end]
+        status: Status | None
+        try:
+            with interruptible() as self.flag:
+                self.sample(self.t, y)
+                for stop in [*inner, settings.t_end]:
+                    y = self.piece(y, stop)
+            status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
+        except _Ended as ended:
+            status, message = ended.status, ended.message
+        except KeyboardInterrupt:
+            status, message = None, f"interrupted at t = {self.t:.9g} s"
+        found = split(
+            scene, self.samples(), settings, status, message, self.statistics(),
+            (self.t, self.last),
+        )  # fmt: skip
+        return replace(found, unseen=unseen(scene, settings, self.crossings.chatter))
+
+    def piece(self, y: Array, stop: float) -> Array:
+        """From self.t to the next break, with a new integrator after every event.
+
+        Between two breaks that are one but for rounding nothing changes.
+        """
+        span = self.settings.t_end - self.settings.t_start
+        if stop - self.t <= _GAP * max(abs(self.t), span):
+            self.t = stop
+            return y
+        self.system.bounds = (np.nextafter(self.t, np.inf), np.nextafter(stop, -np.inf))
+        while self.t < stop:
+            if self.fire_here(y):
+                continue
+            y = self.stretch(y, stop)
+        self.fire_here(y)
+        return y
+
+    def stretch(self, y: Array, stop: float) -> Array:
+        """Steps of one integrator, up to `stop`, an event or a switch.
+
+        A step with a switch in it is made again, to end just before; see phase_switch in C.
+        """
+        self.refuse_start(y)
+        solver, stuck = self.solver(y, stop), 0
+        while solver.status == "running":
+            self.look()
+            text = self.step(solver)
+            if solver.status == "failed" or not np.isfinite(solver.y).all():
+                raise self.failed(solver.y, text)
+            if not self.sight.has_end(float(solver.t)):
+                raise self.endless()
+            stuck = stuck + 1 if solver.t == solver.t_old else 0
+            if stuck > _STUCK:
+                raise self.failed(solver.y, "the steps have become too small")
+            self.steps += 1
+            self.sizes.append(solver.t - solver.t_old)
+            switch = self.first_switch(solver)
+            if switch is not None and not self.crossings.is_short(switch[1] - solver.t_old):
+                self.steps -= 1
+                self.sizes.pop()
+                return self.stretch(self.last, just_before(solver.t_old, switch[1]))
+            event = self.first_event(solver, switch)
+            end = solver.t if event is None else event[1]
+            dense = solver.dense_output()
+            self.outputs_until(dense, end)
+            y = solver.y if event is None else dense(end)
+            self.t, self.last = float(end), self.system.remember(end, y)
+            self.tell(end)
+            if event is not None:
+                self.crossed(event)
+                return np.array(self.last)
+            if self.outputs is None:
+                self.sample(end, solver.y)
+            self.truth &= self.events(end, solver.y) >= 0
+        return np.array(self.last)
+
+    def refuse_start(self, y: Array) -> None:
+        """SciPy chooses its first step from the rates: from nan a step that never ends."""
+        self.system.failure = ""
+        rates = self.system.rates(self.t, y)
+        if not np.isfinite(rates).all():
+            raise self.failed(rates, None)
+
+    def look(self) -> None:
+        """Between evaluations: has somebody asked for the end?"""
+        if self.flag[0]:
+            raise KeyboardInterrupt
+
+    def step(self, solver: Any) -> str | None:
+        """One step; a sentence where it fails."""
+        limit = self.settings.max_steps
+        if limit and self.steps >= limit:
+            at = f"t = {self.t:.9g} s"
+            text = f"more steps than allowed at {at}; last good state at {at}"
+            raise _Ended(Status.TOO_MANY_STEPS, text)
+        self.system.failure = ""
+        try:
+            with np.errstate(all="ignore"):  # nan is how a bad trial step shows
+                found: str | None = solver.step()
+        except (ValueError, np.linalg.LinAlgError) as error:
+            found, solver.status = str(error), "failed"
+        return found
+
+    def endless(self) -> _Ended:
+        """At the pace of the last steps the run would never end."""
+        text = failure_text(Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1))
+        if self.crossings.chatter is not None:
+            text += f"; {endless(self.system.scene, self.crossings.chatter)}"
+        return _Ended(Status.TOO_MANY_STEPS, text)
+
+    def crossed(self, event: tuple[int, float]) -> None:
+        """The step ended where a switch crosses."""
+        if event[0] >= self.n_events:
+            self.crossings.note(event[0] - self.n_events, self.t)
+            if self.outputs is None:
+                self.sample(self.t, self.last)
+
+    def solver(self, y: Array, stop: float) -> Any:
+        import scipy.integrate
+
+        name = METHODS[self.settings.method]
+        kind = getattr(scipy.integrate, name)
+        first = self.settings.first_step if self.t == self.settings.t_start else 0.0
+        more = {"jac": self.system.jacobian} if name in _IMPLICIT else {}
+        return kind(
+            self.rates, self.t, y, stop, rtol=max(self.settings.rtol, 2.3e-14),
+            atol=self.atol, max_step=self.longest_step(),
+            first_step=min(first, stop - self.t) or None, **more,
+        )  # fmt: skip
+
+    def longest_step(self) -> float:
+        """What max_step and the loads allow from self.t to the next stop."""
+        starts, longest = self.known.starts, self.known.longest
+        here = int(np.searchsorted(starts, self.t, side="right")) - 1
+        bound = float(longest[here]) if here >= 0 else np.inf
+        return min(self.settings.max_step or np.inf, bound)
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Rates for a step of SciPy's, which a step of endless trials does not outlive."""
+        if METHODS[self.settings.method] != "LSODA":  # no exception passes through its C code
+            self.look()
+        return self.system.rates(t, y)
+
+    def failed(self, y: Array, text: str | None) -> _Ended:
+        at = f"last good state at t = {self.t:.9g} s"
+        status = Status.RHS_FAILED if self.system.failure else Status.STEP_TOO_SMALL
+        cause = cause_of(self.system.scene, status, self.t, self.last, self.t)
+        if cause or self.system.failure:
+            return _Ended(status, f"{cause or self.system.failure}; {at}")
+        if not np.isfinite(y).all():
+            name = self.system.scene.components()[int(np.argmin(np.isfinite(y)))]
+            return _Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
+        text = (text or "the integrator failed").strip(". ")
+        where = busiest(self.system.scene, self.t, self.last)
+        return _Ended(status, f"{text}; {at}{where}")
+
+    # --- events ---------------------------------------------------------------------------------
+
+    def events(self, t: float, y: Array) -> Array:
+        """Conditions at a state; one that is not a number ends the run."""
+        found = self.system.events(t, y)
+        if np.isnan(found).any():
+            name = self.system.scene.event_names[int(np.argmax(np.isnan(found)))]
+            text = f"the condition of {name} is not a number at t = {t:.9g} s"
+            at = f"last good state at t = {self.t:.9g} s"
+            raise _Ended(Status.EVENT_FAILED, f"{text}; {at}")
+        return found
+
+    def fire_here(self, y: Array) -> bool:
+        """Fire what has become true at self.t; True if the integrator must start again."""
+        values = self.events(self.t, y)
+        self.truth &= values >= 0
+        self.last = np.array(y)
+        for i in np.flatnonzero((values >= 0) & ~self.truth):
+            return self.fire(int(i), y)
+        return False
+
+    def fire(self, event: int, y: Array) -> bool:
+        lib, t = self.system.engine.lib, self.t
+        before = (t, np.array(y), np.array(self.system.scene.memory), -(event + 1))
+        answer = self.system.fire(event, t, y)
+        self.truth[event], self.fired = True, self.fired + 1
+        if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
+            self.rows.pop()
+        if answer != lib.MSTMM_FIRE_STOP:
+            self.rows.append(before)
+        self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
+        if answer == lib.MSTMM_FIRE_STOP:
+            name = self.system.scene.event_names[event]
+            raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s")
+        return True
+
+    def first_switch(self, solver: Any) -> tuple[int, float] | None:
+        """(number behind the events, time) of the first switch that crosses in the step."""
+        if not self.crossings.n:
+            return None
+        n, dense = self.n_events, solver.dense_output()
+        times = [float(solver.t_old)]
+        rows = [self.system.watched(times[0], dense(times[0]))[n:]]
+        for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
+            margins = self.system.watched(right, dense(right))[n:]
+            ends = {i: (times[-1], right, margins[i])
+                    for i in self.crossings.changed(rows[-1], margins)}  # fmt: skip
+            times.append(float(right))
+            rows.append(np.where(margins == 0.0, rows[-1], margins))
+            ends |= self.dips(dense, times[-3:], rows[-3:])
+            if ends:
+                found = [(self.locate(dense, n + i, *ends[i]), n + i) for i in ends]
+                time, number = min(found)
+                return number, time
+        return None
+
+    def dips(
+        self, dense: Any, times: list[float], rows: list[Array]
+    ) -> dict[int, tuple[float, float, float]]:
+        """Switch -> (left, right, margin there) where one crosses and is back at the next look."""
+        found: dict[int, tuple[float, float, float]] = {}
+        n = self.n_events
+        for i in self.crossings.near(rows) if len(rows) == 3 else ():
+            side = float(np.sign(rows[1][i]))
+
+            def height(t: float, i: int = i, side: float = side) -> float:
+                return side * float(self.system.watched(t, dense(t))[n + i])
+
+            at = dip(height, list(times), [side * float(row[i]) for row in rows])
+            if at is not None:
+                left = times[1] if at > times[1] else times[0]
+                found[i] = (left, at, -side)
+        return found
+
+    def first_event(
+        self, solver: Any, switch: tuple[int, float] | None
+    ) -> tuple[int, float] | None:
+        """(event, time) of the first one that becomes true in the step, or the switch in it."""
+        if not len(self.truth):
+            return switch
+        dense, left = solver.dense_output(), solver.t_old
+        end = solver.t if switch is None else switch[1]
+        false = self.events(left, dense(left)) < 0
+        for right in solver.t_old + _LOOKS * (end - solver.t_old):
+            values = self.events(right, dense(right))
+            risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]
+            if risen:
+                time, event = min((self.locate(dense, i, left, right), i) for i in risen)
+                return event, time
+            left, false = right, values < 0
+        return switch
+
+    def locate(
+        self, dense: Any, number: int, left: float, right: float, behind: float = 0.0
+    ) -> float:
+        """The first number at which an event holds, or a switch has the sign of `behind`, by
+        bisection."""
+        while True:
+            middle = left + (right - left) / 2
+            if not left < middle < right:
+                return right
+            value = self.system.watched(middle, dense(middle))[number]
+            if value * behind > 0 or (not behind and value >= 0):
+                right = middle
+            else:
+                left = middle
+
+    # --- samples --------------------------------------------------------------------------------
+
+    def sample(self, t: float, y: Array) -> None:
+        if self.outputs is not None:
+            if not self.outputs or self.outputs[0] > t:
+                return
+            while self.outputs and self.outputs[0] <= t:
+                self.outputs.popleft()
+        self.rows.append((t, np.array(y), np.array(self.system.scene.memory), 0))
+
+    def outputs_until(self, dense: Any, end: float) -> None:
+        while self.outputs and self.outputs[0] <= end:
+            t = self.outputs.popleft()
+            self.rows.append((t, dense(t), np.array(self.system.scene.memory), 0))
+
+    def samples(self) -> Samples:
+        n_memory = int(self.system.calls.n_memory)
+        rows = self.rows
+        return Samples(
+            np.array([t for t, *_ in rows]),
+            np.array([y for _, y, *_ in rows]).reshape(len(rows), len(self.last)),
+            np.array([m[:n_memory] for *_, m, _ in rows]).reshape(len(rows), n_memory),
+            np.array([e for *_, e in rows], dtype=np.int64),
+        )
+
+    def statistics(self) -> Statistics:
+        return Statistics(
+            self.steps, 0, self.system.evaluations, self.fired,
+            min(self.sizes, default=None), max(self.sizes, default=None),
+            None, None, 0.0, 0.0, False, 0, self.crossings.count,
+        )  # fmt: skip

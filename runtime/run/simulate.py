@@ -1,0 +1,196 @@
+"""One run of a model: the scene as the integrator's system, advanced in slices until it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure, SceneError
+
+from ..host.interruptible import interruptible
+from ..integrate.loop import Run, Samples, Statistics, Status
+from ..integrate.settings import Settings
+from ..integrate.steppers import get
+from .endings import message_of
+from .notes import unseen
+from .system import SceneSystem
+from .trajectory import Trajectory
+
+#: Seconds between looks at progress, interrupts and checkpoints.
+SLICE = 0.1
+
+#: Bytes of samples at which a run stops and asks for output times.
+LARGEST = 2**30
+
+#: Quaternions that are settled at once.
+_QUATERNIONS = 2**18
+
+#: The work is a by-product of a run: it may err by this many times rtol of the energy.
+_WORK_TOLERANCE = 10.0
+
+
+def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
+    """The integrator at the start of the run."""
+    tableau = get(settings.method)
+    if settings.step is None and not tableau.adaptive:
+        raise SceneError(
+            f"method {settings.method!r} takes fixed steps: give step in s, or use dopri5, dop853"
+        )
+    start = system.start(settings.t_start, q, u)
+    known = system.engine.packed.time_map(settings.t_start, settings.t_end)
+    return Run(
+        system.engine.ffi, system.engine.lib, system.system, tableau,
+        t_start=settings.t_start, t_end=settings.t_end,
+        y0=start, rtol=settings.rtol, atol=tolerances(system, settings, start),
+        step=settings.step, output_times=settings.output_times, breaks=known.breaks,
+        bounds=(known.starts, known.longest),
+        max_step=settings.max_step, max_steps=settings.max_steps, first_step=settings.first_step,
+    )  # fmt: skip
+
+
+def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
+    """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
+    found = np.full(len(start), settings.atol)
+    if system.with_power:
+        energy = _energy(system, settings.t_start, start) or 1.0
+        found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
+    return found
+
+
+def _energy(system: SceneSystem, t: float, y: Array) -> float:
+    """Sum of the sizes of the energies of a state, J; 0 where the motion itself cannot be computed,
+    which the run will say.
+
+    Raises NumericalFailure where the motion can, but not what the state shows.
+    """
+    engine, memory = system.engine, system.memory[None]
+    q, u = y[None, : engine.nq].copy(), y[None, engine.nq : engine.nq + engine.nu].copy()
+    seen = engine.observe(np.array([t]), q, u, memory, parts=("sums",))
+    energy = float(np.abs(seen.sums[0, :3]).sum())
+    if np.isfinite(energy):
+        return energy
+    try:
+        engine.accelerations(t, q, u, memory.copy())
+    except NumericalFailure:
+        return 0.0
+    raise NumericalFailure(
+        seen.failures[0]
+        if seen.failures
+        else f"the energy at t = {t:.9g} s is not finite; see "
+        "whether masses, speeds and stiffnesses are of the size that was meant"
+    )
+
+
+def advance(
+    run: Run, observe: Callable[[Run], None] | None = None, steps: int = 0
+) -> Status | None:
+    """Run to the end; None if an interrupt came first or the samples fill the memory they may take.
+
+    `observe` is called between slices.  RUNNING when so many steps have been made in all.
+    """
+    with interruptible() as interrupted:
+        while True:
+            status = run.advance(SLICE, steps)
+            if status is not Status.RUNNING or run.statistics.steps == steps:
+                return status
+            if observe is not None:
+                observe(run)
+            if interrupted[0] or run.kept_bytes > LARGEST:
+                return None
+
+
+def trajectory(
+    system: SceneSystem,
+    run: Run,
+    settings: Settings,
+    status: Status | None,
+    message: str,
+    earlier: Samples | None = None,
+) -> Trajectory:
+    """Samples of a run, behind those of an earlier process, split into q, u and work."""
+    samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
+    failure = run.failure
+    found = split(
+        system, samples, settings, status, message, run.statistics, (run.t, run.y),
+        None if failure is None else failure.time,
+    )  # fmt: skip
+    return replace(found, unseen=unseen(system, settings, run.chatter))
+
+
+def said(system: SceneSystem, run: Run, status: Status | None) -> str:
+    """How a run came back, as a sentence; None for interrupted."""
+    return _interrupted(run) if status is None else message_of(system, run)
+
+
+def _interrupted(run: Run) -> str:
+    if run.kept_bytes <= LARGEST:
+        return f"interrupted at t = {run.t:.9g} s"
+    return (
+        f"interrupted at t = {run.t:.9g} s, because the samples of all steps fill "
+        f"{run.kept_bytes / 2**30:.1f} GiB; ask for output times, or see whether the scene is stiff"
+    )
+
+
+def split(
+    system: SceneSystem,
+    samples: Samples,
+    settings: Settings,
+    status: Status | None,
+    message: str,
+    statistics: Statistics,
+    last: tuple[float, Array],
+    fail_time: float | None = None,
+) -> Trajectory:
+    """Trajectory of samples; with output times only those, not the events between."""
+    times = settings.output_times
+    if times is not None and (samples.t.tolist() != list(times) or samples.event.any()):
+        wanted = _among(samples.t, np.asarray(times)) & (samples.event >= 0)
+        behind = np.append(samples.t[1:] != samples.t[:-1], True)  # an event at such a time
+        keep = wanted & behind[: len(wanted)]
+        samples = Samples(
+            samples.t[keep], samples.y[keep], samples.memory[keep], samples.event[keep]
+        )
+    nq, nu = system.engine.nq, system.engine.nu
+    y, residual = settled(system, samples.t, samples.y, samples.memory)
+    work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
+    return Trajectory(
+        samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
+        message, settings, statistics, fail_time, (), residual,
+        (last[0], last[1][:nq], last[1][nq : nq + nu]),
+    )  # fmt: skip
+
+
+def _among(t: Array, times: Array) -> NDArray[np.bool_]:
+    """Which of `t` are among the increasing `times`."""
+    if not len(times):
+        return np.zeros(len(t), bool)
+    return np.asarray(times[np.minimum(np.searchsorted(times, t), len(times) - 1)] == t)
+
+
+def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
+    """Samples (n, n_state) with unit quaternions and exact driven coordinates.
+
+    Between steps the samples are the method's dense output, which meets both only within the
+    tolerance.  Also returns the largest distance of a quaternion's length from 1.
+    """
+    engine, y, residual = system.engine, y.copy(), 0.0
+    quaternions = engine.packed.layout.quaternions
+    entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
+    rows = max(1, _QUATERNIONS // max(1, len(entries)))
+    for first in range(0, len(y) if len(entries) else 0, rows):
+        some = y[first : first + rows]
+        lengths = np.sqrt(np.sum(some[:, entries] ** 2, axis=2))
+        residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
+        with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
+            some[:, entries] /= lengths[:, :, None]
+    if engine.packed.model.n_drives:
+        times, known = np.ascontiguousarray(t), memory.copy()
+        engine.lib.mstmm_scene_settle_many(
+            system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),
+            engine.pointer(y),
+        )  # fmt: skip
+    return y, residual

@@ -1,0 +1,29 @@
+"""The state in which a compiled scene begins: as its hinges say it, drives and static shapes taken
+in."""
+
+from __future__ import annotations
+
+from mstmm.arrays import Array
+
+from ..engine.compiled import Compiled
+from ..pack.start import start_values
+from .static_start import settle
+from .system import SceneSystem
+
+
+def initial_state(compiled: Compiled) -> tuple[Array, Array]:
+    """(q, u) at t = 0.  Raises NumericalFailure where a static shape is not found."""
+    packed, engine = compiled.packed, compiled.looped
+    q, u = start_values(packed.scene, compiled.layout, packed.flexible)
+    y = SceneSystem(engine).start(0.0, q, u)
+    q, u = y[: compiled.nq], y[compiled.nq : compiled.nq + compiled.nu]
+    described = (*packed.described.beam, *packed.described.elastic)
+    still = [b.name for b in described if b.name in packed.flexible and b.initial.static]
+    if not still:
+        return q, u
+    memory = engine.start_memory()
+    q = settle(
+        lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
+        q, u, {name: compiled.flexible[name] for name in still}, compiled.layout.modal,
+    )  # fmt: skip
+    return q, u

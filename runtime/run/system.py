@@ -1,0 +1,130 @@
+"""A packed scene as the system that the time integration advances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array
+from mstmm.tape import Tape
+
+from ..engine.calls import Probe
+from ..engine.engine import Engine
+from ..kernels.fused import FusedLibrary
+from ..kernels.tape import c_tape
+from ..pack.layout import StateNames
+from ..pack.packed import resize
+from ..pack.switches import MOST
+
+
+@dataclass(frozen=True)
+class SceneCode:
+    """Code compiled for a scene: for one state, for several side by side, and their numbers."""
+
+    one: FusedLibrary
+    lanes: FusedLibrary | None
+    numbers: Array
+
+
+class SceneSystem:
+    """`mstmm_system` of a model: events, power and memory of its own.
+
+    With `compiled` the right-hand side is that code; events and settling stay with the engine.
+    Without `with_power` the work of what is not stored is not integrated.
+    """
+
+    def __init__(
+        self, engine: Engine, compiled: SceneCode | None = None, with_power: bool = True
+    ) -> None:
+        packed, ffi = engine.packed, engine.ffi
+        self.engine, self.kept = engine, list[Any]()
+        actions, self.event_names = _actions(engine)
+        self.switches = packed.watched.switches
+        self.memory = engine.start_memory()
+        model = packed.model
+        self.run = run = ffi.new("mstmm_scene_run *")
+        run.model = model
+        works = bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
+        works = works or any(
+            body.D.any() or body.drag is not None for body in packed.flexible.values()
+        )
+        run.with_power = int(with_power and works)
+        run.memory = engine.pointer(self.memory)
+        first = np.append(packed.layout.quaternions, 0).astype(np.int32)
+        run.quaternions = ffi.from_buffer("int[]", first)
+        run.n_quaternions = len(packed.layout.quaternions)
+        self.kept += [model, first]
+        if packed.watched.tape is not None:
+            self._events(packed.watched.tape, packed.watched.ends, actions)
+        self.workspace = np.zeros(int(model.workspace))
+        run.workspace = engine.pointer(self.workspace)
+        if compiled is not None:
+            self._compiled(compiled)
+        self.system = ffi.new("mstmm_system *")
+        engine.lib.mstmm_scene_system(run, self.system)
+
+    def _compiled(self, code: SceneCode) -> None:
+        engine, lib = self.engine, self.engine.lib
+        lanes = engine.ffi.NULL if code.lanes is None else code.lanes.descriptor
+        numbers = np.ascontiguousarray(code.numbers)
+        scratch = np.zeros(max(1, lib.mstmm_compiled_size(code.one.descriptor, lanes)))
+        pointers = engine.pointer(numbers), engine.pointer(scratch)
+        lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)
+        self.kept += [code, numbers, scratch, *pointers]
+
+    def _events(
+        self, tape: Tape, ends: Sequence[tuple[str, str]], actions: list[tuple[int, int]]
+    ) -> None:
+        engine, ffi, run = self.engine, self.engine.ffi, self.run
+        resize(engine.packed, tape.slots)
+        run.event_tape = c_tape(ffi, tape, self.kept)
+        probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
+        records = engine.probes(probes)
+        numbers = np.zeros(6 * len(probes) + int(engine.lib.MSTMM_PROBE_NUMBERS))
+        run.probes, run.n_probes = records, len(probes)
+        run.probe_values = engine.pointer(numbers)
+        table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
+        for record, (action, release) in zip(table, actions, strict=False):
+            record.action, record.release = action, release
+        run.events, run.n_events = table, len(actions)
+        run.n_switches = min(len(self.switches), MOST)
+        self.kept += [records, numbers, table]
+
+    @property
+    def with_power(self) -> bool:
+        """True if the state ends with the work of everything that is not stored."""
+        return bool(self.run.with_power)
+
+    def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
+        """State vector at t with driven coordinates, quaternions and memory in order."""
+        y = np.concatenate(
+            [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
+        )
+        y = np.ascontiguousarray(y)
+        self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
+        return y
+
+    def components(self) -> StateNames:
+        """A name per component of the state."""
+        return StateNames(self.engine.packed.layout, self.with_power)
+
+
+def _actions(engine: Engine) -> tuple[list[tuple[int, int]], list[str]]:
+    """(action, memory place) and name of every event and release."""
+    packed, lib = engine.packed, engine.lib
+    actions: list[tuple[int, int]] = []
+    names: list[str] = []
+    for event in packed.scene.event:
+        stops = event.do == "stop"
+        release = -1 if stops else packed.releases[str(event.hinge)]
+        actions.append((lib.MSTMM_FIRE_STOP if stops else lib.MSTMM_FIRE_RESTART, release))
+        names.append(f'event "{event.name}"')
+    for hinge in packed.scene.hinge:
+        if hinge.release is not None:
+            actions.append((lib.MSTMM_FIRE_RESTART, packed.releases[hinge.name]))
+            names.append(f'release of hinge "{hinge.name}"')
+    return actions, names
