@@ -13,7 +13,7 @@ from .scene import Scene
 from .spec import ElementSpec
 
 if TYPE_CHECKING:
-    from .derive.registry import Element
+    from .derive.catalogue.registry import Element
     from .runtime.model.model import Model
     from .runtime.pack.bodies import Known
     from .runtime.pack.packed import Packed
@@ -105,10 +105,10 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
     Raises ElementError naming the equation that is wrong, EnvironmentFailure if the store cannot be
     written.  A name that a built-in element has is refused.
     """
-    from .derive.checks import check
-    from .derive.registry import kind_of
-    from .derive.render import element_source, header
-    from .derive.specs import spec_of
+    from .derive.audit.definition import check
+    from .derive.catalogue.registry import kind_of
+    from .derive.catalogue.specs import spec_of
+    from .derive.print.render import element_source, header
     from .runtime.kernels import prebuilt, store
 
     made = []
@@ -126,7 +126,7 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
 
 def generate_file(path: str | Path) -> list[Generated]:
     """`generate` for every element that a Python file defines.  The file is executed: trust it."""
-    from .derive.registry import load_file
+    from .derive.catalogue.registry import load_file
 
     return generate(load_file(path))
 
@@ -136,13 +136,13 @@ def generate_published() -> list[Generated]:
 
     The group is "mstmm.elements"; an entry names a class or a module of classes.
     """
-    from .derive.registry import published
+    from .derive.catalogue.registry import published
 
     return generate(element for _, elements in published() for element in elements)
 
 
 def register(element: type[Element]) -> Generated:
     """Make a hinge, body or force element of your own known to scenes by its name."""
-    from .derive.registry import instance
+    from .derive.catalogue.registry import instance
 
     return generate([instance(element)])[0]

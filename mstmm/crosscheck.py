@@ -1,8 +1,8 @@
 """Every kernel of an element three ways, and what mechanics asks of it.
 
-The stated equations at 50 digits (`derive.direct`), the IR at 50 digits, the compiled C in doubles
-within the bound that running error analysis gives for its rounding; at random points and at those
-where a formula could break.  Beside that the statements of `derive.properties`.
+The stated equations at 50 digits (`derive.audit.evaluate_equations`), the IR at 50 digits, the
+compiled C in doubles within the bound that running error analysis gives for its rounding; at random
+points and at those where a formula could break.  Beside that what `derive.audit.properties` states.
 
     report = mstmm.crosscheck.crosscheck("hinge", "pin")
     print(report); report.passed
@@ -22,10 +22,10 @@ from .ir import KernelIR
 from .spec import ElementSpec
 
 if TYPE_CHECKING:
-    from .derive.kernels import Kernel
-    from .derive.points import Source
-    from .derive.properties import Property
-    from .derive.registry import Element as Definition
+    from .derive.audit.properties import Property
+    from .derive.audit.samples import Source
+    from .derive.catalogue.kernels import Kernel
+    from .derive.catalogue.registry import Element as Definition
     from .runtime.kernels.prebuilt import Element as Compiled
 
 #: Largest relative difference between specialised and generic kernels in doubles.
@@ -41,8 +41,8 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
     `points` random points per kernel besides the special ones.  Raises ElementError for a name
     that nobody knows.
     """
-    from .derive.kernels import built_in
-    from .derive.registry import builtin_elements, kind_of
+    from .derive.catalogue.kernels import built_in
+    from .derive.catalogue.registry import builtin_elements, kind_of
     from .runtime.kernels import prebuilt, store
 
     make = built_in().get((kind, name))
@@ -64,9 +64,9 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
 
 def crosscheck_definition(element: Definition, points: int = 2) -> Report:
     """Check an element of the user's, with its equations; the C if the store has this very one."""
-    from .derive.kernels import kernels_of
-    from .derive.registry import kind_of
-    from .derive.specs import spec_from
+    from .derive.catalogue.kernels import kernels_of
+    from .derive.catalogue.registry import kind_of
+    from .derive.catalogue.specs import spec_from
     from .runtime.kernels import store
 
     kernels, key = kernels_of(element), (kind_of(element), element.name)
@@ -104,9 +104,9 @@ def _subject(
     kernels: Sequence[Kernel],
     compiled: Compiled | None,
 ) -> _Subject:
-    from .derive.element import Hinge
-    from .derive.hinge import speeds_of
-    from .derive.points import Source
+    from .derive.audit.samples import Source
+    from .derive.equations.hinge import speeds_of
+    from .derive.language.element import Hinge
 
     hinge = element if isinstance(element, Hinge) else None
     nu = len(speeds_of(hinge)) if hinge else 0
@@ -133,7 +133,7 @@ class _Subject:
 
     @classmethod
     def stored(cls, spec: ElementSpec, compiled: Compiled) -> _Subject:
-        from .derive.points import Source
+        from .derive.audit.samples import Source
 
         source = Source(spec.kind, spec.coordinates, spec.parameters)
         irs = {kernel.name: kernel for kernel in spec.kernels}
@@ -170,8 +170,8 @@ class _Subject:
         self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
     ) -> tuple[float, float] | str | None:
         """(equations, compiled) errors; None where all are stopped alike; text where not."""
-        from .derive.direct import Undefined, evaluate_equations
-        from .derive.evaluate import GuardFailure, evaluate
+        from .derive.audit.evaluate import GuardFailure, evaluate
+        from .derive.audit.evaluate_equations import Undefined, evaluate_equations
 
         code, exact = 0, None
         try:
@@ -207,7 +207,7 @@ class _Subject:
         n: int,
     ) -> float:
         """Largest error of C as a share of its bound."""
-        from .derive.rounding import rounding_bounds
+        from .derive.audit.rounding import rounding_bounds
 
         worst = 0.0
         for name, limits in rounding_bounds(kernel, inputs, n).items():
@@ -236,16 +236,16 @@ class _Subject:
 
     def _precisely(self, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]:
         """One kernel at high precision: by its equations if they are at hand, else by its IR."""
-        from .derive.direct import evaluate_equations
-        from .derive.evaluate import evaluate
-        from .derive.properties import DIGITS
+        from .derive.audit.evaluate import evaluate
+        from .derive.audit.evaluate_equations import evaluate_equations
+        from .derive.audit.properties import DIGITS
 
         if self.stated:
             return evaluate_equations(self.stated[name].derivation, inputs, (), DIGITS).outputs
         return evaluate(self.irs[name], inputs, DIGITS)
 
     def statements(self) -> Iterator[tuple[str, float, float]]:
-        from .derive import law_properties, properties
+        from .derive.audit import law_properties, properties
 
         found: tuple[Property, ...] = ()
         p = next((port.length() for kernel in self.irs.values() for port in kernel.inputs
@@ -270,7 +270,7 @@ class _Subject:
 
     def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
         """The compiled specialised kernels against the compiled generic ones."""
-        from .derive.kernels import generic_kernels
+        from .derive.catalogue.kernels import generic_kernels
         from .runtime.kernels import prebuilt
 
         if self.compiled is None or self.compiled.tape is not None:
@@ -293,9 +293,9 @@ class _Subject:
 
 
 def _generic(nu: int, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]:
-    from .derive.direct import evaluate_equations
-    from .derive.kernels import generic_kernels
-    from .derive.properties import DIGITS
+    from .derive.audit.evaluate_equations import evaluate_equations
+    from .derive.audit.properties import DIGITS
+    from .derive.catalogue.kernels import generic_kernels
 
     kernel = next(k for k in generic_kernels(nu) if k.name == name)
     return evaluate_equations(kernel.derivation, inputs, (), DIGITS).outputs

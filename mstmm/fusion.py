@@ -26,7 +26,7 @@ from .spec import ElementSpec
 from .structure import BodyStructure, Key, Structure
 
 if TYPE_CHECKING:
-    from .derive.fuse import Fused
+    from .derive.fuse.scene import Fused
     from .runtime.pack.bodies import Known
     from .runtime.pack.packed import Packed
 
@@ -43,18 +43,14 @@ _SAVED_PER_BODY = 6e-8
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
 
-#: What decides the text besides structure and kernels: the modules that print it.
+#: What decides the text besides structure and kernels: the files and folders that print it.
 PRINTERS = {
     "mstmm": (
         "abi.py", "columns_abi.py", "fused_abi.py", "graph.py", "graph_terms.py", "graph_writer.py",
         "ir.py", "ir_check.py", "ir_kernel.py", "ir_statements.py",
         "structure.py", "tangent.py",
     ),
-    "mstmm.derive": (
-        "balance.py", "c_text.py", "columns_c.py", "fuse.py", "fuse_state.py", "fused_c.py",
-        "fused_loads.py", "fused_modal.py", "fused_sincos.py", "inline.py", "line.py",
-        "straight_c.py", "streams.py", "thrift.py", "transport.py", "unrolled.py",
-    ),
+    "mstmm.derive": ("fuse", "print", "unrolled.py"),
 }  # fmt: skip
 
 
@@ -170,7 +166,7 @@ class Fusion:
         return Recipe("fused", identity, sources, FLAGS, optional=TUNING)
 
     def _sources(self, part: str, key: str) -> dict[str, str]:
-        from .derive.fused_c import fused_sources
+        from .derive.print.scene import fused_sources
 
         return fused_sources(self.fused(self.structure), key, part)
 
@@ -189,7 +185,7 @@ class Fusion:
             return None
 
         def sources(key: str) -> dict[str, str]:
-            from .derive.columns_c import columns_sources
+            from .derive.print.columns import columns_sources
 
             return columns_sources(kernels(), key)
 
@@ -204,7 +200,7 @@ class Fusion:
 
     def fused(self, structure: Structure) -> Fused:
         """The IR of a structure whose elements this scene has; no compiler, no cache."""
-        from .derive.fuse import fuse
+        from .derive.fuse.scene import fuse
 
         return fuse(structure, kernels_of(self._definitions))
 
@@ -242,12 +238,21 @@ def _obstacle(packed: Packed, most: int) -> str:
     return ""
 
 
+def printers() -> list[Path]:
+    """The files named by PRINTERS, those of a folder in the order of their names."""
+    found: list[Path] = []
+    for package, names in PRINTERS.items():
+        for name in names:
+            path = Path(str(files(package).joinpath(name)))
+            found += sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    return found
+
+
 @cache
 def _printers_hash() -> str:
     found = hashlib.sha256()
-    for package, names in PRINTERS.items():
-        for name in names:
-            found.update(files(package).joinpath(name).read_bytes())
+    for path in printers():
+        found.update(path.read_bytes())
     for path in sorted(Path(str(files("mstmm.templates"))).glob("fused_*.c")):
         found.update(path.read_bytes())
     return found.hexdigest()

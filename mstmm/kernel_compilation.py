@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hashlib import sha256
 
-from .derive.scalar_c import library_source
+from .derive.print.scalar_library import library_source
 from .ir import KernelIR
 from .runtime.kernels.scalar import ScalarKernel
 from .runtime.libraries.cache import Recipe, opened

@@ -1,1 +1,1 @@
-"""Jinja templates of the C text; `derive.render` fills them."""
+"""Jinja templates of the C text; `derive.print.render` fills them."""

@@ -172,7 +172,7 @@ def test_jinja_is_used_in_one_file() -> None:
         for _, name in imports(path)
         if name.split(".")[0] == "jinja2"
     }
-    assert users == {"derive/render.py"}
+    assert users == {"derive/print/render.py"}
 
 
 def test_import_contracts_hold() -> None:
@@ -188,8 +188,8 @@ def test_no_module_imports_itself_in_the_end() -> None:
     """Imports inside functions and for the type checker count like any other."""
     graph = grimp.build_graph("mstmm")
     imported = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
-    rooms = {name: found for name, found in imported.items() if name.split(".")[1:2] == ["runtime"]}
-    assert len(rooms) > 100
+    rooms = {n: found for n, found in imported.items() if n.split(".")[1:2] != ["cli"]}
+    assert len(rooms) > 300
     graphlib.TopologicalSorter(rooms).prepare()  # CycleError tells the way around
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, vector
-from ..notation import Matrix, Perp, Tilde, matrix_symbols
+from ..language.derivation import Derivation, Equation, Quantity, vector
+from ..language.notation import Matrix, Perp, Tilde, matrix_symbols
 from . import hinge_relation
 from .hinge_relation import HingeStatement
 from .state import PLANAR, SPATIAL

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..derivation import Derivation, Equation, Quantity, vector
+from ..language.derivation import Derivation, Equation, Quantity, vector
 from . import hinge_relation
 from .hinge_relation import HingeStatement
 from .state import SPATIAL

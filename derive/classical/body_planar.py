@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, vector
-from ..notation import Perp
+from ..language.derivation import Derivation, Equation, Quantity, vector
+from ..language.notation import Perp
 from .state import BOOK, PLANAR, force_scale, transfer_matrix
 
 MASS = sp.MatrixSymbol("M", 1, 1)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, tilde, vector
-from ..notation import Tilde, explicit
+from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..language.notation import Tilde, explicit
 from .state import BOOK, SPATIAL, force_scale, transfer_matrix
 
 MASS = sp.MatrixSymbol("M", 1, 1)
@@ -81,6 +81,6 @@ def derivation(stated: tuple[Equation, ...] | None = None) -> Derivation:
         sources=(f"{BOOK}, (5.19) to (5.27)",),
         notes=(
             "State [rdd; omegadot; m; q; 1] in inertial axes; m, q of the inboard on the outboard.",
-            "Euler's law about I is the integral of r x a dm (mstmm.derive.newton_euler).",
+            "Euler's law about I is the integral of r x a dm (derive.equations.newton_euler).",
         ),
     )

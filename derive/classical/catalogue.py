@@ -12,10 +12,10 @@ import sympy as sp
 
 from mstmm.spec import ElementSpec
 
-from ..derivation import Derivation
-from ..lower import lower
+from ..language.derivation import Derivation
+from ..lower.kernel import lower
 from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
-from .flexible_catalogue import FLEXIBLE
+from .discrete.catalogue import FLEXIBLE
 from .hinge_relation import guards
 
 

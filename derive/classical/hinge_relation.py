@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, Solve
-from ..notation import Matrix, residual, solve_linear
+from ..language.derivation import Derivation, Equation, Quantity, Solve
+from ..language.notation import Matrix, residual, solve_linear
 from .state import BOOK, State, closed
 
 #: Relative size below which a pivot counts as vanished, and the failure code of a kernel then.
@@ -173,7 +173,7 @@ def _margin(statement: HingeStatement, scale: sp.MatrixSymbol) -> tuple[Equation
 
 
 def guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """Guards for `mstmm.derive.lower.lower`: leave with VANISHING_PIVOT below PIVOT_LIMIT."""
+    """Guards for `derive.lower.kernel.lower`: leave with VANISHING_PIVOT below PIVOT_LIMIT."""
     margin = next(q.symbol for q in hinge.outputs if q.name == "margin")
     return (
         (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity
+from ..language.derivation import Derivation, Equation, Quantity
 from . import hinge_relation
 from .hinge_relation import HingeStatement
 from .state import PLANAR

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, tilde, vector
-from ..notation import explicit
+from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..language.notation import explicit
 from . import hinge_relation
 from .hinge_relation import HingeStatement
 from .state import SPATIAL

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..derivation import Equation, vector
-from ..notation import Matrix, solve_linear
+from ..language.derivation import Equation, vector
+from ..language.notation import Matrix, solve_linear
 
 BOOK = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 5"
 

@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from ..derivation import tilde
-from ..element import Body, Param, Symbols
+from ..language.derivation import tilde
+from ..language.element import Body, Param, Symbols
 
 PARAMETERS = (
     Param("mass", "kg", "mass", minimum=0.0),
@@ -21,7 +21,7 @@ def inertia_tensor(p: Symbols) -> sp.Matrix:
 
 
 class RigidBody(Body):
-    """Newton-Euler equations about the input end I, derived in `derive.newton_euler`."""
+    """Newton-Euler equations about the input end I, derived in `derive.equations.newton_euler`."""
 
     name = "rigid"
     title = "rigid body"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..element import ForceElement, Param, Symbols
+from ..language.element import ForceElement, Param, Symbols
 
 
 class Spring(ForceElement):

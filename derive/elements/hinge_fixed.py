@@ -1,6 +1,6 @@
 """Fixed hinge (weld): no relative motion."""
 
-from ..element import Hinge
+from ..language.element import Hinge
 
 
 class Fixed(Hinge):

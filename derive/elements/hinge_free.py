@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from ..element import Hinge, Param, Symbols
-from ..quaternion import rate_of, rotation_of
+from ..language.element import Hinge, Param, Symbols
+from ..language.quaternion import rate_of, rotation_of
 
 COORDINATES = (
     *(Param(n, "m", "P from Q, inboard hinge axes") for n in "xyz"),

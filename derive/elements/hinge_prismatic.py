@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..element import Hinge, Param, Symbols
+from ..language.element import Hinge, Param, Symbols
 
 
 class Prismatic(Hinge):

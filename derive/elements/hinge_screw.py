@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..element import Hinge, Param, Symbols, rotation_about
+from ..language.element import Hinge, Param, Symbols, rotation_about
 
 
 class Screw(Hinge):

@@ -20,8 +20,8 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, vector
-from ..notation import Matrix
+from ..language.derivation import Derivation, Equation, Quantity, vector
+from ..language.notation import Matrix
 
 _Y, _Z, _X = sp.symbols("y z x", real=True)
 

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, vector
-from ..notation import Matrix
+from ..language.derivation import Derivation, Equation, Quantity, vector
+from ..language.notation import Matrix
 from .beam_fields import INERTIA, X, displacement, entries, over_mass, point
 
 SOURCES = (

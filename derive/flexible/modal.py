@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, tilde, vector
-from ..sweep import MOTION, E, S
+from ..equations.sweep import MOTION, E, S
+from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
 from .symbols import (
     DAMPING,
     ETA,

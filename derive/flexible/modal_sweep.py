@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from ..sweep import DELTA, SHIFT, SOURCES, E, R, S
+from ..equations.sweep import DELTA, SHIFT, SOURCES, E, R, S
+from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from .modal import E_F, S_FF, S_RF
 from .symbols import N, column, modal, part, stack
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Derivation, Equation, Quantity, tilde, vector
+from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
 from .symbols import ETA, ETAD, SOURCES, column, modal, pair, part, stack
 
 eta, etad = ETA.symbol, ETAD.symbol

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..derivation import Quantity
+from ..language.derivation import Quantity
 
 #: Number of modes.
 N = sp.Symbol("n", integer=True, positive=True)

@@ -183,8 +183,8 @@ def _element(name: str) -> Report:
 def _file(path: str) -> Report:
     """Every element that a Python file defines.  The file is executed."""
     from mstmm.crosscheck import crosscheck_definition
-    from mstmm.derive.checks import check as check_element
-    from mstmm.derive.registry import load_file
+    from mstmm.derive.audit.definition import check as check_element
+    from mstmm.derive.catalogue.registry import load_file
 
     reports = []
     for element in load_file(python_file(path)):

@@ -100,7 +100,7 @@ def _checkout() -> Path:
 
 
 def _regenerate(json: bool) -> None:
-    from mstmm.derive.generate import regenerate
+    from mstmm.derive.catalogue.generate import regenerate
 
     from .output import emit_json, note, say
 
@@ -115,7 +115,7 @@ def _regenerate(json: bool) -> None:
 
 
 def _compare(json: bool) -> None:
-    from mstmm.derive.generate import differences
+    from mstmm.derive.catalogue.generate import differences
 
     from .output import complain, emit_json, note, say
 

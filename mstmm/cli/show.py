@@ -11,7 +11,7 @@ from mstmm.errors import ElementError
 from .options import Json, output_file, python_file, quoted
 
 if TYPE_CHECKING:
-    from mstmm.derive.show_document import ElementView
+    from mstmm.derive.show.document import ElementView
     from mstmm.spec import ElementSpec
 
 STAGES = ("equations", "matrix", "ir", "c")
@@ -74,21 +74,21 @@ def show(
 
 
 def _page(view: ElementView, at: str, format: str) -> str:
-    from mstmm.derive.show import show_view
+    from mstmm.derive.show.page import show_view
 
     return show_view(view, at, format)
 
 
 def _views(element: str, at: str) -> list[ElementView]:
     """Views of a built-in element, of one in the kernel store, or of all in a file."""
-    from mstmm.derive import views
+    from mstmm.derive.show import subjects as views
 
     from . import stored
     from .names import found
 
     if element.endswith(".py"):
-        from mstmm.derive.checks import check
-        from mstmm.derive.registry import load_file
+        from mstmm.derive.audit.definition import check
+        from mstmm.derive.catalogue.registry import load_file
 
         defined = load_file(python_file(element))
         for each in defined:
@@ -121,7 +121,7 @@ def _kept(kind: str, name: str, at: str) -> ElementView:
 
 
 def _of_spec(spec: ElementSpec, source: str) -> ElementView:
-    from mstmm.derive.show_document import ElementView
+    from mstmm.derive.show.document import ElementView
 
     return ElementView(
         f"{spec.kind}_{spec.name}",

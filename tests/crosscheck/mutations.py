@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import sympy as sp
 
-from mstmm.derive.derivation import Derivation
-from mstmm.derive.kernels import Kernel
+from mstmm.derive.catalogue.kernels import Kernel
+from mstmm.derive.language.derivation import Derivation
 
 
 def turned(expression: sp.Basic) -> Iterator[sp.Basic]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mstmm.crosscheck import Report, crosscheck
-from mstmm.derive.kernels import built_in
+from mstmm.derive.catalogue.kernels import built_in
 from mstmm.errors import ElementError
 
 MANIFEST = Path(__file__).resolve().parents[2] / "generated" / "manifest.json"

@@ -16,7 +16,7 @@ from reference.tree import SIZES
 from support.complex_arithmetic import complex_step
 
 import mstmm
-from mstmm.derive.evaluate import evaluate
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.ir import KernelIR
 from mstmm.runtime.model.derivatives import Derivatives
 from mstmm.runtime.pack.pack import pack

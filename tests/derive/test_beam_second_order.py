@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from mstmm.derive.evaluate import evaluate
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.flexible import beam_second_order
-from mstmm.derive.lower import lower
+from mstmm.derive.lower.kernel import lower
 
 from .test_beam_fields import DENSITY, Y, Z, over_rectangle, section
 

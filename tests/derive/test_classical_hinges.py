@@ -20,6 +20,7 @@ from support.classical_kernels import (
 from support.dense_chain import Array, Body, Joint, accelerations, planar_body, random_body
 from support.sign_flips import Flip, flipped, flips, terms
 
+from mstmm.derive.audit.evaluate import GuardFailure
 from mstmm.derive.classical import (
     acceleration,
     ball,
@@ -31,8 +32,7 @@ from mstmm.derive.classical import (
 )
 from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.hinge_relation import VANISHING_PIVOT, HingeStatement
-from mstmm.derive.evaluate import GuardFailure
-from mstmm.derive.notation import matrix_symbols
+from mstmm.derive.language.notation import matrix_symbols
 from mstmm.ir import KernelIR
 
 SPATIAL_BODY = kernel(body_spatial.derivation())

@@ -9,14 +9,14 @@ import mpmath
 import pytest
 import sympy as sp
 
-from mstmm.derive.derivation import Derivation, Equation, Factor, Quantity, Triangular
-from mstmm.derive.direct import Undefined, evaluate_equations
-from mstmm.derive.element import Hinge
-from mstmm.derive.evaluate import evaluate
-from mstmm.derive.kernels import generic_kernels, hinge_kernels, screw_kernels
-from mstmm.derive.lower import lower
-from mstmm.derive.points import rotation
-from mstmm.derive.registry import builtin_elements
+from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.audit.evaluate_equations import Undefined, evaluate_equations
+from mstmm.derive.audit.samples import rotation
+from mstmm.derive.catalogue.kernels import generic_kernels, hinge_kernels, screw_kernels
+from mstmm.derive.catalogue.registry import builtin_elements
+from mstmm.derive.language.derivation import Derivation, Equation, Factor, Quantity, Triangular
+from mstmm.derive.language.element import Hinge
+from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
 
 DIGITS = 40

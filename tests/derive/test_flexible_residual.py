@@ -9,8 +9,8 @@ T = 1/2 yd^T M(eta) yd with yd = [v; w; etad] is formed from the moments that th
 
 import sympy as sp
 
-from mstmm.derive.derivation import Derivation
 from mstmm.derive.flexible import modal, section, symbols
+from mstmm.derive.language.derivation import Derivation
 
 N = 2
 

@@ -8,9 +8,9 @@ from typing import Any
 import mpmath
 import pytest
 
-from mstmm.derive.evaluate import evaluate
-from mstmm.derive.kernels import Kernel, generic_kernels, screw_kernels
-from mstmm.derive.points import Source
+from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.audit.samples import Source
+from mstmm.derive.catalogue.kernels import Kernel, generic_kernels, screw_kernels
 from mstmm.graph import Graph, Node
 from mstmm.ir import Assign, Constant, Element, KernelIR, Operand, Store, Temporary
 

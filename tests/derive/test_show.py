@@ -10,18 +10,18 @@ import pytest
 import sympy as sp
 
 from mstmm.derive.classical.catalogue import CLASSICAL, classical_spec
-from mstmm.derive.classical.flexible_catalogue import FLEXIBLE
-from mstmm.derive.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from mstmm.derive.notation import Matrix, Tilde, explicit
-from mstmm.derive.render import element_source
-from mstmm.derive.rigid_body import rigid_body
-from mstmm.derive.show import FORMATS, STAGES, ElementView, show, show_view
-from mstmm.derive.show_html import mathml
-from mstmm.derive.show_latex import latex
-from mstmm.derive.show_layout import layout
-from mstmm.derive.show_names import ShownName, shown_name, shown_unit
-from mstmm.derive.show_recognise import recognise
-from mstmm.derive.show_text import WIDTH, columns, wrapped
+from mstmm.derive.classical.discrete.catalogue import FLEXIBLE
+from mstmm.derive.equations.rigid_body import rigid_body
+from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from mstmm.derive.language.notation import Matrix, Tilde, explicit
+from mstmm.derive.print.render import element_source
+from mstmm.derive.show.html import mathml
+from mstmm.derive.show.latex import latex
+from mstmm.derive.show.layout import layout
+from mstmm.derive.show.names import ShownName, shown_name, shown_unit
+from mstmm.derive.show.page import FORMATS, STAGES, ElementView, show, show_view
+from mstmm.derive.show.recognise import recognise
+from mstmm.derive.show.text import WIDTH, columns, wrapped
 from mstmm.errors import ElementError
 
 #: Acceleration form; tests/flexible/test_classical_show.py has the discrete-time form.

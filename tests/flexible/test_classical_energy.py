@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mstmm.derive.classical.flexible_energy import Equations, Motion, equations
-from mstmm.derive.classical.flexible_moments import ETA, Letters, planar, spatial
-from mstmm.derive.derivation import Equation, vector
+from mstmm.derive.classical.discrete.energy import Equations, Motion, equations
+from mstmm.derive.classical.discrete.moments import ETA, Letters, planar, spatial
+from mstmm.derive.language.derivation import Equation, vector
 
 Numbers = dict[sp.Basic, sp.Rational]
 

@@ -18,20 +18,15 @@ from support.hinge_premises import body_residual, hinge_residual, matrices
 from support.premises import Premises
 from support.random_bodies import random_body
 
-from mstmm.derive.classical import flexible_body
+from mstmm.derive.catalogue.kernels import Kernel
 from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.classical.flexible_catalogue import (
-    BODIES,
-    HINGES,
-    PLANAR_MODES,
-    SPATIAL_MODES,
-)
-from mstmm.derive.classical.flexible_hinge import PAIRINGS, Pairing, pairing
-from mstmm.derive.classical.flexible_state import PLANE, SPACE
-from mstmm.derive.classical.flexible_statement import BodyStatement
-from mstmm.derive.derivation import Derivation
-from mstmm.derive.kernels import Kernel
-from mstmm.derive.lower import lower
+from mstmm.derive.classical.discrete import body as flexible_body
+from mstmm.derive.classical.discrete.catalogue import BODIES, HINGES, PLANAR_MODES, SPATIAL_MODES
+from mstmm.derive.classical.discrete.hinge import PAIRINGS, Pairing, pairing
+from mstmm.derive.classical.discrete.state import PLANE, SPACE
+from mstmm.derive.classical.discrete.statement import BodyStatement
+from mstmm.derive.language.derivation import Derivation
+from mstmm.derive.lower.kernel import lower
 
 #: The differences' own error is 1e-50.
 LIMIT = 1e-40

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import pytest
 
 from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.classical.flexible_catalogue import BODIES, FLEXIBLE, HINGES
-from mstmm.derive.show import show_view
-from mstmm.derive.show_text import WIDTH, columns
-from mstmm.derive.views import view
+from mstmm.derive.classical.discrete.catalogue import BODIES, FLEXIBLE, HINGES
+from mstmm.derive.show.page import show_view
+from mstmm.derive.show.subjects import view
+from mstmm.derive.show.text import WIDTH, columns
 
 #: Printed matrices and the numbers of their equations.
 NUMBERS = {

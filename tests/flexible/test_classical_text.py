@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.evaluate import evaluate_floats
-from mstmm.derive.lower import lower
+from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from reference.jets import Array
 from support.complex_arithmetic import complex_step
 
 import mstmm
-from mstmm.derive.evaluate import evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.errors import SceneError
 from mstmm.fusion import Fusion, modes_at
 from mstmm.ir import KernelIR

@@ -13,7 +13,7 @@ from support.result_scenes import pins
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.fusion import MOST_ASKED, MOST_BODIES, PRINTERS, Fusion
+from mstmm.fusion import MOST_ASKED, MOST_BODIES, Fusion, printers
 from mstmm.ir import KernelIR
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.structure import structure_of
@@ -163,10 +163,10 @@ def test_contradictory_wishes_are_refused() -> None:
 
 def test_everything_that_prints_the_text_is_part_of_the_key() -> None:
     code = (
-        "import sys, mstmm.derive.fuse, mstmm.derive.fused_c\n"
+        "import sys, mstmm.derive.fuse.scene, mstmm.derive.print.scene\n"
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('mstmm')))"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = {Path(name).name for name in found.stdout.split()}
-    hashed = {name for names in PRINTERS.values() for name in names}
-    assert loaded - {"__init__.py", "errors.py", "interrupts.py"} <= hashed
+    loaded = {Path(name).resolve() for name in found.stdout.split()}
+    missed = {path.name for path in loaded - {path.resolve() for path in printers()}}
+    assert missed <= {"__init__.py", "errors.py", "interrupts.py", "version.py"}

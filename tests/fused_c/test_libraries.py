@@ -12,7 +12,7 @@ from support.rod_scenes import chain, drawn_state
 
 import mstmm
 from mstmm import fused_abi
-from mstmm.derive.fused_c import fused_sources
+from mstmm.derive.print.scene import fused_sources
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.kernels.fused import Call, FusedLibrary, open_library
 from mstmm.runtime.pack.structure import structure_of

@@ -8,7 +8,7 @@ import math
 import pytest
 from support.fused_lab import COMPILERS, WIDTHS, FusedLab
 
-from mstmm.derive.evaluate import evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.ir import (
     OPERATIONS,
     Assign,

@@ -10,7 +10,7 @@ import pytest
 from support.fused_lab import COMPILERS, FusedLab
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.rounding import rounding_bounds
+from mstmm.derive.audit.rounding import rounding_bounds
 from mstmm.graph import Graph
 from mstmm.ir import OPERATIONS, Port
 

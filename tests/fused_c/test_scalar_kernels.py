@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.evaluate import evaluate
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.graph import Graph
 from mstmm.ir import OPERATIONS, Port
 from mstmm.kernel_compilation import compile_kernel

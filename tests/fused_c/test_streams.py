@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.evaluate import evaluate_floats
-from mstmm.derive.fused_sincos import gather
-from mstmm.derive.line import Line, operands
-from mstmm.derive.streams import merged
-from mstmm.derive.thrift import thrifty
+from mstmm.derive.audit.evaluate import evaluate_floats
+from mstmm.derive.fuse.passes.interleave import merged
+from mstmm.derive.fuse.passes.line import Line, operands
+from mstmm.derive.fuse.passes.registers import thrifty
+from mstmm.derive.fuse.passes.sincos import gather
 from mstmm.graph import Graph
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
 

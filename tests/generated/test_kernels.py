@@ -10,8 +10,8 @@ import pytest
 from support.c_library import CLibrary, compile_library, same
 
 from mstmm import abi
-from mstmm.derive.evaluate import GuardFailure, evaluate_floats
-from mstmm.derive.rounding import rounding_bounds
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate_floats
+from mstmm.derive.audit.rounding import rounding_bounds
 from mstmm.ir import KernelIR, Port
 from mstmm.spec import ElementSpec
 from mstmm.stored import element_from_json

@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from mstmm.derive.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
 from mstmm.errors import NumericalFailure
 from mstmm.graph import Graph
 from mstmm.ir import KernelIR, Port

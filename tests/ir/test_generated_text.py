@@ -16,8 +16,8 @@ from support.c_library import build, compile_library
 from support.random_kernels import element, random_kernel
 
 from mstmm import abi
-from mstmm.derive.c_text import comment, literal, string
-from mstmm.derive.render import (
+from mstmm.derive.print.kernel import comment, literal, string
+from mstmm.derive.print.render import (
     element_source,
     generated_files,
     registry_source,
@@ -35,7 +35,7 @@ DIGEST = """
 import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 from support.random_kernels import element, random_kernel
-from mstmm.derive.render import generated_files
+from mstmm.derive.print.render import generated_files
 files = generated_files([element("b", random_kernel("k", 1)), element("a", random_kernel("k", 2))])
 for name, text in files.items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
@@ -206,7 +206,7 @@ def test_string_and_comment() -> None:
 
 
 def test_templates_are_strict() -> None:
-    from mstmm.derive import render
+    from mstmm.derive.print import render
 
     environment = render._environment()
     assert environment.undefined is jinja2.StrictUndefined

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
-from mstmm.derive.evaluate import evaluate
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.graph import Graph, Node
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Port
 from mstmm.tangent import derivative

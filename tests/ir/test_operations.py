@@ -13,8 +13,8 @@ import pytest
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm.derive.c_text import C_OPERATIONS
-from mstmm.derive.evaluate import evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
+from mstmm.derive.print.kernel import C_OPERATIONS
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Store, Temporary
 from mstmm.tape import compile_tape
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.evaluate import GuardFailure, evaluate, evaluate_floats
-from mstmm.derive.rounding import UNIT, rounding_bounds
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.rounding import UNIT, rounding_bounds
 from mstmm.graph import Graph
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Solve, Store, Temporary
 

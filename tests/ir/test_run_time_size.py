@@ -11,7 +11,7 @@ from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
 from mstmm import abi
-from mstmm.derive.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
 from mstmm.graph import Graph
 from mstmm.ir import LOOP_INDEX, Element, KernelIR, Port, Solve, Store, from_json, to_json
 from mstmm.spec import ElementSpec

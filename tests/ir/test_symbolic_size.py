@@ -11,13 +11,13 @@ import sympy as sp
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm.derive.derivation import Derivation, Equation, Quantity, Solve
-from mstmm.derive.direct import evaluate_equations
-from mstmm.derive.evaluate import GuardFailure, evaluate, evaluate_floats
-from mstmm.derive.inline import unrolled
-from mstmm.derive.lower import lower
-from mstmm.derive.rounding import rounding_bounds
-from mstmm.derive.show_ir import listing
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate_equations import evaluate_equations
+from mstmm.derive.audit.rounding import rounding_bounds
+from mstmm.derive.fuse.inline import unrolled
+from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Solve
+from mstmm.derive.lower.kernel import lower
+from mstmm.derive.show.ir import listing
 from mstmm.errors import NumericalFailure
 from mstmm.graph import Graph
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json

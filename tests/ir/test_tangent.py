@@ -14,7 +14,7 @@ from ir.test_run_time_size import SIZES, drawn
 from support.complex_arithmetic import complex_step
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
 from mstmm.graph import Graph
 from mstmm.ir import Constant, KernelIR, Port, Store
 from mstmm.tangent import tangent

@@ -9,8 +9,8 @@ import pytest
 from support.random_kernels import random_inputs, random_kernel
 from support.scalar_kernels import ScalarKernel
 
-from mstmm.derive.evaluate import evaluate, evaluate_floats
-from mstmm.derive.scalar_types import SCALARS, scalar_source
+from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
+from mstmm.derive.print.scalar_function import SCALARS, scalar_source
 from mstmm.graph import Graph
 from mstmm.ir import KernelIR, Port
 

@@ -13,7 +13,7 @@ from typing import Any
 import cffi
 
 from mstmm import abi
-from mstmm.derive.render import write_generated
+from mstmm.derive.print.render import write_generated
 from mstmm.spec import ElementSpec
 from mstmm.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 

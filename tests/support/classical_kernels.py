@@ -9,10 +9,10 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
 from mstmm.derive.classical.catalogue import classical_guards
-from mstmm.derive.derivation import Derivation
-from mstmm.derive.evaluate import evaluate, evaluate_floats
-from mstmm.derive.lower import lower
+from mstmm.derive.language.derivation import Derivation
+from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
 from support.dense_chain import Array, Body
 

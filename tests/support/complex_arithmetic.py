@@ -9,8 +9,8 @@ import cmath
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from mstmm.derive.arithmetic import FloatArithmetic
-from mstmm.derive.evaluate import run
+from mstmm.derive.audit.arithmetic import FloatArithmetic
+from mstmm.derive.audit.evaluate import run
 from mstmm.ir import Constant, KernelIR
 
 STEP = 1e-200
@@ -39,7 +39,7 @@ def _power(a: complex, b: complex) -> complex:
 
 
 class ComplexArithmetic:
-    """What `mstmm.derive.evaluate.run` needs."""
+    """What `mstmm.derive.audit.evaluate.run` needs."""
 
     operations: ClassVar[Mapping[str, Callable[..., Any]]] = {
         **{name: getattr(cmath, name) for name in (

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.derive.fused_c import function_text, support
-from mstmm.derive.straight_c import LANES, NUMBERS
+from mstmm.derive.print.scene import function_text, support
+from mstmm.derive.print.straight_line import LANES, NUMBERS
 from mstmm.fused_abi import FLAGS
 from mstmm.ir import KernelIR
 

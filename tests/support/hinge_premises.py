@@ -7,11 +7,11 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from mstmm.derive.classical.flexible_hinge import Pairing
-from mstmm.derive.classical.flexible_state import Space
+from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.classical.discrete.hinge import Pairing
+from mstmm.derive.classical.discrete.state import Space
 from mstmm.derive.classical.state import State
-from mstmm.derive.derivation import Derivation
-from mstmm.derive.evaluate import evaluate
+from mstmm.derive.language.derivation import Derivation
 from mstmm.ir import KernelIR
 from support.discrete_bodies import DIGITS, Array, ParticleBody, drawn, kernel_inputs, stacked
 from support.premises import Premises

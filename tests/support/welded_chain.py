@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mstmm.derive.classical import flexible_body, flexible_joint
-from mstmm.derive.classical.flexible_hinge import Pairing
-from mstmm.derive.classical.flexible_state import PLANE
-from mstmm.derive.classical.flexible_statement import BodyStatement
-from mstmm.derive.evaluate import evaluate, evaluate_floats
-from mstmm.derive.lower import lower
+from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
+from mstmm.derive.classical.discrete import body as flexible_body
+from mstmm.derive.classical.discrete import joint as flexible_joint
+from mstmm.derive.classical.discrete.hinge import Pairing
+from mstmm.derive.classical.discrete.state import PLANE
+from mstmm.derive.classical.discrete.statement import BodyStatement
+from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import mstmm
 from mstmm.cli.app import app
 from mstmm.compilation import generate_published
-from mstmm.derive.registry import published
+from mstmm.derive.catalogue.registry import published
 
 MODULE = """
 import sympy as sp

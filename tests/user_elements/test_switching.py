@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 import mstmm
 from mstmm.crosscheck import crosscheck_definition
 from mstmm.derive import ForceElement, Hinge, Param, rotation_about
-from mstmm.derive.checks import check
-from mstmm.derive.switches import slope
+from mstmm.derive.audit.definition import check
+from mstmm.derive.language.switches import slope
 from mstmm.errors import ElementError
 
 a, r = sp.symbols("q_angle p_r", real=True)

@@ -1,0 +1,1 @@
+"""Checks of definitions, equations, kernels and their rounding errors."""

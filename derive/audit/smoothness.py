@@ -1,0 +1,102 @@
+"""Refuses definitions whose branches do not meet as mechanics needs.
+
+A hinge's position, rotation and motion subspace must be continuous: where the slope of a position
+jumped, the velocities of the bodies would, which is an impulse that no hinge carries.  A potential
+must be continuous, or energy would appear from nothing.  Second derivatives and forces may jump.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import mpmath
+import sympy as sp
+
+from mstmm.errors import ElementError
+
+from ..language.switches import crossings, switches
+from .evaluate_equations import Undefined, evaluate_matrix
+
+_DIGITS = 40
+#: Distance from the place where branches meet at which both are looked at.
+_BESIDE = mpmath.mpf(10) ** -15
+#: Largest difference, relative, between both sides of something continuous.
+_CONTINUOUS = 1e-9
+#: Values of a variable between which a change of sign is looked for.
+_SAMPLES = 41
+
+Range = tuple[float, float]
+
+
+def refuse_jumps(
+    where: str,
+    expressions: Mapping[str, sp.Matrix],
+    along: Mapping[sp.Symbol, Range],
+    points: Iterable[Mapping[sp.Symbol, float]],
+    why: str,
+) -> None:
+    """ElementError if one of the named matrices jumps where a branch takes over.
+
+    Args:
+        expressions: name -> matrix in the symbols of the points.
+        along: the variables and the range in which each is moved, the others held at a point.
+        why: what is wrong with a jump, for the message.
+    """
+    found = list(switches(expressions.values()))
+    if not found:
+        return
+    for point in points:
+        for node, vanishing in found:
+            for symbol in sorted(vanishing.free_symbols & along.keys(), key=str):
+                for place in _places(vanishing, symbol, along[symbol], point):
+                    _refuse_jump(where, expressions, node, {**point, symbol: place}, symbol, why)
+
+
+def _places(
+    vanishing: sp.Expr, symbol: sp.Symbol, bounds: Range, point: Mapping[sp.Symbol, float]
+) -> list[mpmath.mpf]:
+    def value(x: mpmath.mpf) -> mpmath.mpf:
+        try:
+            return evaluate_matrix(sp.Matrix([vanishing]), {**point, symbol: x}, _DIGITS)[0][0]
+        except Undefined:
+            return mpmath.mpf(0)
+
+    return list(crossings(mpmath.linspace(*bounds, _SAMPLES), value, _DIGITS))
+
+
+def _refuse_jump(
+    where: str,
+    expressions: Mapping[str, sp.Matrix],
+    node: sp.Basic,
+    place: Mapping[sp.Symbol, mpmath.mpf],
+    symbol: sp.Symbol,
+    why: str,
+) -> None:
+    for what, matrix in expressions.items():
+        with mpmath.workdps(_DIGITS):
+            sides = [{**place, symbol: place[symbol] + d} for d in (-_BESIDE, _BESIDE)]
+            try:
+                one, two = (_entries(matrix, side) for side in sides)
+            except Undefined:
+                continue
+            size = 1 + max(map(abs, one), default=0)
+            if all(abs(a - b) <= _CONTINUOUS * size for a, b in zip(one, two, strict=True)):
+                continue
+        raise ElementError(
+            f"{where}: {what} jumps at {_written(symbol)} = {_number(place[symbol])}, where "
+            f"{_written(node):.80} takes another branch: {why}"
+        )
+
+
+def _number(x: mpmath.mpf) -> str:
+    return str(mpmath.nstr(mpmath.chop(x, 1e-20), 6))
+
+
+def _written(expression: sp.Basic) -> str:
+    """An expression on one line as its author wrote it: q.angle, not q_angle."""
+    return re.sub(r"\b([qup])_", r"\1.", " ".join(str(expression).split()))
+
+
+def _entries(matrix: sp.Matrix, point: Mapping[sp.Symbol, mpmath.mpf]) -> Sequence[mpmath.mpf]:
+    return [x for row in evaluate_matrix(matrix, point, _DIGITS) for x in row]

@@ -1,0 +1,45 @@
+"""Regenerates the committed C, and compares it with what a fresh derivation gives."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from ..print.render import generated_files, write_generated
+from .specs import all_specs
+
+#: Files of `generated/` that are written by hand or by the compiler.
+NOT_GENERATED = ("__init__.py",)
+
+
+def regenerate(folder: Path | str) -> list[Path]:
+    """Derive everything and write it; files of elements that are gone are removed."""
+    target = Path(folder)
+    written = write_generated(all_specs(), target)
+    for path in target.iterdir():
+        if path.suffix in (".c", ".h", ".json") and path not in written:
+            path.unlink()
+    return written
+
+
+def differences(folder: Path | str) -> list[str]:
+    """Unified diffs between a fresh derivation and `folder`; empty if they agree byte for byte."""
+    target = Path(folder)
+    fresh = generated_files(all_specs())
+    stored = {
+        path.name: path.read_text(encoding="utf-8")
+        for path in sorted(target.iterdir())
+        if path.suffix in (".c", ".h", ".json")
+    }
+    found = []
+    for name in sorted(fresh.keys() | stored.keys()):
+        if fresh.get(name) != stored.get(name):
+            lines = difflib.unified_diff(
+                stored.get(name, "").splitlines(),
+                fresh.get(name, "").splitlines(),
+                f"committed/{name}",
+                f"derived/{name}",
+                lineterm="",
+            )
+            found.append("\n".join(list(lines)[:40]))
+    return found

@@ -1,0 +1,217 @@
+"""Every kernel by its derivation: what is lowered, shown, and evaluated by the cross-check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import sympy as sp
+
+from mstmm.errors import ElementError
+from mstmm.ir import KernelIR
+
+from ..classical.catalogue import CLASSICAL, classical_guards
+from ..elements.body_rigid import RigidBody
+from ..equations import body as body_kernels
+from ..equations import force as force_kernels
+from ..equations import frames, laws, link, screw, sweep
+from ..equations.factored import eliminate_factored, recover_factored
+from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
+from ..flexible import beam_fields, beam_second_order, modal, modal_sweep, section
+from ..language.derivation import Derivation, Equation, Quantity, vector
+from ..language.element import Body, Hinge
+from ..lower.kernel import lower
+from .registry import Element, builtin_elements, kind_of
+
+#: (condition, failure code, message) over the derivation's quantities.
+Guards = tuple[tuple[sp.Basic, int, str], ...]
+
+FRAME_DERIVATIONS = (
+    frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
+    frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.carried_momentum,
+    frames.gravity_energy,
+    frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
+    frames.length, frames.turned, frames.classical_body, frames.state_deviation,
+)  # fmt: skip
+
+#: Largest number of speeds of a hinge.
+MAX_SPEEDS = 6
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One kernel before lowering: its name within the element, its equations, its guards."""
+
+    name: str
+    derivation: Derivation
+    guards: Guards = ()
+
+    def ir(self) -> KernelIR:
+        """The kernel lowered."""
+        return lower(self.derivation, self.name, self.guards)
+
+
+def kernels_of(element: Element) -> tuple[Kernel, ...]:
+    """Kernels of any element, built in or the user's, in the order of the generated file."""
+    if isinstance(element, Hinge):
+        return hinge_kernels(element)
+    if isinstance(element, Body):
+        return (
+            Kernel("inertia", body_kernels.inertia(element)),
+            Kernel("bias_load", body_kernels.bias_load(element)),
+            Kernel("energy", body_kernels.kinetic_energy(element)),
+        )
+    wrench = force_kernels.wrench(element)
+    return (Kernel("wrench", wrench, force_kernels.wrench_guards(element)),)
+
+
+def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
+    """`hinge` always; `forward`, `condense`, `recover` specialised to its motion subspace."""
+    motion = motion_of(hinge)
+    inputs = hinge_quantities(hinge)
+    subspace, nu = motion.in_arrays(motion.subspace), motion.nu
+    kernels = [
+        Kernel("hinge", hinge_derivation(motion)),
+        Kernel("forward", sweep.forward(motion, inputs)),
+        Kernel(
+            "condense",
+            sweep.condense(nu, subspace, inputs[:2], hinge.name),
+            sweep.pivot_guards(nu, subspace),
+        ),
+        Kernel("recover", sweep.recover(nu, subspace, inputs[:2], hinge.name)),
+    ]
+    if nu:
+        kernels.append(
+            Kernel("eliminate", eliminate_factored(nu, subspace, inputs[:2], hinge.name))
+        )
+    measure = hinge.singular_when(motion.q, motion.p)
+    if measure is not None:
+        kernels.append(Kernel("singularity", _singularity(motion, measure)))
+    return tuple(kernels)
+
+
+def _singularity(motion: HingeMotion, measure: sp.Expr) -> Derivation:
+    value = Quantity(vector("measure", 1), "", "tends to zero where the coordinates fail")
+    return Derivation(
+        motion.hinge.name,
+        "distance from the singular configuration",
+        hinge_quantities(motion.hinge)[:2],
+        (value,),
+        (Equation("measure", value.symbol, motion.in_arrays(sp.Matrix([measure]))),),
+    )
+
+
+def generic_kernels(nu: int) -> tuple[Kernel, ...]:
+    """The sweep's steps for any hinge with `nu` free speeds."""
+    return (
+        Kernel("forward", sweep.forward_generic(nu)),
+        Kernel("condense", sweep.condense(nu), sweep.pivot_guards(nu)),
+        Kernel("recover", sweep.recover(nu)),
+        Kernel("effort", sweep.effort(nu)),
+        Kernel("project", sweep.project(nu)),
+        *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
+        *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
+    )
+
+
+def frame_kernels() -> tuple[Kernel, ...]:
+    """Poses, points and loads."""
+    return tuple(Kernel(derivation.__name__, derivation()) for derivation in FRAME_DERIVATIONS)
+
+
+def law_kernels() -> tuple[Kernel, ...]:
+    """Laws on hinge coordinates."""
+    return (
+        Kernel("linear", laws.coordinate_law(full=False)),
+        Kernel("full", laws.coordinate_law(full=True)),
+        Kernel("rotation", laws.rotation_law()),
+        Kernel("six", laws.six_direction_law()),
+    )
+
+
+def screw_kernels() -> tuple[Kernel, ...]:
+    """Transport across axial screws."""
+    return tuple(Kernel(name, derivation) for name, derivation in screw.derivations().items())
+
+
+def links() -> dict[str, Hinge]:
+    """Built-in hinges that move about and along z alone, by name."""
+    hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
+    return {hinge.name: hinge for hinge in hinges if hinge.speeds is None and _axial(hinge)}
+
+
+def _axial(hinge: Hinge) -> bool:
+    motion = motion_of(hinge)
+    return motion.nu > 0 and link.along_z(motion) is not None
+
+
+def link_kernels(name: str) -> tuple[Kernel, ...]:
+    """A rigid body behind the hinge `name`, pass by pass."""
+    motion = motion_of(links()[name])
+    subspace = motion.in_arrays(motion.subspace)
+    return (
+        Kernel("angle", link.angle(motion)),
+        Kernel("forward", link.forward(motion, RigidBody())),
+        Kernel(
+            "condense",
+            link.condense(motion, RigidBody()),
+            sweep.pivot_guards(motion.nu, subspace, link.floor(RigidBody())),
+        ),
+        Kernel("recover", link.recover(motion)),
+    )
+
+
+def modal_kernels() -> tuple[Kernel, ...]:
+    """Flexible bodies: residual, sections, condensation; n modes, known at run time."""
+    turning = section.turn_guards()
+    return (
+        Kernel("residual", modal.residual()),
+        Kernel("momentum", modal.momentum()),
+        Kernel("strain_energy", modal.strain_energy()),
+        Kernel("section", section.section()),
+        Kernel("outward", section.outward(), turning),
+        Kernel("inward", section.inward(), turning),
+        Kernel("subspace", section.subspace()),
+        Kernel("imposed", section.imposed()),
+        *(Kernel(step.__name__, step()) for step in modal_sweep.STEPS),
+    )
+
+
+def beam_kernels() -> tuple[Kernel, ...]:
+    """Beams: integrands per length, integrated along the beam when a scene is packed."""
+    derivations = beam_fields.KERNELS | beam_second_order.KERNELS
+    return tuple(Kernel(name, make()) for name, make in derivations.items())
+
+
+def classical_kernel(name: str) -> Kernel:
+    """The classical transfer matrix `name`."""
+    derivation = CLASSICAL[name]()
+    return Kernel("transfer", derivation, classical_guards(derivation))
+
+
+def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
+    """(kind, name) -> its kernels, for everything that is compiled with the package."""
+    table: dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]] = {
+        (kind_of(e), e.name): lambda e=e: kernels_of(e)  # type: ignore[misc]
+        for e in builtin_elements()
+    }
+    table["sweep", "frames"] = frame_kernels
+    table["sweep", "laws"] = law_kernels
+    table["sweep", "screw"] = screw_kernels
+    table["sweep", "modal"] = modal_kernels
+    table["sweep", "beam"] = beam_kernels
+    for name in links():
+        table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]
+    for nu in range(MAX_SPEEDS + 1):
+        table["sweep", f"generic{nu}"] = lambda nu=nu: generic_kernels(nu)  # type: ignore[misc]
+    for name in CLASSICAL:
+        table["classical", name] = lambda name=name: (classical_kernel(name),)  # type: ignore[misc]
+    return table
+
+
+def built_in_kernels(kind: str, name: str) -> tuple[Kernel, ...]:
+    """Kernels of one built-in element.  ElementError if there is none."""
+    make = built_in().get((kind, name))
+    if make is None:
+        raise ElementError(f"there is no built-in {kind} called {name!r}")
+    return make()

@@ -1,0 +1,163 @@
+"""Which elements there are: each class in `derive/elements/`, and those of a file of the user's."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from mstmm.errors import ElementError
+from mstmm.spec import ENTRY_POINTS
+
+from .. import elements
+from ..language.element import Body, ForceElement, Hinge
+
+Element = Hinge | Body | ForceElement
+KINDS: tuple[tuple[str, type], ...] = (("hinge", Hinge), ("body", Body), ("force", ForceElement))
+_BASES = (Hinge, Body, ForceElement)
+
+
+def kind_of(element: Element) -> str:
+    """hinge, body or force."""
+    return next(name for name, base in KINDS if isinstance(element, base))
+
+
+def elements_in(module: ModuleType) -> list[Element]:
+    """One instance of every element class that the module itself defines, in order of the text.
+
+    Raises ElementError for a class that cannot be made without arguments or whose name is no text.
+    """
+    classes = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and issubclass(value, _BASES)
+        and value.__module__ == module.__name__
+        and "name" in vars(value)
+    ]
+    return [instance(value) for value in dict.fromkeys(classes)]
+
+
+def instance(element: type[Element]) -> Element:
+    """An element of its class.  ElementError if the class is none, or cannot be made."""
+    if not (isinstance(element, type) and issubclass(element, _BASES)):
+        raise ElementError(
+            f"{element!r:.80} is no element; expected a subclass of mstmm.derive.Hinge, Body or "
+            "ForceElement"
+        )
+    if not isinstance(getattr(element, "name", None), str):
+        raise ElementError(
+            f'{element.__name__}: name: expected text such as "knee", '
+            f"found {getattr(element, 'name', None)!r:.40}"
+        )
+    try:
+        return element()
+    except Exception as error:
+        raise ElementError(
+            f"{element.__name__}: cannot be made ({type(error).__name__}: {error}); "
+            "a definition takes no arguments"
+        ) from error
+
+
+def builtin_elements() -> list[Element]:
+    """All elements of `derive/elements/`, by file name; the same instances at every call.
+
+    Raises ElementError for a name used twice.
+    """
+    return list(_builtin_elements())
+
+
+@cache
+def _builtin_elements() -> tuple[Element, ...]:
+    found: dict[tuple[str, str], str] = {}
+    result: list[Element] = []
+    for info in sorted(pkgutil.iter_modules(elements.__path__), key=lambda i: i.name):
+        module = importlib.import_module(f"{elements.__name__}.{info.name}")
+        for element in elements_in(module):
+            key = (kind_of(element), element.name)
+            if key in found:
+                raise ElementError(
+                    f"{key[0]} {key[1]!r} is defined in {found[key]} and in {info.name}"
+                )
+            found[key] = info.name
+            result.append(element)
+    return tuple(result)
+
+
+def load_file(path: str | Path) -> list[Element]:
+    """Elements of a Python file (trusted code: it is executed).
+
+    Raises ElementError if the file cannot be run, defines no element, or one twice.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ElementError(f"{path}: no such file")
+    name = f"mstmm_user_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if path.suffix != ".py" or spec is None or spec.loader is None:
+        raise ElementError(f"{path}: expected a Python file, ending in .py")
+    _refuse_null_bytes(path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        said = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise ElementError(f"{path}: running the file failed with {said}") from error
+    try:
+        return _distinct(elements_in(module))
+    except ElementError as error:
+        raise ElementError(f"{path}: {error}") from error
+
+
+def _refuse_null_bytes(path: Path) -> None:
+    """Versions of Python differ in what they raise for them."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ElementError(f"{path}: cannot be read ({error.strerror})") from error
+    if b"\0" in content:
+        raise ElementError(
+            f"{path}: this is no Python text: it holds null bytes; save the file as UTF-8"
+        )
+
+
+def _distinct(found: list[Element]) -> list[Element]:
+    if not found:
+        raise ElementError(
+            "defines no element; subclass mstmm.derive.Hinge, Body or ForceElement "
+            "and give it a name"
+        )
+    keys = [(kind_of(e), e.name) for e in found]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ElementError(f"defines {key[0]} {key[1]!r} twice")
+    return found
+
+
+def published() -> list[tuple[str, list[Element]]]:
+    """(distribution, its elements) of the packages that publish elements by entry points.
+
+    Their modules are imported.  Raises ElementError naming the package that fails.
+    """
+    found: dict[str, list[Element]] = {}
+    for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name):
+        owner = entry.dist.name if entry.dist is not None else entry.value
+        try:
+            value = entry.load()
+            made = elements_in(value) if isinstance(value, ModuleType) else [instance(value)]
+        except Exception as error:
+            said = (
+                f"{type(error).__name__}: {error}" if not isinstance(error, ElementError) else error
+            )
+            raise ElementError(
+                f"package {owner}: entry point {entry.name} = {entry.value}: {said}"
+            ) from error
+        found.setdefault(owner, []).extend(made)
+    return [(owner, _distinct(elements)) for owner, elements in found.items()]

@@ -1,0 +1,102 @@
+"""Element -> ElementSpec: derive and lower every kernel an element offers."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from mstmm.ir import KernelIR
+from mstmm.spec import ElementSpec
+
+from ..classical.catalogue import CLASSICAL, classical_spec
+from ..equations import sweep
+from ..equations.hinge import speeds_of
+from ..language.element import Hinge
+from .kernels import (
+    FRAME_DERIVATIONS,
+    MAX_SPEEDS,
+    Kernel,
+    beam_kernels,
+    frame_kernels,
+    generic_kernels,
+    kernels_of,
+    law_kernels,
+    link_kernels,
+    links,
+    modal_kernels,
+    screw_kernels,
+)
+from .registry import Element, builtin_elements, kind_of
+
+__all__ = [
+    "FRAME_DERIVATIONS",
+    "MAX_SPEEDS",
+    "all_specs",
+    "generic_spec",
+    "shared_specs",
+    "spec_from",
+    "spec_of",
+]
+
+
+def _lowered(kernels: tuple[Kernel, ...]) -> tuple[KernelIR, ...]:
+    return tuple(kernel.ir() for kernel in kernels)
+
+
+def spec_of(element: Element) -> ElementSpec:
+    """Derive and lower the kernels of any element, built in or the user's."""
+    return spec_from(element, kernels_of(element))
+
+
+def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
+    """The element with its kernels, once they are derived."""
+    hinge = element if isinstance(element, Hinge) else None
+    return ElementSpec(
+        kind_of(element),
+        element.name,
+        element.title or element.name,
+        hinge.coordinates if hinge else (),
+        speeds_of(hinge) if hinge else (),
+        element.parameters,
+        _lowered(kernels),
+        element.sources,
+    )
+
+
+def generic_spec(nu: int) -> ElementSpec:
+    """The sweep's steps for any hinge with `nu` free speeds."""
+    return ElementSpec(
+        "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
+        _lowered(generic_kernels(nu)), sweep.SOURCES,
+    )  # fmt: skip
+
+
+def shared_specs() -> list[ElementSpec]:
+    """What is no element of a scene: frames, laws, generic sweep."""
+    plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
+    frames, laws = _lowered(frame_kernels()), _lowered(law_kernels())
+    screws = _lowered(screw_kernels())
+    return [
+        plain(name="frames", title="poses, points and loads", kernels=frames),
+        plain(name="laws", title="laws on hinge coordinates", kernels=laws),
+        plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
+        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels())),
+        plain(name="screw", title="transport across axial screws", kernels=screws),
+        *(
+            plain(
+                name=f"link_{name}",
+                title=f"rigid body behind the {hinge.title}",
+                kernels=_lowered(link_kernels(name)),
+            )
+            for name, hinge in links().items()
+        ),
+        *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
+    ]
+
+
+def all_specs() -> list[ElementSpec]:
+    """Everything that is generated and compiled when the package is built."""
+    return [
+        *(spec_of(e) for e in builtin_elements()),
+        *shared_specs(),
+        *(classical_spec(name) for name in CLASSICAL),
+    ]

@@ -1,0 +1,1 @@
+"""The classical discrete-time matrices of rigid and flexible bodies and hinges."""

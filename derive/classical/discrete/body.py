@@ -1,0 +1,185 @@
+"""Discrete-time transfer matrices of rigid and flexible bodies, planar and spatial.
+
+One residual (`flexible_energy`) and one linear time map yd = C y + D, ydd = A y + B, expanded once
+at a predictor: Z = A M + C dR/dyd + dR/dy.  The frame's rows give the loads at the output end,
+geometry gives its place, and the modal coordinates are the same at both ends: z_O = U z_I.  The
+modal rows are no part of U.  In terms of z_I they are W z_I = 0, which the hinge before the body
+needs.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ...language.derivation import Derivation, Equation, Quantity, tilde, vector
+from ...language.notation import Matrix
+from .energy import Equations, Motion, equations
+from .moments import ETA, BodyMoments, Letters, planar, spatial
+from .premises import planar_premises, spatial_premises
+from .state import BOOK, Space, perp
+from .statement import TURN, A, BodyStatement, C, inputs_of
+from .transfer import transfer
+
+
+def derivation(statement: BodyStatement) -> Derivation:
+    """U (z_O = U z_I) and, with modes, W (W z_I = 0) of the body."""
+    space, modes = statement.space, statement.modes
+    letters = Letters()
+    build = planar if space.planar else spatial
+    extra = () if space.planar else (statement.planes,)
+    body = build(modes, letters, statement.kind, *extra)
+    motion = _motion(space, modes, letters)
+    solved = equations(body.moments, motion, _elastic(body, motion))
+    n = space.length(modes)
+    outputs = [
+        Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I"),
+    ]
+    if modes:
+        outputs.append(Quantity(sp.MatrixSymbol("W", modes, n), "N", "modal rows, W z_I = 0"))
+    return Derivation(
+        element=f"classical_{statement.element}",
+        title=statement.title,
+        inputs=(*body.inputs, *inputs_of(statement)),
+        outputs=tuple(outputs),
+        definitions=(
+            *_kinematics(space, modes),
+            *body.definitions,
+            *_linearised(space, modes, solved, letters),
+            *transfer(statement),
+        ),
+        premises=(planar_premises if space.planar else spatial_premises)(statement, body),
+        sources=(f"{BOOK}, {statement.source}",),
+        notes=(*_NOTES, *statement.notes),
+    )
+
+
+_NOTES = (
+    "State [r; angle; m; q; eta; 1] (mstmm.derive.classical.discrete.state) in inertial axes; the "
+    "frame's origin is the input end, where every shape vanishes.",
+    "A, C (numbers) and B, D (vectors) are the linear time map; r_p, angle and eta_p the "
+    "predictor; q_p and m_p the loads there. Terms of second order in the step from it are "
+    "dropped.",
+    "det U = 1 at every motion; its product with the hinge before it is symplectic only where Z is "
+    "symmetric (at rest).",
+)
+
+
+# --- the residual and its linear form ---------------------------------------------------------
+
+
+def _motion(space: Space, modes: int, letters: Letters) -> Motion:
+    def three(name: str, size: int, before: int) -> sp.Matrix:
+        return sp.Matrix(
+            [*[0] * before, *letters.of(vector(name, size)), *[0] * (3 - before - size)]
+        )
+
+    def modal(name: str) -> sp.Matrix:
+        return letters.of(vector(name, modes)) if modes else sp.zeros(0, 1)
+
+    turning = 3 - space.turns
+    return Motion(
+        three("a", space.shifts, 0), three("w", space.turns, turning),
+        three("wd", space.turns, turning), modal(ETA), modal("etad"), modal("etadd"),
+    )  # fmt: skip
+
+
+def _elastic(body: BodyMoments, motion: Motion) -> sp.Matrix:
+    if body.stiffness is None or body.damping is None:
+        return sp.zeros(0, 1)
+    return body.stiffness * motion.eta + body.damping * motion.etad
+
+
+def _kinematics(space: Space, modes: int) -> tuple[Equation, ...]:
+    """Motion at the predictor, in frame axes."""
+    rotation = sp.MatrixSymbol("R", space.shifts, space.shifts)
+    lead = [Equation("frame axes at the predictor", rotation, _axes(space))]
+    w, wd = vector("w", space.turns), vector("wd", space.turns)
+    if space.planar:
+        theta = vector("theta_p", 1)
+        lead += [
+            Equation("angular velocity", w, C * theta + vector("D_theta", 1)),
+            Equation("angular acceleration", wd, A * theta + vector("B_theta", 1)),
+        ]
+    else:
+        lead += [
+            Equation("angular velocity", w, vector("D_w", 3)),
+            Equation("angular acceleration", wd, vector("B_w", 3)),
+        ]
+    size = space.shifts
+    felt = A * vector("r_p", size) + vector("B_r", size) - vector("g", size)
+    lead.append(
+        Equation("acceleration less gravity, frame axes", vector("a", size), rotation.T * felt)
+    )
+    if modes:
+        eta, etad, etadd = (vector(name, modes) for name in (ETA, "etad", "etadd"))
+        lead += [
+            Equation("modal speeds", etad, C * eta + vector("D_eta", modes)),
+            Equation("modal accelerations", etadd, A * eta + vector("B_eta", modes)),
+        ]
+    return tuple(lead)
+
+
+def _axes(space: Space) -> sp.Basic:
+    if not space.planar:
+        return sp.MatrixSymbol("R_p", 3, 3)
+    theta = vector("theta_p", 1)[0, 0]
+    cosine, sine = sp.cos(theta), sp.sin(theta)
+    return Matrix([[cosine, -sine], [sine, cosine]])
+
+
+def _linearised(
+    space: Space, modes: int, solved: Equations, letters: Letters
+) -> tuple[Equation, ...]:
+    """Residual at the predictor and Z = A M + C dR/dyd + dR/dy, turned to inertial axes."""
+    size = space.rigid + modes
+    mass, rates, shape = (sp.MatrixSymbol(name, size, size) for name in ("M", "N_b", "L_b"))
+    rows, impedance = vector("F_b", size), sp.MatrixSymbol("Z", size, size)
+    turning, axes = sp.eye(size), sp.eye(size)
+    if not space.planar:
+        turning[3:6, 3:6] = TURN.as_explicit()
+    rotation = sp.MatrixSymbol("R", space.shifts, space.shifts).as_explicit()
+    axes[: space.shifts, : space.shifts] = rotation
+    if not space.planar:
+        axes[3:6, 3:6] = rotation
+    x, t = sp.MatrixSymbol("X", size, size), Matrix(turning)
+    dynamic = A * mass + C * rates
+    return (
+        Equation("residual, frame axes", rows, letters.back(solved.rows)),
+        Equation("mass matrix", mass, letters.back(solved.mass), "", "d F_b / d ydd"),
+        Equation("by the speeds", rates, letters.back(solved.rates), "", "d F_b / d yd"),
+        Equation(
+            "by the coordinates", shape, _shape(space, modes, solved, letters),
+            "", "d F_b / d y; the frame's turn moves a and the rows themselves",
+        ),
+        Equation("frame axes of rows and columns", x, Matrix(axes)),
+        Equation(
+            "one Newton step", impedance,
+            x * ((dynamic * t if not space.planar else dynamic) + shape) * x.T,
+            "", "Z = A M + C dR/dyd + dR/dy, inertial axes",
+        ),
+        Equation(
+            "residual at the predictor", vector("F", size), x * rows - _external(space, modes)
+        ),
+    )  # fmt: skip
+
+
+def _shape(space: Space, modes: int, solved: Equations, letters: Letters) -> Matrix:
+    """Columns of r (none), of the frame's turn, and of eta."""
+    size, shifts, turns = space.rigid + modes, space.shifts, space.turns
+    a, mass, rows = vector("a", shifts), sp.MatrixSymbol("M", size, size), vector("F_b", size)
+    by_a = Matrix(size, shifts, lambda i, j: mass[i, j])
+    force = Matrix(shifts, 1, lambda i, _: rows[i, 0])
+    carried = -by_a * perp(a) if space.planar else by_a * tilde(a)
+    turned = sp.zeros(size, turns)
+    if space.planar:
+        turned[:2, :] = perp(force)
+    else:
+        moment = Matrix(3, 1, lambda i, _: rows[3 + i, 0])
+        turned[:3, :], turned[3:6, :] = -tilde(force), -tilde(moment)
+    columns = [sp.zeros(size, shifts), sp.Matrix(carried) + turned, letters.back(solved.shape)]
+    return Matrix(sp.Matrix.hstack(*(c for c in columns if c.cols)))
+
+
+def _external(space: Space, modes: int) -> Matrix:
+    blocks = [("f_r", space.shifts), ("f_m", space.turns), ("f_eta", modes)]
+    return Matrix([vector(name, k)[i, 0] for name, k in blocks if k for i in range(k)])

@@ -1,0 +1,89 @@
+"""State vectors of the discrete-time form: positions, angles, loads, modal coordinates, 1.
+
+Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, (8.63) to (8.65).
+In the plane z = [r; theta; m; q; eta; 1], 7 + n numbers (10 with three modes), in space
+z = [r; psi; m; q; eta; 1], 13 + n.  r is the position of the section, theta the angle of the
+floating frame, psi the rotation vector (inertial axes) from the frame's predicted orientation to
+the wanted one, eta the modal coordinates of the body that the end belongs to (rigid: none).
+m and q are the moment and the force of the inboard on the outboard side, inertial axes.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ...language.derivation import tilde
+from ...language.notation import Matrix
+from ..state import State
+
+BOOK = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8"
+
+
+class Space:
+    """The plane or space: sizes, cross products and the units of a state."""
+
+    def __init__(self, planar: bool) -> None:
+        self.planar = planar
+        self.name = "planar" if planar else "spatial"
+        self.shifts, self.turns = (2, 1) if planar else (3, 3)
+        self.angle = "theta" if planar else "psi"
+
+    @property
+    def rigid(self) -> int:
+        """Rigid degrees of freedom."""
+        return self.shifts + self.turns
+
+    def state(self, modes: int) -> State:
+        """The state vector of an end of a body with so many modes."""
+        own = bool(modes)
+        return State(
+            ("r", self.angle, "m", "q", *("eta",) * own),
+            (self.shifts, self.turns, self.turns, self.shifts, *(modes,) * own),
+            ("m", "rad", "N*m", "N", *("m",) * own, "1"),
+        )
+
+    def length(self, modes: int) -> int:
+        """Numbers in a state."""
+        return 2 * self.rigid + modes + 1
+
+    def moment(self, lever: sp.Basic, force: sp.Basic) -> sp.Basic:
+        """lever x force, for a column `lever` and the rows `force` of a state (or a column)."""
+        return perp(lever).T * force if self.planar else tilde(lever) * force
+
+    def turned(self, column: sp.Basic, angle: sp.Basic) -> sp.Basic:
+        """angle x column, for the rows `angle` of a small rotation."""
+        return perp(column) * angle if self.planar else -tilde(column) * angle
+
+    def change_moment(self, change: sp.Basic, force: sp.Basic) -> sp.Basic:
+        """change x force, for the rows `change` of a small displacement and a column `force`."""
+        return -perp(force).T * change if self.planar else -tilde(force) * change
+
+
+def perp(column: sp.Basic) -> Matrix:
+    """A plane column turned by +90 degrees, entry by entry."""
+    return Matrix([-column[1, 0], column[0, 0]])
+
+
+PLANE, SPACE = Space(True), Space(False)
+
+
+def rows_of(state: State, name: str) -> Matrix:
+    """Rows of the unit matrix that pick the block `name` out of a state ("1": the last number)."""
+    starts = dict(zip(state.names, _starts(state), strict=True)) | {"1": state.length - 1}
+    sizes = dict(zip(state.names, state.sizes, strict=True)) | {"1": 1}
+    first = starts[name]
+    return Matrix(sizes[name], state.length, lambda i, j: int(j == first + i))
+
+
+def _starts(state: State) -> list[int]:
+    return [sum(state.sizes[:k]) for k in range(len(state.sizes))]
+
+
+def part(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
+    """`count` rows of a matrix symbol."""
+    return Matrix(count, int(matrix.cols), lambda i, j: matrix[first + i, j])
+
+
+def constant(column: sp.Basic, state: State) -> sp.MatrixExpr:
+    """`column` in the last column of rows on a state."""
+    return column * rows_of(state, "1")

@@ -1,0 +1,1 @@
+"""Newton-Euler, hinges, laws and the sweep as matrix equations of symbols."""

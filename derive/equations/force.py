@@ -1,0 +1,113 @@
+"""Kernel of a force element between two ends, from its law in relative motion."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..language.element import ForceElement, Symbols, described
+from ..language.switches import slope
+
+#: Failure code of a force element whose direction is undefined (`defined_when`).
+UNDEFINED = 2
+
+
+def _matrix(name: str) -> sp.MatrixSymbol:
+    return sp.MatrixSymbol(name, 3, 3)
+
+
+def _explicit(array: sp.MatrixSymbol) -> sp.Matrix:
+    return sp.Matrix(array.rows, array.cols, lambda i, j: array[i, j])
+
+
+def relative_motion() -> tuple[tuple[Equation, ...], tuple[sp.MatrixSymbol, ...]]:
+    """Position, rate, rotation and angular velocity of T against F, in F axes."""
+    a_f, a_t = _matrix("A_F"), _matrix("A_T")
+    x_f, x_t, v_f, v_t, w_f, w_t = (
+        vector(n, 3) for n in ("x_F", "x_T", "v_F", "v_T", "w_F", "w_T")
+    )
+    x, v, w, spin = (vector(n, 3) for n in ("x_rel", "v_rel", "w_rel", "w_own"))
+    rotation = _matrix("R_rel")
+    equations = (
+        Equation("relative position, F axes", x, a_f.T * (x_t - x_f)),
+        Equation("angular velocity of F, F axes", spin, a_f.T * w_f),
+        Equation(
+            "relative rate, F axes",
+            v,
+            a_f.T * (v_t - v_f) - tilde(_explicit(spin)) * x,
+        ),
+        Equation("relative rotation", rotation, a_f.T * a_t),
+        Equation("relative angular velocity, F axes", w, a_f.T * (w_t - w_f)),
+    )
+    return equations, (x, v, rotation, w)
+
+
+def wrench(element: ForceElement) -> Derivation:
+    """(p, t, effort, motion of both ends) -> force and moment on T, energy and power."""
+    p = Symbols("p", tuple(x.name for x in element.parameters))
+    parameters = vector("p", len(p))
+    effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)
+    equations, arrays = relative_motion()
+    x, v, rotation, w = (_explicit(a) for a in arrays)
+    names = sp.Matrix(sp.symbols("X_1 X_2 X_3", real=True))
+    energy = sp.sympify(element.potential(names, p))
+    gradient = [slope(energy, n).xreplace(dict(zip(names, x, strict=True))) for n in names]
+    force, moment = element.wrench(x, v, rotation, w, p, effort, t)
+    force, moment = sp.Matrix(force), sp.Matrix(moment)
+    lost = force.dot(v) + moment.dot(w) + sum(g * r for g, r in zip(gradient, v, strict=True))
+    replace = {s: parameters[i, 0] for i, s in enumerate(p)}
+    replace |= {effort: vector("effort", 1)[0, 0], t: vector("t", 1)[0, 0]}
+    replace |= dict(zip(names, x, strict=True))
+
+    def final(value: sp.Matrix) -> sp.ImmutableDenseMatrix:
+        return sp.ImmutableDenseMatrix(value.xreplace(replace))
+
+    a_f, local = _matrix("A_F"), vector("f_local", 3)
+    turning = vector("m_local", 3)
+    outputs = (
+        Quantity(vector("F", 3), "N", "force on T at its point, inertial axes"),
+        Quantity(vector("M", 3), "N*m", "moment on T, inertial axes"),
+        Quantity(vector("V", 1), "J", "stored energy"),
+        Quantity(vector("P", 1), "W", "power of what is not stored"),
+    )
+    return Derivation(
+        element.name,
+        f"load of the {element.title}",
+        (
+            Quantity(parameters, "", described("parameters", element.parameters)),
+            Quantity(vector("t", 1), "s", "time"),
+            Quantity(vector("effort", 1), "", "given effort"),
+            *(
+                Quantity(_matrix(f"A_{end}") if k == "A" else vector(f"{k}_{end}", 3), "", meaning)
+                for end in ("F", "T")
+                for k, meaning in (
+                    ("A", "rotation, end axes to inertial axes"),
+                    ("x", "position"),
+                    ("v", "velocity, inertial axes"),
+                    ("w", "angular velocity, inertial axes"),
+                )
+            ),
+        ),
+        outputs,
+        (
+            *equations,
+            Equation("force, F axes", local, final(force)),
+            Equation("moment, F axes", turning, final(moment)),
+            Equation("force", outputs[0].symbol, a_f * local),
+            Equation("moment", outputs[1].symbol, a_f * turning),
+            Equation("stored energy", outputs[2].symbol, final(sp.Matrix([energy]))),
+            Equation("power", outputs[3].symbol, final(sp.Matrix([lost]))),
+        ),
+        sources=element.sources,
+    )
+
+
+def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...]:
+    """The element's own condition, over the arrays of the kernel."""
+    p = Symbols("p", tuple(x.name for x in element.parameters))
+    _, arrays = relative_motion()
+    condition = element.defined_when(_explicit(arrays[0]), p)
+    if condition is None:
+        return ()
+    replace = {s: vector("p", len(p))[i, 0] for i, s in enumerate(p)}
+    return ((condition.xreplace(replace), UNDEFINED, "the direction of the force is undefined"),)

@@ -1,0 +1,176 @@
+"""Motion of any hinge from its rotation and position alone: subspace, bias, and their checks.
+
+With R(q) (P axes to Q axes), d(q) (P from Q, Q axes) and qdot = N(q) u:
+
+    w = axial(R^T dR/dt),  v = R^T dd/dt                  relative velocity in P axes
+    [v; w] = H u,          c = d/dt[v; w] + [w x v; 0]     at udot = 0
+
+so that a_P = X a_Q + H udot + (terms of the carrier's rotation) + c.  Rui, Wang and Zhang state
+these relations hinge by hinge (ch. 5, sections 5.6 to 5.8); here they are one derivation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy as sp
+
+from mstmm.errors import ElementError
+
+from ..language import returned as stated
+from ..language.derivation import Derivation, Equation, Quantity, axial, vector
+from ..language.element import Hinge, Param, Symbols, described
+from ..language.switches import slope
+
+#: Trigonometric entries with more operations than this are left as differentiation gave them.
+SIMPLIFY_LIMIT = 400
+
+
+@dataclass(frozen=True)
+class HingeMotion:
+    """Relative motion of a hinge as SymPy matrices in the symbols q, u, p."""
+
+    hinge: Hinge
+    q: Symbols
+    u: Symbols
+    p: Symbols
+    rotation: sp.Matrix
+    position: sp.Matrix
+    subspace: sp.Matrix
+    velocity: sp.Matrix
+    spin: sp.Matrix
+    bias: sp.Matrix
+    rates: sp.Matrix
+
+    @property
+    def nu(self) -> int:
+        return len(self.u)
+
+    def in_arrays(self, matrix: sp.Matrix) -> sp.ImmutableDenseMatrix:
+        """The same matrix over the entries of the arrays q, u, p."""
+        replace: dict[sp.Basic, sp.Basic] = {}
+        for name, symbols in (("q", self.q), ("u", self.u), ("p", self.p)):
+            if len(symbols):
+                array = vector(name, len(symbols))
+                replace.update({s: array[i, 0] for i, s in enumerate(symbols)})
+        return sp.ImmutableDenseMatrix(sp.Matrix(matrix).xreplace(replace))
+
+
+def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
+    """Declared speeds, or the rates of the coordinates with their units."""
+    if hinge.speeds is not None:
+        return hinge.speeds
+    return tuple(
+        Param(f"{c.name}_rate", f"{c.unit or '1'}/s", f"rate of {c.name}")
+        for c in hinge.coordinates
+    )
+
+
+@lru_cache(maxsize=32)
+def motion_of(hinge: Hinge) -> HingeMotion:
+    """Derive H and c, once for each definition.
+
+    Raises ElementError naming the equation that a definition contradicts.
+    """
+    speeds = speeds_of(hinge)
+    q = Symbols("q", tuple(c.name for c in hinge.coordinates))
+    u = Symbols("u", tuple(s.name for s in speeds))
+    p = Symbols("p", tuple(x.name for x in hinge.parameters))
+    where = f"hinge {hinge.name}"
+    rotation = stated.matrix(where, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
+    position = stated.matrix(where, "position(q, p)", hinge.position, (3, 1), q, p)
+    rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, p)
+    if rates is None and len(q) != len(u):
+        raise ElementError(
+            f"{where}: {len(q)} coordinates but {len(u)} speeds; "
+            "state qdot = N(q) u in rates(q, u, p)"
+        )
+    given = sp.Matrix(list(u)) if rates is None else rates
+    rates = stated.matrix(where, "rates(q, u, p)", lambda: given, (len(q), 1))
+    subspace = _simplify(_subspace(rotation, position, rates, q, u))
+    velocities = subspace * sp.Matrix(list(u)) if len(u) else sp.zeros(6, 1)
+    v, w = velocities[:3, :], velocities[3:, :]
+    bias = _simplify(_bias(v, w, rates, q))
+    return HingeMotion(hinge, q, u, p, rotation, position, subspace, v, w, bias, rates)
+
+
+def _subspace(
+    rotation: sp.Matrix, position: sp.Matrix, rates: sp.Matrix, q: Symbols, u: Symbols
+) -> sp.Matrix:
+    columns = []
+    for speed in u:
+        along = rates.diff(speed)  # coordinate rates when this speed alone is one
+        d_rotation, d_position = sp.zeros(3, 3), sp.zeros(3, 1)
+        for coordinate, rate in zip(q, along, strict=True):
+            d_rotation += slope(rotation, coordinate) * rate
+            d_position += slope(position, coordinate) * rate
+        v = rotation.T * d_position
+        columns.append(sp.Matrix.vstack(v, sp.Matrix(axial(rotation.T * d_rotation))))
+    return sp.Matrix.hstack(*columns) if columns else sp.zeros(6, 0)
+
+
+def _bias(v: sp.Matrix, w: sp.Matrix, rates: sp.Matrix, q: Symbols) -> sp.Matrix:
+    v_rate, w_rate = sp.zeros(3, 1), sp.zeros(3, 1)
+    for coordinate, rate in zip(q, rates, strict=True):
+        v_rate += slope(v, coordinate) * rate
+        w_rate += slope(w, coordinate) * rate
+    return sp.Matrix.vstack(v_rate + w.cross(v), w_rate)
+
+
+def _simplify(matrix: sp.Matrix) -> sp.Matrix:
+    return matrix.applyfunc(simplify_entry)
+
+
+def simplify_entry(entry: sp.Expr) -> sp.Expr:
+    """Shortest of a few cheap forms; rational entries are cancelled, angles collected."""
+    if entry.is_number:
+        return entry
+    if entry.is_rational_function():
+        candidates = [entry, sp.factor_terms(sp.cancel(sp.together(entry)))]
+    elif entry.count_ops() > SIMPLIFY_LIMIT:
+        return entry
+    elif any(not power.exp.is_integer for power in entry.atoms(sp.Pow)):
+        candidates = [entry, sp.factor_terms(entry)]  # under roots angles are collected too slowly
+    else:
+        candidates = [entry, sp.trigsimp(sp.expand(entry)), sp.factor_terms(entry)]
+    return min(candidates, key=lambda e: (e.count_ops(), str(e)))
+
+
+def hinge_quantities(hinge: Hinge) -> tuple[Quantity, ...]:
+    """Inputs p, q, u of every hinge kernel (arrays of length zero are left out)."""
+    groups = (
+        ("p", "parameters", hinge.parameters),
+        ("q", "coordinates", hinge.coordinates),
+        ("u", "speeds", speeds_of(hinge)),
+    )
+    return tuple(
+        Quantity(sp.MatrixSymbol(name, len(declared), 1), "", described(what, declared))
+        for name, what, declared in groups
+    )
+
+
+def hinge_derivation(motion: HingeMotion) -> Derivation:
+    """The function every hinge offers: (p, q, u) -> R, d, H, v, w, c, qdot."""
+    rows = (
+        ("R", motion.rotation, "", "rotation, P axes to Q axes"),
+        ("d", motion.position, "m", "position of P from Q, Q axes"),
+        ("H", motion.subspace, "", "motion subspace, rows v then w, P axes"),
+        ("v", motion.velocity, "m/s", "relative velocity of P, P axes"),
+        ("w", motion.spin, "rad/s", "relative angular velocity, P axes"),
+        ("c", motion.bias, "m/s2, rad/s2", "relative acceleration at udot = 0, P axes"),
+        ("qdot", motion.rates, "", "coordinate rates"),
+    )
+    definitions, outputs = [], []
+    for name, value, unit, meaning in rows:
+        symbol = sp.MatrixSymbol(name, value.rows, value.cols)
+        outputs.append(Quantity(symbol, unit, meaning))
+        definitions.append(Equation(meaning, symbol, motion.in_arrays(value)))
+    return Derivation(
+        motion.hinge.name,
+        f"relative motion of the {motion.hinge.title or motion.hinge.name}",
+        hinge_quantities(motion.hinge),
+        tuple(outputs),
+        tuple(definitions),
+        sources=motion.hinge.sources,
+    )

@@ -1,0 +1,1 @@
+"""What makes a straight line of code fast: order, balance, registers, angles together."""

@@ -1,0 +1,1 @@
+"""What a definition and a derivation are written in: elements, notation, functions."""

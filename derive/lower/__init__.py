@@ -1,0 +1,1 @@
+"""Matrix equations become KernelIR."""

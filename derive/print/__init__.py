@@ -1,0 +1,1 @@
+"""KernelIR becomes C text.  No SymPy: somebody waits."""

@@ -1,0 +1,229 @@
+"""Statements of a KernelIR as C text: names, literals, expressions.  No templates here.
+
+Everything is spelled so that the C computes what `derive.audit.evaluate` computes with plain
+floats, operation by operation, and so that a NaN is never hidden by min, max, sign or a guard.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from mstmm.abi import parameter_names, work_name
+from mstmm.ir import (
+    Assign,
+    Constant,
+    Element,
+    Guard,
+    Inner,
+    KernelIR,
+    Operand,
+    Port,
+    Solve,
+    Store,
+    Sum,
+    Temporary,
+)
+
+#: How C writes each operation; {0}, {1}, {2} are operands (names or literals, never expressions)
+#: and {t0}, {t1} ask whether an operand is true, that is neither zero nor NaN.
+C_OPERATIONS: dict[str, str] = {
+    "neg": "-{0}",
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "pow": "pow({0}, {1})",
+    "sqrt": "sqrt({0})",
+    "sin": "sin({0})",
+    "cos": "cos({0})",
+    "tan": "tan({0})",
+    "asin": "asin({0})",
+    "acos": "acos({0})",
+    "atan": "atan({0})",
+    "atan2": "atan2({0}, {1})",
+    "sinh": "sinh({0})",
+    "cosh": "cosh({0})",
+    "tanh": "tanh({0})",
+    "exp": "exp({0})",
+    "log": "log({0})",
+    "abs": "fabs({0})",
+    "sign": "{0} > 0 ? 1 : ({0} < 0 ? -1 : {0})",
+    "floor": "floor({0})",
+    "min": "({0} < {1} || isnan({0})) ? {0} : {1}",
+    "max": "({0} < {1} || isnan({1})) ? {1} : {0}",
+    "lt": "{0} < {1}",
+    "le": "{0} <= {1}",
+    "eq": "{0} == {1}",
+    "and": "{t0} && {t1}",
+    "or": "{t0} || {t1}",
+    "not": "{0} == 0",
+    "select": "{t0} ? {1} : {2}",
+}
+
+#: Operations whose value is 0 or 1.
+TRUTH_VALUED = frozenset({"lt", "le", "eq", "and", "or", "not"})
+
+
+def literal(text: str) -> str:
+    """C text of a constant ("3", "-1/3", "pi"): exact where a double is, else correctly rounded.
+
+    A quotient of two whole numbers that a double holds is left to the C compiler to divide.
+    """
+    if text == "pi":
+        return "MSTMM_PI"
+    value = Fraction(text)
+    rounded = Constant(text).number
+    top, bottom = abs(value.numerator), value.denominator
+    if Fraction(rounded) == value or max(top, bottom) > 2**53:
+        written = repr(abs(rounded))
+    else:
+        written = f"((real){top} / (real){bottom})"
+    return f"(-{written})" if value < 0 else written
+
+
+def string(text: str) -> str:
+    """C string literal; every byte that is not plain ASCII is escaped."""
+    plain = "".join(
+        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}"
+        for byte in text.encode()
+    )
+    return f'"{plain}"'
+
+
+def comment(text: str) -> str:
+    """Text that can stand inside a C comment on one line."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").rstrip("\\ ")
+
+
+class KernelText:
+    """C text of one kernel's statements, in the form the templates lay out."""
+
+    def __init__(self, kernel: KernelIR) -> None:
+        self.kernel = kernel
+        self.names = parameter_names(kernel)
+        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
+        self._truths: set[int] = set()
+
+    def statements(self) -> list[dict[str, Any]]:
+        """One dictionary a statement; its `kind` is assign, sum, store, guard or solve."""
+        return [self._statement(statement) for statement in self.kernel.statements]
+
+    def used_names(self) -> set[str]:
+        """C names of the input arrays that the statements read."""
+        used: set[str] = set()
+        for statement in self.kernel.statements:
+            operands = list(_operands(statement))
+            used |= {self.names[o.port] for o in operands if isinstance(o, Element)}
+            if isinstance(statement, Solve):
+                used |= {self.names[statement.matrix], self.names[statement.right]}
+        return used
+
+    def _statement(self, statement: object) -> dict[str, Any]:
+        if isinstance(statement, (Assign, Sum)):
+            return self._inner(statement)
+        if isinstance(statement, Store):
+            port = self.ports[statement.port]
+            return {
+                "kind": "store",
+                "loops": statement.loops,
+                "body": [self._inner(a) for a in statement.body],
+                "target": self._entry(port, statement.index),
+                "sign": "+=" if port.accumulate else "=",
+                "value": self.operand(statement.value),
+            }
+        if isinstance(statement, Guard):
+            condition = self._truth(statement.condition)
+            message = comment(statement.message)
+            return {
+                "kind": "guard", "condition": condition, "code": statement.code,
+                "message": message,
+            }  # fmt: skip
+        assert isinstance(statement, Solve)
+        return self._solve(statement)
+
+    def _inner(self, statement: Inner) -> dict[str, Any]:
+        if isinstance(statement, Assign):
+            return self._assign(statement)
+        return {
+            "kind": "sum",
+            "number": statement.number,
+            "over": statement.over,
+            "body": [self._inner(inner) for inner in statement.body],
+            "value": self.operand(statement.value),
+        }
+
+    def _assign(self, assign: Assign) -> dict[str, Any]:
+        if assign.op in TRUTH_VALUED:
+            self._truths.add(assign.number)
+        else:
+            self._truths.discard(assign.number)
+        words = [self.operand(a) for a in assign.args]
+        truths = {f"t{place}": self._truth(a) for place, a in enumerate(assign.args)}
+        expression = C_OPERATIONS[assign.op].format(*words, **truths)
+        return {"kind": "assign", "number": assign.number, "expression": expression}
+
+    def _solve(self, solve: Solve) -> dict[str, Any]:
+        columns = self.ports[solve.right].shape[1:]
+        width = columns[0] if columns else 1
+        return {
+            "kind": "solve",
+            "columns": "n" if isinstance(width, str) else width,
+            "matrix": self.names[solve.matrix],
+            "right": self.names[solve.right],
+            "output": self.names[solve.port],
+            "work": work_name(self.kernel),
+            "relative_pivot": repr(solve.relative_pivot),
+            "code": solve.code,
+            "message": comment(solve.message),
+        }
+
+    def operand(self, operand: Operand) -> str:
+        """C text of an operand: a literal, an entry of an array or a temporary."""
+        if isinstance(operand, Constant):
+            return literal(operand.text)
+        if isinstance(operand, Temporary):
+            return f"t{operand.number}"
+        return self._entry(self.ports[operand.port], operand.index)
+
+    def _truth(self, operand: Operand) -> str:
+        word = self.operand(operand)
+        if isinstance(operand, Temporary) and operand.number in self._truths:
+            return f"{word} != 0"
+        return f"fabs({word}) > 0"
+
+    def _entry(self, port: Port, index: tuple[int | str, ...]) -> str:
+        return f"{self.names[port.name]}[{_place(port, index)}]"
+
+
+def _place(port: Port, index: tuple[int | str, ...]) -> str:
+    """Row-major place of an entry as C text; `n` and `k` where the shape or the index has them."""
+    terms: list[str] = []
+    fixed = 0
+    for axis, entry in enumerate(index):
+        later = port.shape[axis + 1 :]
+        stride = 1
+        factors = ["n" for extent in later if isinstance(extent, str)]
+        for extent in later:
+            stride *= extent if isinstance(extent, int) else 1
+        if isinstance(entry, int) and not factors:
+            fixed += entry * stride
+            continue
+        whole = stride if isinstance(entry, str) else stride * entry
+        if whole:
+            words = ([str(whole)] if whole != 1 else []) + factors
+            terms.append(" * ".join(words + ([entry] if isinstance(entry, str) else [])) or "1")
+    if fixed or not terms:
+        terms.append(str(fixed))
+    return " + ".join(terms)
+
+
+def _operands(statement: object) -> list[Operand]:
+    if isinstance(statement, Assign):
+        return list(statement.args)
+    if isinstance(statement, (Sum, Store)):
+        inner = [operand for line in statement.body for operand in _operands(line)]
+        return [*inner, statement.value]
+    if isinstance(statement, Guard):
+        return [statement.condition]
+    return []

@@ -1,0 +1,263 @@
+"""ElementSpec -> C text: hands names, numbers and spelled expressions to the templates.
+
+The templates lay text out; they know no arithmetic and no physics.  The bytes depend on the
+specs alone: no time, path, version or order of a set.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+import mstmm.templates
+from mstmm import abi, fused_abi
+from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
+from mstmm.spec import ElementSpec, Param
+from mstmm.stored import element_to_json
+from mstmm.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
+
+from .kernel import C_OPERATIONS, KernelText, comment, string
+
+#: Run-time sizes for which the compiler unrolls the loops of a kernel.
+_OWN_SIZES = (1, 2, 3, 4)
+
+
+def element_source(spec: ElementSpec) -> str:
+    """C file of one element: a function and a trampoline per kernel, and the descriptor."""
+    return _render("element.c.jinja", element=_element_view(spec))
+
+
+def header() -> str:
+    """`mstmm.h`: scalar type, ABI number and descriptors."""
+    return _render("mstmm.h.jinja")
+
+
+def registry_source(specs: Sequence[ElementSpec]) -> str:
+    """`registry.c`: the table of the elements' descriptors, in the order given."""
+    return _render("registry.c.jinja", elements=_summaries(specs))
+
+
+def elements_header(specs: Sequence[ElementSpec]) -> str:
+    """`elements.h`: descriptors and kernel functions, for C that calls kernels by name."""
+    return _render("elements.h.jinja", elements=_summaries(specs))
+
+
+def engine_sources(specs: Sequence[ElementSpec] = ()) -> dict[str, str]:
+    """File name -> text of the kernel-free C: every template called engine*.jinja."""
+    folder = Path(mstmm.templates.__path__[0])
+    names = sorted(path.name for path in folder.glob("engine*.jinja"))
+    return {
+        name.removesuffix(".jinja"): _render(name, elements=_summaries(specs)) for name in names
+    }
+
+
+def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
+    """`manifest.json`: ABI number, SHA-256 of all C text, names and hashes of elements and kernels.
+
+    A module that was compiled from other text is told by it (`runtime/kernels/prebuilt.py`).
+    """
+    text = hashlib.sha256()
+    for name in sorted(name for name in files if name.endswith((".c", ".h"))):
+        text.update(f"{name}\n{files[name]}".encode())
+    elements = [
+        {
+            "kind": spec.kind,
+            "name": spec.name,
+            "hash": spec.hash(),
+            "kernels": {kernel.name: kernel.hash() for kernel in spec.kernels},
+        }
+        for spec in specs
+    ]
+    found = {"abi": abi.ABI, "sources": text.hexdigest(), "elements": elements}
+    return json.dumps(found, indent=1) + "\n"
+
+
+def generated_files(specs: Iterable[ElementSpec], *, engine: bool = True) -> dict[str, str]:
+    """File name -> text of everything generated, elements sorted by kind and name.
+
+    `engine=False` leaves out the kernel-free C (for a user's element compiled on its own).
+    ValueError if two elements share kind and name.
+    """
+    ordered = sorted(specs, key=lambda spec: (spec.kind, spec.name))
+    files = {"mstmm.h": header(), "elements.h": elements_header(ordered)}
+    for spec in ordered:
+        stem = f"{spec.kind}_{spec.name}"
+        if f"{stem}.c" in files:
+            raise ValueError(f"two elements are called {spec.kind} {spec.name!r}")
+        files[f"{stem}.c"] = element_source(spec)
+        files[f"{stem}.json"] = element_to_json(spec)
+    files["registry.c"] = registry_source(ordered)
+    files |= engine_sources(ordered) if engine else {}
+    files["manifest.json"] = manifest(ordered, files)
+    return files
+
+
+def write_generated(
+    specs: Iterable[ElementSpec], folder: Path | str, *, engine: bool = True
+) -> list[Path]:
+    """Write `generated_files` into `folder` (made if missing); returns the paths, sorted."""
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, text in generated_files(specs, engine=engine).items():
+        path = target / name
+        path.write_text(text, encoding="utf-8", newline="\n")
+        paths.append(path)
+    return sorted(paths)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(mstmm.templates.__path__[0]),
+        undefined=jinja2.StrictUndefined,
+        autoescape=False,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        newline_sequence="\n",
+    )
+    environment.filters["c_string"] = string
+    environment.filters["c_comment"] = comment
+    return environment
+
+
+def _render(name: str, **values: Any) -> str:
+    return (
+        _environment()
+        .get_template(name)
+        .render(abi=abi, fused_abi=fused_abi, tape=_tape_view(), **values)
+    )
+
+
+def _tape_view() -> dict[str, Any]:
+    """The tape's instruction set; operands are the interpreter's locals a, b, c."""
+    truths = {"t0": "fabs(a) > 0", "t1": "fabs(b) > 0"}
+    return {
+        "guard": GUARD_OPCODE,
+        "width": INSTRUCTION_WIDTH,
+        "output_width": OUTPUT_WIDTH,
+        "operations": [
+            {
+                "name": name,
+                "code": OPCODES[name],
+                "expression": C_OPERATIONS[name].format("a", "b", "c", **truths),
+            }
+            for name in OPERATIONS
+        ],
+    }
+
+
+def _summaries(specs: Sequence[ElementSpec]) -> list[dict[str, Any]]:
+    return [
+        {
+            "symbol": abi.element_symbol(spec.kind, spec.name),
+            "prototypes": [abi.prototype(spec.kind, spec.name, k) for k in spec.kernels],
+        }
+        for spec in specs
+    ]
+
+
+def _element_view(spec: ElementSpec) -> dict[str, Any]:
+    symbol = abi.element_symbol(spec.kind, spec.name)
+    return {
+        "symbol": symbol,
+        "kind": spec.kind,
+        "name": spec.name,
+        "title": spec.title,
+        "sources": list(spec.sources),
+        "hash": spec.hash(),
+        "solves": any(abi.needs_work(kernel) for kernel in spec.kernels),
+        "tables": [
+            *_name_tables("q", spec.coordinates),
+            *_name_tables("u", spec.speeds),
+            *_name_tables("p", spec.parameters),
+        ],
+        "nq": len(spec.coordinates),
+        "nu": len(spec.speeds),
+        "np": len(spec.parameters),
+        "kernels": [_kernel_view(spec, kernel) for kernel in spec.kernels],
+    }
+
+
+def _name_tables(letter: str, group: Sequence[Param]) -> list[dict[str, Any]]:
+    return [
+        {"name": f"{letter}_names", "entries": [string(p.name) for p in group]},
+        {"name": f"{letter}_units", "entries": [string(p.unit) for p in group]},
+    ]
+
+
+def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
+    text = KernelText(kernel)
+    outputs = abi.c_outputs(kernel)
+    used = text.used_names()
+    arguments = ["n"] if kernel.size_symbol else []
+    arguments += [f"in[{place}]" for place in range(len(kernel.inputs))]
+    arguments += [f"out[{place}]" for place in range(len(outputs))]
+    statements = text.statements()
+    written = {text.names[s.port] for s in kernel.statements if hasattr(s, "port")}
+    names = [text.names[port.name] for port in (*kernel.inputs, *kernel.outputs)]
+    unused = [name for name in names if name not in used | written]
+    looped = any(s["kind"] in ("sum", "solve") or s.get("loops") for s in statements)
+    sized = any("n *" in str(s) for s in statements)
+    return {
+        "name": kernel.name,
+        "function": abi.kernel_symbol(spec.kind, spec.name, kernel.name),
+        "prototype": abi.prototype(spec.kind, spec.name, kernel),
+        "sized": _sized_view(spec, kernel) if kernel.size_symbol else None,
+        "purpose": kernel.purpose,
+        "sources": list(kernel.sources),
+        "inputs": [_port_view(port) for port in kernel.inputs],
+        "outputs": [_port_view(port) for port in outputs],
+        "arguments": arguments,
+        "unused": (["n"] if kernel.size_symbol and not (looped or sized) else []) + unused,
+        "trampoline_unused": ([] if kernel.size_symbol else ["n"])
+        + ([] if kernel.inputs else ["in"])
+        + ([] if outputs else ["out"]),
+        "statements": statements,
+        "guards": [
+            {"code": s.code, "message": string(s.message)}
+            for s in kernel.statements
+            if isinstance(s, (Guard, Solve))
+        ],
+        "hash": kernel.hash(),
+    }
+
+
+def _sized_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
+    """The function that is compiled for some sizes of their own, and its arguments but the size."""
+    names = abi.parameter_names(kernel)
+    return {
+        "prototype": abi.prototype(spec.kind, spec.name, kernel, "_sized"),
+        "sizes": _OWN_SIZES,
+        "arguments": [names[port.name] for port in kernel.inputs]
+        + [names.get(port.name, port.name) for port in abi.c_outputs(kernel)],
+    }
+
+
+def _port_view(port: Port) -> dict[str, Any]:
+    length = 1
+    for extent in port.shape:
+        length *= extent if isinstance(extent, int) else 1
+    return {
+        "name": string(port.name),
+        "length": length,
+        "power": sum(isinstance(extent, str) for extent in port.shape),
+        "unit": string(port.unit),
+        "accumulate": int(port.accumulate),
+        "remark": _remark(port),
+    }
+
+
+def _remark(port: Port) -> str:
+    """One line of a function's comment: name, shape, unit, meaning."""
+    shape = "".join(f"[{extent}]" for extent in port.shape)
+    parts = [f"{port.name}{shape}", f"({port.unit})" if port.unit else "", port.meaning]
+    line = " ".join(part for part in parts if part)
+    return comment(line + (", added to what is there" if port.accumulate else ""))

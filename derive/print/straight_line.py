@@ -1,0 +1,142 @@
+"""Straight-line KernelIR as C statements, for one number or for several lanes at a time.
+
+A kernel without run-time size becomes one `const` per value, in an order in which every value
+stands behind its operands.  The same lines are printed in several dialects: plain numbers of any
+real type, and GNU C vectors, whose operations are spelled as functions of the support text
+(templates/fused_*.jinja).  Ports get an underscore behind their names, so that they meet no other
+name of the text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
+
+from ..fuse.passes.line import operands
+from .kernel import TRUTH_VALUED, literal
+
+_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+_COMPARISONS = {"lt": "<", "le": "<=", "eq": "=="}
+_LOGIC = {"and": "&", "or": "|"}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How C spells values: their types in registers and in arrays, truths, prefix of functions."""
+
+    real: str
+    array: str
+    truth: str
+    prefix: str
+    vector: bool = False
+
+
+#: One number at a time, of the type `real` of the text around it.
+NUMBERS = Dialect("real", "real", "int", "real_")
+#: `lanes` numbers side by side.
+LANES = Dialect("lanes_t", "lanes_array_t", "mask_t", "lanes_", vector=True)
+
+
+def port_name(name: str) -> str:
+    """C name of a port's array."""
+    return f"{name}_"
+
+
+def signature(kernel: KernelIR, dialect: Dialect) -> list[str]:
+    """C parameters of a kernel's function: inputs, then outputs, in the order of the ports."""
+    inputs = [f"const {dialect.array} *restrict {port_name(p.name)}" for p in kernel.inputs]
+    return inputs + [f"{dialect.array} *restrict {port_name(p.name)}" for p in kernel.outputs]
+
+
+class StraightText:
+    """C text of the statements of one straight-line kernel."""
+
+    def __init__(self, kernel: KernelIR, dialect: Dialect) -> None:
+        if kernel.size_symbol is not None:
+            raise ValueError(f"{kernel.name}: a kernel of run-time size is no straight line")
+        self.kernel, self.dialect = kernel, dialect
+        self.ports: dict[str, Port] = {p.name: p for p in (*kernel.inputs, *kernel.outputs)}
+        self._truths = {
+            s.number for s in kernel.statements if isinstance(s, Assign) and s.op in TRUTH_VALUED
+        }
+        self._numbers = _used_as_numbers(kernel.statements) & self._truths
+
+    def assign(self, statement: Assign) -> list[str]:
+        """`const real t12 = ...;`; a truth value is `m12`, and `t12` where somebody counts it."""
+        number, op, args = statement.number, statement.op, statement.args
+        if op not in TRUTH_VALUED:
+            return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
+        lines = [f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"]
+        if number in self._numbers:
+            lines.append(
+                f"const {self.dialect.real} t{number} = {self.dialect.prefix}number(m{number});"
+            )
+        return lines
+
+    def store(self, statement: Store) -> str:
+        """`qdot_[3] = t12;`, or += where the port accumulates."""
+        port = self.ports[statement.port]
+        sign = "+=" if port.accumulate else "="
+        place = port.offset(statement.index)
+        return f"{port_name(port.name)}[{place}] {sign} {self.whole(statement.value)};"
+
+    def truth(self, operand: Operand) -> str:
+        """Whether an operand is true, that is neither zero nor NaN."""
+        if isinstance(operand, Temporary) and operand.number in self._truths:
+            return f"m{operand.number}"
+        return f"{self.dialect.prefix}true({self.whole(operand)})"
+
+    def word(self, operand: Operand) -> str:
+        """An operand beside an arithmetic sign: a literal, an entry of a port or a temporary."""
+        if isinstance(operand, Constant):
+            return literal(operand.text)
+        if isinstance(operand, Temporary):
+            return f"t{operand.number}"
+        return f"{port_name(operand.port)}[{self.ports[operand.port].offset(operand.index)}]"
+
+    def whole(self, operand: Operand) -> str:
+        """An operand of the dialect's own type: a literal fills every lane."""
+        word = self.word(operand)
+        return f"lanes_all({word})" if self._bare(operand) else word
+
+    def _bare(self, operand: Operand) -> bool:
+        return self.dialect.vector and isinstance(operand, Constant)
+
+    def _value(self, op: str, args: Sequence[Operand]) -> str:
+        if op in _INFIX:
+            left = self.whole(args[0]) if self._bare(args[1]) else self.word(args[0])
+            return f"{left} {_INFIX[op]} {self.word(args[1])}"
+        if op == "neg":
+            return f"-{self.whole(args[0])}"
+        if op == "select":
+            words = [self.truth(args[0]), self.whole(args[1]), self.whole(args[2])]
+        else:
+            words = [self.whole(a) for a in args]
+        return f"{self.dialect.prefix}{op}({', '.join(words)})"
+
+    def _comparison(self, op: str, args: Sequence[Operand]) -> str:
+        if op in _COMPARISONS:
+            return f"{self.whole(args[0])} {_COMPARISONS[op]} {self.whole(args[1])}"
+        if op in _LOGIC:
+            return f"{self.truth(args[0])} {_LOGIC[op]} {self.truth(args[1])}"
+        (a,) = args
+        if isinstance(a, Temporary) and a.number in self._truths:
+            return f"{self.dialect.prefix}not(m{a.number})"
+        return f"{self.whole(a)} == {self.whole(Constant('0'))}"
+
+
+def _used_as_numbers(statements: Iterable[object]) -> set[int]:
+    """Temporaries that somebody reads as numbers, not as truths."""
+    used: set[int] = set()
+    for statement in statements:
+        read = operands(statement)
+        if isinstance(statement, Guard):
+            continue
+        if isinstance(statement, Assign) and statement.op in ("and", "or", "not"):
+            continue
+        if isinstance(statement, Assign) and statement.op == "select":
+            read = read[1:]
+        used |= {operand.number for operand in read if isinstance(operand, Temporary)}
+    return used

@@ -1,0 +1,1 @@
+"""Elements and their derivations as pages for a reader."""

@@ -1,0 +1,95 @@
+"""Layout trees as LaTeX (amsmath)."""
+
+from __future__ import annotations
+
+import re
+
+from .layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
+from .names import GREEK, ShownName
+
+_SIGNS = {
+    "−": "-", "≤": r"\le ", "≥": r"\ge ", "≠": r"\ne ", " ": r"\,", "·": r"\cdot ",
+}  # fmt: skip
+_WORDS = {"∼": r"\sim", "⊥": r"\perp", "π": r"\pi", "T": r"\mathsf{T}", "−1": "-1", "I": "I"}
+_FUNCTIONS = {"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "max", "min"}
+_TEXT = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "_": r"\_", "%": r"\%", "&": r"\&",
+    "#": r"\#", "$": r"\$", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "–": "--", "·": r"$\cdot$", "…": r"\dots{}",
+    "≤": r"$\le$", "≥": r"$\ge$", "²": r"$^2$", "³": r"$^3$", "−": r"$-$",
+}  # fmt: skip
+
+
+def escaped(text: str) -> str:
+    """Plain text safe in a LaTeX paragraph."""
+    return "".join(_TEXT.get(c, c) for c in text)
+
+
+def latex_unit(unit: str) -> str:
+    """kg*m2 as kg m^2, upright."""
+    if not unit:
+        return "--"
+    text = escaped(unit).replace("*", r"\,")
+    return re.sub(r"(?<=[A-Za-z])(?:\\textasciicircum\{\})?(-?\d+)", r"\\textsuperscript{\1}", text)
+
+
+def latex_name(name: ShownName, accent: str = "", index: str = "") -> str:
+    """A name with its dots, accent, subscript and index."""
+    core = _core(name)
+    core = {0: core, 1: rf"\dot{{{core}}}", 2: rf"\ddot{{{core}}}"}[min(name.dots, 2)]
+    if accent == "tilde":
+        core = rf"\tilde{{{core}}}" if len(name.base) == 1 else rf"\widetilde{{{core}}}"
+    subscript = [_subscript(name.subscript)] if name.subscript else []
+    for sign, command in (("…", r"\dots "), ("⟨", r"\langle "), ("⟩", r"\rangle ")):
+        index = index.replace(sign, command)
+    subscript += [index] if index else []
+    tail = f"_{{{','.join(subscript)}}}" if subscript else ""
+    return f"{core}{tail}" + (r"^{\perp}" if accent == "perp" else "")
+
+
+def _core(name: ShownName) -> str:
+    if name.base in GREEK:
+        return "\\" + name.base
+    if name.upright or len(name.base) > 1:
+        return rf"\mathrm{{{name.base}}}".replace("_", r"\_")
+    return name.base
+
+
+def _subscript(text: str) -> str:
+    return rf"\mathrm{{{text}}}".replace("_", r"\_") if len(text) > 1 else text
+
+
+def latex(node: Node) -> str:
+    """The node as the content of a formula."""
+    if isinstance(node, Name):
+        return latex_name(node.name, node.accent, node.index)
+    if isinstance(node, Word):
+        return _word(node.text)
+    if isinstance(node, Sign):
+        sign = _SIGNS.get(node.text, node.text)
+        return f" {sign} " if node.spaced else sign
+    if isinstance(node, Row):
+        return "".join(latex(item) for item in node.items)
+    if isinstance(node, Fraction):
+        return rf"\frac{{{latex(node.above)}}}{{{latex(node.below)}}}"
+    if isinstance(node, Raised):
+        return rf"{{{latex(node.base)}}}^{{{latex(node.exponent)}}}"
+    if isinstance(node, Fence):
+        return rf"\left{node.left}{latex(node.body)}\right{node.right}"
+    if isinstance(node, Root):
+        return rf"\sqrt{{{latex(node.body)}}}"
+    rows = r" \\ ".join(" & ".join(latex(cell) for cell in row) for row in node.rows)
+    if node.cases:
+        return rf"\begin{{cases}} {rows} \end{{cases}}"
+    layout = "c" * len(node.rows[0])
+    return rf"\left[\begin{{array}}{{{layout}}} {rows} \end{{array}}\right]"
+
+
+def _word(text: str) -> str:
+    if text in _WORDS:
+        return _WORDS[text]
+    if text in _FUNCTIONS:
+        return "\\" + text
+    if re.fullmatch(r"[0-9.]+", text):
+        return text
+    return rf"\text{{{escaped(text)}}}" if text.isascii() else escaped(text)

@@ -1,0 +1,107 @@
+"""What `mstmm show` can show: every element and every step of the sweep, by name.
+
+A full name is kind and name, as in the C files: hinge_pin, body_rigid, force_spring, sweep_frames,
+classical_ball.  The name alone means the first of these kinds that has it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from functools import cache, partial
+
+from mstmm.errors import ElementError
+from mstmm.ir import KernelIR
+from mstmm.spec import ElementSpec
+
+from ..catalogue.kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, kernels_of
+from ..catalogue.registry import Element, builtin_elements, kind_of
+from ..catalogue.specs import generic_spec, shared_specs, spec_of
+from ..classical.catalogue import classical_spec
+from ..print.render import element_source
+from .document import ElementView
+
+__all__ = ["KINDS", "ElementView", "full_name", "names", "of_element", "view"]
+
+KINDS = ("hinge", "body", "force", "classical", "sweep")
+
+#: A second name of an element: the same motion, its law is in sweep_laws.
+_ALIASES = {"hinge_elastic": ("hinge", "free")}
+
+
+def names() -> list[str]:
+    """Every full name, by kind."""
+    return list(_keys())
+
+
+@cache
+def _keys() -> dict[str, tuple[str, str]]:
+    keys = sorted(built_in(), key=lambda key: KINDS.index(key[0]))
+    return {f"{kind}_{name}": (kind, name) for kind, name in keys} | _ALIASES
+
+
+def full_name(name: str, known: Iterable[str]) -> str | None:
+    """The full name that a user means, None if there is none."""
+    there = set(known)
+    return next((c for c in (name, *(f"{kind}_{name}" for kind in KINDS)) if c in there), None)
+
+
+def view(name: str) -> ElementView:
+    """The view of a built-in element.  Raises ElementError, with the nearest name, for another."""
+    full = full_name(name, _keys())
+    if full is None:
+        short = [key.split("_", 1)[1] for key in _keys()]
+        near = difflib.get_close_matches(name, [*_keys(), *short], 1, 0.6)
+        hint = f'; did you mean "{near[0]}"?' if near else "; mstmm list shows what there is"
+        raise ElementError(f'element "{name:.60}": there is no such element{hint}')
+    kind, own = _keys()[full]
+    for element in builtin_elements():
+        if (kind_of(element), element.name) == (kind, own):
+            return of_element(element)
+    return _of_step(kind, own)
+
+
+def of_element(element: Element) -> ElementView:
+    """View of a hinge, body or force element, built in or a user's."""
+    name = f"{kind_of(element)}_{element.name}"
+    return _view(
+        name, element.title or element.name, kernels_of(element), element.sources,
+        lambda: element_source(spec_of(element)),
+    )  # fmt: skip
+
+
+def _of_step(kind: str, name: str) -> ElementView:
+    """A classical matrix or a step of the sweep."""
+    spec = cache(partial(_spec_of_step, kind, name))
+    kernels = built_in_kernels(kind, name)
+    title = kernels[0].derivation.title if kind == "classical" else _TITLES.get(name, name)
+    return _view(f"{kind}_{name}", title, kernels, (), lambda: element_source(spec()))
+
+
+_TITLES = {
+    "frames": "poses, points and loads",
+    "laws": "laws on hinge coordinates",
+    "beam": "Euler-Bernoulli beam",
+    "modal": "flexible bodies",
+} | {f"generic{nu}": f"sweep across a hinge with {nu} speeds" for nu in range(MAX_SPEEDS + 1)}
+
+
+def _spec_of_step(kind: str, name: str) -> ElementSpec:
+    if kind == "classical":
+        return classical_spec(name)
+    if name.startswith("generic"):
+        return generic_spec(int(name.removeprefix("generic")))
+    return next(spec for spec in shared_specs() if spec.name == name)
+
+
+def _view(
+    name: str,
+    title: str,
+    kernels: tuple[Kernel, ...],
+    sources: tuple[str, ...],
+    c_text: Callable[[], str],
+) -> ElementView:
+    def lowered() -> tuple[KernelIR, ...]:
+        return tuple(kernel.ir() for kernel in kernels)
+
+    return ElementView(name, title, tuple(k.derivation for k in kernels), lowered, c_text, sources)
