@@ -29,21 +29,21 @@ from .errors import (
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .compilation import compile_scene as compile
-    from .compilation import generate_file, register
+    from .bridge.compilation import compile_scene as compile
+    from .bridge.compilation import generate_file, register
     from .runtime.model.loading import load_result
     from .runtime.model.model import Model
     from .runtime.result.result import Result
     from .scene import Scene
-    from .scene_load import load_scene
+    from .scene.load import load_scene
 
 #: Public name -> (module, name there).
 _LAZY = {
     "Scene": (".scene", "Scene"),
-    "load_scene": (".scene_load", "load_scene"),
-    "compile": (".compilation", "compile_scene"),
-    "register": (".compilation", "register"),
-    "generate_file": (".compilation", "generate_file"),
+    "load_scene": (".scene.load", "load_scene"),
+    "compile": (".bridge.compilation", "compile_scene"),
+    "register": (".bridge.compilation", "register"),
+    "generate_file": (".bridge.compilation", "generate_file"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
     "load_result": (".runtime.model.loading", "load_result"),

@@ -18,7 +18,7 @@ class SceneError(MstmmError):
 
 
 class ExpressionError(MstmmError):
-    """Text that is not an expression of the small grammar (`mstmm.expression`)."""
+    """Text that is not an expression of the small grammar (`mstmm.expression.expression`)."""
 
 
 class ElementError(MstmmError):

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import grimp
@@ -21,10 +21,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
 ROOMS = ("derive", "templates", "generated", "runtime")
 
-# The modules that join derivation and numbers: a command line, a compile, a comparison.
-BRIDGES = {
-    "__init__", "__main__", "cli", "compilation", "crosscheck", "fusion", "kernel_compilation"
-}  # fmt: skip
+# The rooms of mstmm that join derivation and numbers, and the face that names what they offer.
+BRIDGES = {"bridge", "cli"}
 
 
 def room_folder(package: str) -> Path:
@@ -64,14 +62,20 @@ def loaded_after(statements: str) -> set[str]:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-def import_all(package: str, leaves_only: bool = False) -> str:
-    """Statements that import every module of a package (not `__main__`)."""
+def leaves() -> list[Path]:
+    """Files of the rooms of mstmm that all others may use."""
+    return [
+        path
+        for path in python_files("mstmm")
+        if path.relative_to(ROOT / "mstmm").parts[0] not in {"__init__.py", "__main__.py", *BRIDGES}
+    ]
+
+
+def import_all(package: str, paths: Sequence[Path]) -> str:
+    """Statements that import a package and every file below its folder (not `__init__`)."""
     folder = room_folder(package) if package != "mstmm" else ROOT / "mstmm"
-    modules = [package]
-    for path in sorted(folder.glob("*.py") if leaves_only else folder.rglob("*.py")):
-        parts = path.relative_to(folder).with_suffix("").parts
-        if parts[-1] not in {"__init__", "__main__"} and not (leaves_only and parts[-1] in BRIDGES):
-            modules.append(".".join((package, *parts)))
+    names = [path.relative_to(folder).with_suffix("").parts for path in sorted(paths)]
+    modules = [package, *(".".join((package, *n)) for n in names if n[-1] != "__init__")]
     return "\n".join(f"import {module}" for module in modules)
 
 
@@ -125,7 +129,7 @@ def test_import_of_the_face_is_light() -> None:
 
 
 def test_leaves_need_no_room() -> None:
-    loaded = loaded_after(import_all("mstmm", leaves_only=True))
+    loaded = loaded_after(import_all("mstmm", leaves()))
     assert not loaded & {"sympy", "jinja2", "cffi", *(f"mstmm.{room}" for room in ROOMS)}
 
 
@@ -133,8 +137,7 @@ def test_leaves_name_no_room() -> None:
     # Not even inside a function: what joins the rooms is listed above.
     named = [
         (path.name, name)
-        for path in python_files("mstmm")
-        if not {path.stem, path.parent.name} & BRIDGES
+        for path in leaves()
         for _, name in imports(path)
         if {*name.split(".")[:2]} & {"sympy", "jinja2", "cffi", *ROOMS}
     ]
@@ -142,13 +145,13 @@ def test_leaves_name_no_room() -> None:
 
 
 def test_runtime_needs_no_derivation() -> None:
-    loaded = loaded_after(import_all("mstmm.runtime"))
+    loaded = loaded_after(import_all("mstmm.runtime", python_files("runtime")))
     assert "mstmm.runtime" in loaded
     assert not loaded & {"sympy", "jinja2", "mstmm.derive", "mstmm.templates"}
 
 
 def test_derivation_needs_no_numbers() -> None:
-    loaded = loaded_after(import_all("mstmm.derive"))
+    loaded = loaded_after(import_all("mstmm.derive", python_files("derive")))
     assert "sympy" in loaded
     assert not loaded & {"numpy", "scipy", "cffi", "mstmm.runtime", "mstmm.generated"}
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import mstmm
-from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import (
     Arrays,
     Beam,
@@ -32,7 +31,8 @@ from mstmm.scene import (
     Start,
     load_scene,
 )
-from mstmm.scene_rules import Table
+from mstmm.scene.rules.values import Table
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 PAGES = Path(__file__).parents[1] / "docs" / "use"
 BLOCKS = [

@@ -54,7 +54,7 @@ def spent(command: list[str], cache: Path) -> dict[str, float]:
 def compiler(scene: dict[str, Any], folder: Path) -> list[str]:
     """The command of the compiler alone on the text of the scene's fused code."""
     import mstmm
-    from mstmm.fused_abi import FLAGS
+    from mstmm.border.fused import FLAGS
 
     model = mstmm.compile(mstmm.Scene(**scene), engine="fused")
     sources = model.fusion._sources("scalar", "0" * 64)

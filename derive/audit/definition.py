@@ -14,7 +14,7 @@ import mpmath
 import sympy as sp
 
 from mstmm.errors import ElementError
-from mstmm.spec import Param
+from mstmm.ir.spec import Param
 
 from ..catalogue.registry import Element, builtin_elements, kind_of
 from ..equations.hinge import HingeMotion, motion_of, speeds_of

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 
 from mstmm.ir import KernelIR, Port, Solve
-from mstmm.spec import Param
+from mstmm.ir.spec import Param
 
 Numbers = list[float]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mstmm.errors import ElementError
-from mstmm.spec import ENTRY_POINTS
+from mstmm.ir.spec import ENTRY_POINTS
 
 from .. import elements
 from ..language.element import Body, ForceElement, Hinge

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from mstmm.ir import KernelIR
-from mstmm.spec import ElementSpec
+from mstmm.ir.spec import ElementSpec
 
 from ..classical.catalogue import CLASSICAL, classical_spec
 from ..equations import sweep

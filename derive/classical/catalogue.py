@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import sympy as sp
 
-from mstmm.spec import ElementSpec
+from mstmm.ir.spec import ElementSpec
 
 from ..language.derivation import Derivation
 from ..lower.kernel import lower

@@ -12,7 +12,6 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
-from mstmm.graph import Graph, Node
 from mstmm.ir import (
     INNER_INDEX,
     LOOP_INDEX,
@@ -30,8 +29,8 @@ from mstmm.ir import (
     Sum,
     Temporary,
 )
-
-from ..unrolled import solve_symmetric
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.unrolled import solve_symmetric
 
 Nodes = list[Node]
 Guarding = Callable[[Node, int], None]

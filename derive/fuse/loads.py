@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mstmm.graph import Node
-from mstmm.structure import ForceStructure, LawStructure, LoadStructure
+from mstmm.ir.graph import Node
+from mstmm.ir.structure import ForceStructure, LawStructure, LoadStructure
 
 from .inline import Nodes
 from .modal import ModalPass

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mstmm.graph import Node
-from mstmm.structure import ModalStructure, SectionStructure
+from mstmm.ir.graph import Node
+from mstmm.ir.structure import ModalStructure, SectionStructure
 
 from .inline import Guarding, Nodes
 from .state import FusionState

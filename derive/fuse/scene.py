@@ -12,13 +12,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from mstmm.errors import ElementError
-from mstmm.graph import Node
 from mstmm.ir import KernelIR, Port
-from mstmm.structure import (
-    ANGLE,
-    BodyStructure,
-    Structure,
-)
+from mstmm.ir.graph import Node
+from mstmm.ir.structure import ANGLE, BodyStructure, Structure
 
 from .inline import Nodes
 from .loads import LoadPass

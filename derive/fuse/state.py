@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from mstmm.graph import Graph, Node
 from mstmm.ir import KernelIR
-from mstmm.structure import Entries, ExpressionStructure, Key, Structure
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.structure import Entries, ExpressionStructure, Key, Structure
 
 from .inline import Inliner, Nodes
 from .transport import Stage

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from mstmm.graph import Node
-from mstmm.structure import BodyStructure, Entries
+from mstmm.ir.graph import Node
+from mstmm.ir.structure import BodyStructure, Entries
 
 from .inline import Nodes
 

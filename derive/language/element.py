@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import sympy as sp
 
-from mstmm.spec import Param
+from mstmm.ir.spec import Param
 
 from .derivation import tilde
 

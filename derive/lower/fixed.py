@@ -11,12 +11,12 @@ from collections.abc import Callable
 import sympy as sp
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 
-from mstmm.graph import Graph, Node
 from mstmm.ir import Port
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.unrolled import NodeMatrix, backward, forward, ldl, solve_by_rows, solve_symmetric
 
 from ..language.derivation import Derivation, Equation, Factor, Quantity, Solve, Triangular
 from ..language.functions import FUNCTIONS
-from ..unrolled import NodeMatrix, backward, forward, ldl, solve_by_rows, solve_symmetric
 
 
 def port(quantity: Quantity) -> Port:

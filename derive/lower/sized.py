@@ -18,11 +18,11 @@ from itertools import accumulate
 import sympy as sp
 from sympy.matrices.expressions.slice import MatrixSlice
 
-from mstmm.graph import Node
 from mstmm.ir import LOOPS, Port
+from mstmm.ir.graph import Node
+from mstmm.ir.unrolled import SINGULAR, NodeMatrix
 
 from ..language.derivation import Derivation, Equation, Quantity, Solve
-from ..unrolled import SINGULAR, NodeMatrix
 from .fixed import Lowering, port
 
 Index = int | str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mstmm.columns_abi import ABI, DECLARATIONS, SYMBOL
+from mstmm.border.columns import ABI, DECLARATIONS, SYMBOL
 from mstmm.ir import KernelIR
 
 from .kernel import string
@@ -23,7 +23,7 @@ def columns_sources(kernels: Sequence[KernelIR], key: str) -> dict[str, str]:
     """File name -> C text of a library of derivatives that carries `key`.
 
     Every kernel takes the inputs of "accelerations" and one direction behind them, and has one
-    output and no guards (`mstmm.tangent.tangent` of one port and one output).
+    output and no guards (`mstmm.ir.tangent.tangent` of one port and one output).
     """
     sizes = {port.name: port.length() for port in kernels[0].inputs[:6]}
     texts = [_HEAD, support("real"), support("sincos"), support("lanes"), DECLARATIONS]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from mstmm.abi import parameter_names, work_name
+from mstmm.border.elements import parameter_names, work_name
 from mstmm.ir import (
     Assign,
     Constant,

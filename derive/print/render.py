@@ -16,11 +16,12 @@ from typing import Any
 import jinja2
 
 import mstmm.templates
-from mstmm import abi, fused_abi
+from mstmm.border import elements as abi
+from mstmm.border import fused as fused_abi
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
-from mstmm.spec import ElementSpec, Param
-from mstmm.stored import element_to_json
-from mstmm.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
+from mstmm.ir.spec import ElementSpec, Param
+from mstmm.ir.stored import element_to_json
+from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .kernel import C_OPERATIONS, KernelText, comment, string
 

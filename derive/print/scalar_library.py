@@ -6,8 +6,8 @@ and libquadmath: about a hundred times slower than double, for reference solutio
 
 from __future__ import annotations
 
+from mstmm.border.scalars import SCALARS, SYMBOL
 from mstmm.ir import KernelIR
-from mstmm.scalars import SCALARS, SYMBOL
 
 from .scalar_function import scalar_source
 from .straight_line import port_name

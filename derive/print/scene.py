@@ -1,7 +1,7 @@
 """KernelIRs of a whole scene -> one C text: for one state, or for several states side by side.
 
 The text stands alone: it includes nothing, and what it exports is its descriptor
-(`mstmm.fused_abi`) and a test of itself.  It is printed without templates to fill, because it is
+(`mstmm.border.fused`) and a test of itself.  It is printed without templates to fill, because it is
 printed whenever a scene is compiled for the first time; the parts that depend on no scene lie as
 plain C in templates/fused_*.c.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 import mstmm.templates
-from mstmm.fused_abi import ABI, DECLARATIONS, FLAGS, SYMBOL
+from mstmm.border.fused import ABI, DECLARATIONS, FLAGS, SYMBOL
 from mstmm.ir import Assign, Element, KernelIR, Operand, Store
 
 from ..fuse.passes.interleave import merged

@@ -12,7 +12,7 @@ from functools import cache, partial
 
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
-from mstmm.spec import ElementSpec
+from mstmm.ir.spec import ElementSpec
 
 from ..catalogue.kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, kernels_of
 from ..catalogue.registry import Element, builtin_elements, kind_of

@@ -13,9 +13,9 @@ from mstmm.errors import ElementError, MstmmError
 from .options import Json, python_file, quoted
 
 if TYPE_CHECKING:
-    from mstmm.crosscheck import Report as Crosscheck
+    from mstmm.bridge.crosscheck import Report as Crosscheck
     from mstmm.scene import Scene
-    from mstmm.topology import Topology
+    from mstmm.scene.checks.topology import Topology
 
 SCENE_ENDINGS = (".toml", ".json")
 
@@ -138,7 +138,7 @@ _SHOWN = 40
 
 def _tree_lines(scene: Scene) -> list[str]:
     """The tree of bodies, each with the hinge it hangs on."""
-    from mstmm.topology import build
+    from mstmm.scene.checks.topology import build
 
     skeleton = scene.skeleton
     tree = build(skeleton)
@@ -173,7 +173,7 @@ def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:
 
 def _element(name: str) -> Report:
     """Kernels of a built-in or stored element: equations, intermediate form and C agree."""
-    from mstmm.crosscheck import crosscheck
+    from mstmm.bridge.crosscheck import crosscheck
 
     from .names import found
 
@@ -182,7 +182,7 @@ def _element(name: str) -> Report:
 
 def _file(path: str) -> Report:
     """Every element that a Python file defines.  The file is executed."""
-    from mstmm.crosscheck import crosscheck_definition
+    from mstmm.bridge.crosscheck import crosscheck_definition
     from mstmm.derive.audit.definition import check as check_element
     from mstmm.derive.catalogue.registry import load_file
 

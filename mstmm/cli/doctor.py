@@ -10,9 +10,9 @@ from .options import Json
 
 def doctor(json: Json = False) -> None:
     """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
+    from mstmm.border.fused import FLAGS, TUNING
+    from mstmm.bridge.compilation import compile_scene
     from mstmm.cli import machine as examination
-    from mstmm.compilation import compile_scene
-    from mstmm.fused_abi import FLAGS, TUNING
 
     from . import output
 

@@ -56,7 +56,7 @@ def generate(
 def _own(files: list[str], json: bool) -> None:
     """Generate the elements of files; without any, those of installed packages."""
     import mstmm
-    from mstmm.compilation import generate_published
+    from mstmm.bridge.compilation import generate_published
 
     from .output import emit_json, say
 

@@ -28,7 +28,7 @@ class Section(NamedTuple):
 
 
 def _hinges() -> Section:
-    from mstmm.hinge_types import HINGE_TYPES
+    from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
     from .stored import Entry, with_unit
 
@@ -67,14 +67,14 @@ def _elements(kind: str, title: str) -> Section:
 
 
 def _flexible() -> Section:
-    from mstmm.scene_beam import Beam
-    from mstmm.scene_elastic import Elastic
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.elastic import Elastic
 
     return _keys("flexible bodies", (("beam", Beam), ("elastic", Elastic)))
 
 
 def _laws() -> Section:
-    from mstmm.scene_law import Friction, Law, Limits, SpringLaw
+    from mstmm.scene.tables.law import Friction, Law, Limits, SpringLaw
 
     owners = (
         ("law", Law),
@@ -158,7 +158,7 @@ def _installed() -> Section:
     """Entry points only: nothing is imported for a list."""
     from importlib.metadata import entry_points
 
-    from mstmm.spec import ENTRY_POINTS
+    from mstmm.ir.spec import ENTRY_POINTS
 
     found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
     rows = [(e.name, e.dist.name if e.dist is not None else "", e.value) for e in found]

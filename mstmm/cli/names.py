@@ -23,7 +23,7 @@ def found(name: str) -> tuple[str, str]:
 
     Raises ElementError, with the nearest name, if there is none.
     """
-    from mstmm.scene_errors import near
+    from mstmm.scene.rules.messages import near
 
     names = known()
     for full in (name, *(f"{kind}_{name}" for kind in KINDS)):

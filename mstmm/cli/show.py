@@ -12,7 +12,7 @@ from .options import Json, output_file, python_file, quoted
 
 if TYPE_CHECKING:
     from mstmm.derive.show.document import ElementView
-    from mstmm.spec import ElementSpec
+    from mstmm.ir.spec import ElementSpec
 
 STAGES = ("equations", "matrix", "ir", "c")
 FORMATS = ("text", "latex", "html")
@@ -100,7 +100,7 @@ def _views(element: str, at: str) -> list[ElementView]:
     if source is None:
         return [_kept(kind, name, at)]
     if at in ("ir", "c"):  # the committed kernels: no need to derive them again
-        from mstmm.stored import element_from_json
+        from mstmm.ir.stored import element_from_json
 
         return [_of_spec(element_from_json(str(stored.text(full, ".json"))), source)]
     return [views.view(full)]

@@ -205,7 +205,7 @@ def use_files(paths: list[str]) -> None:
 def _model(plan: Plan) -> Model:
     """The compiled scene, with every quantity that was asked for in it."""
     import mstmm
-    from mstmm.scene_errors import near
+    from mstmm.scene.rules.messages import near
 
     scene, level = mstmm.load_scene(plan.scene), plan.flexibility
     model = compiled(plan.scene, scene, plan.sweep, plan.engine, level)

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mstmm.spec import ElementSpec
+    from mstmm.ir.spec import ElementSpec
 
 
 @dataclass(frozen=True)

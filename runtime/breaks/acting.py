@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from mstmm.expression import Expression
+from mstmm.expression.expression import Expression
 from mstmm.scene import Scene
-from mstmm.scene_hinge_table import Hinge, HingeTable
-from mstmm.scene_members import Hinges
-from mstmm.scene_parts import Spring
+from mstmm.scene.tables.hinge import Hinge, HingeTable
+from mstmm.scene.tables.loads import Spring
+from mstmm.scene.tables.members import Hinges
 
 
 @dataclass(frozen=True)

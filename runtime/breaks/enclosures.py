@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mstmm.expression import Expression
-from mstmm.expression_parser import Term
+from mstmm.expression.expression import Expression
+from mstmm.expression.parser import Term
 
 from . import intervals as iv
 from .intervals import EVERYTHING, Interval, point

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.drive import jump
 from mstmm.errors import SceneError
-from mstmm.expression_parser import Term
+from mstmm.expression.drive import jump
+from mstmm.expression.parser import Term
 
 from .acting import Acting
 from .enclosures import Enclosure, enclose, of_time

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.drive import motion_at
-from mstmm.expression import Expression, Name
+from mstmm.expression.drive import motion_at
+from mstmm.expression.expression import Expression, Name
 
 from .calls import Calls, Probe
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
-    from mstmm.scene_parts import Spring
+    from mstmm.scene.tables.loads import Spring
 
 
 def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:

@@ -1,6 +1,6 @@
 """Jacobian of the equations of motion, for implicit integrators: exact, else by differences.
 
-Exact is the fused kernel differentiated (`mstmm.tangent`), run on the tape that is always there.
+Exact is the fused kernel differentiated (`mstmm.ir.tangent`), run on the tape that is always there.
 Scenes without that kernel (releases change its form) or with so many bodies that writing it takes
 longer than it saves, and states in which a derivative does not exist, get central differences with
 increments that never grow: nothing can be learnt from larger ones along a coordinate that the
@@ -16,7 +16,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.tangent import PREFIX, tangent
+from mstmm.ir.tangent import PREFIX, tangent
 
 from ..kernels.tape import TapeKernel
 from ..pack.pack import pack

@@ -11,8 +11,8 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure
 from mstmm.ir import Constant, KernelIR, Store
-from mstmm.structure import Structure
-from mstmm.tangent import PREFIX, tangent
+from mstmm.ir.structure import Structure
+from mstmm.ir.tangent import PREFIX, tangent
 
 from ..kernels.columns import ColumnsLibrary
 from ..kernels.tape import TapeKernel

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.scene_flexible_checks import free_axes
-from mstmm.scene_rules import GROUND
+from mstmm.scene.checks.flexible import free_axes
+from mstmm.scene.rules.values import GROUND
 
 if TYPE_CHECKING:
     from mstmm.scene import Body, Hinge, Scene

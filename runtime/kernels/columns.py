@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.columns_abi import ABI, SYMBOL
+from mstmm.border.columns import ABI, SYMBOL
 from mstmm.errors import EnvironmentFailure
 
 

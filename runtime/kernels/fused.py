@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
+from mstmm.border.fused import ABI, SYMBOL
 from mstmm.errors import EnvironmentFailure
-from mstmm.fused_abi import ABI, SYMBOL
 
 from . import prebuilt
 

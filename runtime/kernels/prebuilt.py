@@ -9,10 +9,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.spec import Param
-from mstmm.tape import Tape
+from mstmm.ir.spec import Param
+from mstmm.ir.tape import Tape
 
 from ..libraries.build_extension import BUILT_FROM, built_from
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Integers
 from mstmm.errors import SceneError
-from mstmm.scene_members import Members
+from mstmm.scene.tables.members import Members
 
 _WHOLE = {"int": np.int32, "int64_t": np.int64}
 

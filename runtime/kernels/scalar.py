@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mstmm.border.scalars import SCALARS, SYMBOL
 from mstmm.errors import EnvironmentFailure
 from mstmm.ir import KernelIR
-from mstmm.scalars import SCALARS, SYMBOL
 
 
 class ScalarKernel:

@@ -19,14 +19,14 @@ from typing import Any
 
 import cffi
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.hinge_types import HINGE_TYPES
+from mstmm.ir.spec import ElementSpec
+from mstmm.ir.stored import element_from_json, element_to_json
+from mstmm.ir.tape import compile_tape
 from mstmm.scene import Scene
-from mstmm.scene_types import types
-from mstmm.spec import ElementSpec
-from mstmm.stored import element_from_json, element_to_json
-from mstmm.tape import compile_tape
+from mstmm.scene.checks.types import types
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..host.files import replacing
 from ..libraries.build import Built, Order, fetched, found, remove

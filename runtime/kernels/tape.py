@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.ir import KernelIR
-from mstmm.tape import Tape, compile_tape
+from mstmm.ir.tape import Tape, compile_tape
 
 from . import prebuilt
 

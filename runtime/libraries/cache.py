@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mstmm import version
-from mstmm.abi import ABI
+from mstmm.border.elements import ABI
 from mstmm.errors import EnvironmentFailure
 
 from . import processor, toolchain

@@ -1,6 +1,6 @@
 """Exact derivatives of the accelerations: the fused kernel differentiated, not its values.
 
-Forward mode (`mstmm.tangent`): one run of a tangent kernel gives the derivative along one
+Forward mode (`mstmm.ir.tangent`): one run of a tangent kernel gives the derivative along one
 direction.  Coordinates are varied by tangent increments dphi, one for each speed: dq = N(q) dphi,
 where qdot = N(q) u.  For coordinates whose rate is their speed that is the coordinate itself; for
 the quaternion of a ball or free hinge it is the rotation vector in outboard axes.
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.tangents import Tangents
 from ..pack.pack import pack

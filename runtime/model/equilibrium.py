@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
-from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
 from ..pack.layout import refuse_dense

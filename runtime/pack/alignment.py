@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from mstmm.rotations import Matrix, Vector, apply, dot, from_rpy, norm, product
+from mstmm.numbers.rotations import Matrix, Vector, apply, dot, from_rpy, norm, product
 from mstmm.scene import Body, Hinge
 
 from .placement import KERNEL_OF, Placement, alignment

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from mstmm.errors import SceneError
-from mstmm.hinge_types import HINGE_TYPES
-from mstmm.rotations import Matrix
+from mstmm.ir.tape import Tape
+from mstmm.numbers.rotations import Matrix
 from mstmm.scene import Body, Hinge, Scene
-from mstmm.tape import Tape
-from mstmm.topology import Run, Topology
+from mstmm.scene.checks.topology import Run, Topology
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..flexible.records import ModalRecords, in_frame, section_in
 from ..kernels import prebuilt

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.expression import Expression, number
+from mstmm.expression.expression import Expression, number
 from mstmm.scene import Hinge, LawEntry
-from mstmm.scene_chain import Chain
-from mstmm.topology import Run
+from mstmm.scene.checks.topology import Run
+from mstmm.scene.tables.chain import Chain
 
 from ..kernels import prebuilt
 from ..kernels.records import Records

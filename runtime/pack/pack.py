@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mstmm.expression import Expression
+from mstmm.expression.expression import Expression
 from mstmm.ir import KernelIR
+from mstmm.ir.tape import Tape, compile_tape
 from mstmm.scene import Scene, split
-from mstmm.scene_hinge_table import HingeTable
-from mstmm.tape import Tape, compile_tape
-from mstmm.topology import build
+from mstmm.scene.checks.topology import build
+from mstmm.scene.tables.hinge import HingeTable
 
 from ..flexible.modal_body import ModalBody
 from ..kernels import prebuilt

@@ -9,7 +9,7 @@ from typing import Any
 
 from mstmm.ir import KernelIR
 from mstmm.scene import Scene, split
-from mstmm.topology import GROUND_INDEX, Topology
+from mstmm.scene.checks.topology import GROUND_INDEX, Topology
 
 from ..breaks.acting import acting
 from ..breaks.times import TimeMap, time_map

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mstmm.dual import atan2
-from mstmm.rotations import (
+from mstmm.numbers.dual import atan2
+from mstmm.numbers.rotations import (
     IDENTITY,
     Matrix,
     Vector,

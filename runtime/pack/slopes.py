@@ -17,11 +17,11 @@ import numpy as np
 from pydantic import BaseModel
 
 from mstmm.arrays import Array
-from mstmm.dual import Dual, Marks, value_of
 from mstmm.errors import SceneError
-from mstmm.expression import Expression, number
+from mstmm.expression.expression import Expression, number
+from mstmm.ir.structure import Structure
+from mstmm.numbers.dual import Dual, Marks, value_of
 from mstmm.scene import Hinge, Scene
-from mstmm.structure import Structure
 
 from . import parameters
 from .bodies import Known

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import Hinge, Scene
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from .layout import HingeSlots, Layout
 

@@ -20,7 +20,7 @@ from mstmm.ir import (
 from mstmm.ir import (
     Element as ArrayEntry,
 )
-from mstmm.structure import (
+from mstmm.ir.structure import (
     ANGLE,
     BodyStructure,
     Entries,

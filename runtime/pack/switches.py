@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
 
-from mstmm.expression import SWITCHES, Expression, Name
-from mstmm.graph import Graph, Node
+from mstmm.expression.expression import SWITCHES, Expression, Name
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.tape import Tape
 from mstmm.scene import Hinge, Scene, split
-from mstmm.tape import Tape
 
 from ..breaks.acting import Acting, acting, owners
 from ..breaks.enclosures import of_time

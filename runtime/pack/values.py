@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from mstmm.drive import motion
 from mstmm.errors import SceneError
-from mstmm.expression import Expression, Name
-from mstmm.graph import Graph, Node
+from mstmm.expression.drive import motion
+from mstmm.expression.expression import Expression, Name
 from mstmm.ir import KernelIR, Port
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.tape import Tape, compile_tape
 from mstmm.scene import Hinge
-from mstmm.tape import Tape, compile_tape
 
 from .layout import Layout
 

@@ -14,9 +14,9 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
-from mstmm.scene_all import SceneTables
-from mstmm.scene_body import BodyTable
-from mstmm.scene_errors import near
+from mstmm.scene.rules.messages import near
+from mstmm.scene.tables.all import SceneTables
+from mstmm.scene.tables.body import BodyTable
 
 from ..engine.calls import PARTS, Probe
 

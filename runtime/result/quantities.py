@@ -13,8 +13,8 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.hinge_types import effort_unit
-from mstmm.scene_errors import near
+from mstmm.scene.rules.messages import near
+from mstmm.scene.tables.hinge_types import effort_unit
 
 from ..pack.layout import HingeSlots
 from .flexible.names import add_body

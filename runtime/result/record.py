@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.hinge_types import HINGE_TYPES
-from mstmm.scene_flexible_checks import short_beams
+from mstmm.scene.checks.flexible import short_beams
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.compiled import Compiled
 from ..integrate.loop import Statistics

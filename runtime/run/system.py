@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
-from mstmm.tape import Tape
+from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine

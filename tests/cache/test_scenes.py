@@ -14,7 +14,7 @@ import pytest
 
 import mstmm
 from cache.workbench import NOBODY, entry_folders, false_compiler
-from mstmm.fusion import Fusion
+from mstmm.bridge.fusion import Fusion
 from mstmm.runtime.kernels.fused import open_library
 from mstmm.runtime.libraries import cache
 from mstmm.runtime.libraries.upkeep import listed
@@ -159,7 +159,7 @@ def test_library_of_another_layout_is_built_again(
             raise mstmm.EnvironmentFailure("built for layout 0")
         return open_library(path, key)
 
-    monkeypatch.setattr("mstmm.fusion.open_library", reluctant)
+    monkeypatch.setattr("mstmm.bridge.fusion.open_library", reluctant)
     model = mstmm.compile(scene, engine="fused")
     assert len(attempts) == 2 and model.engine == "fused"
     assert_right(model)

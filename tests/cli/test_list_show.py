@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from cli.commands import Command
-from mstmm.hinge_types import HINGE_TYPES
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 
 def test_list_has_everything(mstmm: Command) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mstmm.crosscheck import Report, crosscheck
+from mstmm.bridge.crosscheck import Report, crosscheck
 from mstmm.derive.catalogue.kernels import built_in
 from mstmm.errors import ElementError
 

@@ -11,7 +11,7 @@ from functools import cache
 import pytest
 from crosscheck.mutations import mutants
 
-from mstmm.crosscheck import crosscheck, crosscheck_kernels, mechanics
+from mstmm.bridge.crosscheck import crosscheck, crosscheck_kernels, mechanics
 from mstmm.derive.catalogue.kernels import Kernel, built_in_kernels
 from mstmm.derive.catalogue.registry import Element, builtin_elements, kind_of
 from mstmm.runtime.kernels import prebuilt

@@ -10,7 +10,7 @@ import pytest
 from reference.compare import drawn, worst
 
 import mstmm
-from mstmm.columns_abi import SYMBOL
+from mstmm.border.columns import SYMBOL
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.engine import tangents
 from mstmm.runtime.kernels.columns import open_columns

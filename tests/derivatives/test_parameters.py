@@ -14,9 +14,9 @@ from reference.jets import Array
 from reference.random_scenes import aligned_chain, random_state
 
 import mstmm
-from mstmm import rotations
-from mstmm.dual import Dual, Marks, atan2, hypot
 from mstmm.errors import SceneError
+from mstmm.numbers import rotations
+from mstmm.numbers.dual import Dual, Marks, atan2, hypot
 from mstmm.runtime.pack import parameters
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.slopes import slopes

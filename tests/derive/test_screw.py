@@ -11,8 +11,8 @@ import pytest
 from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.audit.samples import Source
 from mstmm.derive.catalogue.kernels import Kernel, generic_kernels, screw_kernels
-from mstmm.graph import Graph, Node
 from mstmm.ir import Assign, Constant, Element, KernelIR, Operand, Store, Temporary
+from mstmm.ir.graph import Graph, Node
 
 DIGITS = 40
 SCREW = {kernel.name: kernel.ir() for kernel in screw_kernels()}

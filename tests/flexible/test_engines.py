@@ -14,9 +14,9 @@ from reference.jets import Array
 from support.complex_arithmetic import complex_step
 
 import mstmm
+from mstmm.bridge.fusion import Fusion, modes_at
 from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.errors import SceneError
-from mstmm.fusion import Fusion, modes_at
 from mstmm.ir import KernelIR
 from mstmm.runtime.pack.structure import structure_of
 

@@ -12,8 +12,8 @@ import pytest
 from support.result_scenes import pins
 
 import mstmm
+from mstmm.bridge.fusion import MOST_ASKED, MOST_BODIES, Fusion, printers
 from mstmm.errors import SceneError
-from mstmm.fusion import MOST_ASKED, MOST_BODIES, Fusion, printers
 from mstmm.ir import KernelIR
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.structure import structure_of

@@ -11,7 +11,7 @@ from support.fused_lab import COMPILERS
 from support.rod_scenes import chain, drawn_state
 
 import mstmm
-from mstmm import fused_abi
+from mstmm.border import fused as fused_abi
 from mstmm.derive.print.scene import fused_sources
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.kernels.fused import Call, FusedLibrary, open_library

@@ -11,8 +11,8 @@ from support.fused_lab import COMPILERS, FusedLab
 from support.random_kernels import random_inputs, random_kernel
 
 from mstmm.derive.audit.rounding import rounding_bounds
-from mstmm.graph import Graph
 from mstmm.ir import OPERATIONS, Port
+from mstmm.ir.graph import Graph
 
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")
 CONTINUOUS = tuple(op for op in OPERATIONS if op not in JUMPS)

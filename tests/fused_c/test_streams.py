@@ -12,8 +12,8 @@ from mstmm.derive.fuse.passes.interleave import merged
 from mstmm.derive.fuse.passes.line import Line, operands
 from mstmm.derive.fuse.passes.registers import thrifty
 from mstmm.derive.fuse.passes.sincos import gather
-from mstmm.graph import Graph
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
+from mstmm.ir.graph import Graph
 
 
 def lines(kernel: KernelIR) -> list[Line]:

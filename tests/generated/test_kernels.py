@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from support.c_library import CLibrary, compile_library, same
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.derive.audit.evaluate import GuardFailure, evaluate_floats
 from mstmm.derive.audit.rounding import rounding_bounds
 from mstmm.ir import KernelIR, Port
-from mstmm.spec import ElementSpec
-from mstmm.stored import element_from_json
-from mstmm.tape import compile_tape
+from mstmm.ir.spec import ElementSpec
+from mstmm.ir.stored import element_from_json
+from mstmm.ir.tape import compile_tape
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 MANIFEST = json.loads((GENERATED / "manifest.json").read_text())

@@ -10,8 +10,8 @@ import pytest
 
 from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
 from mstmm.errors import NumericalFailure
-from mstmm.graph import Graph
 from mstmm.ir import KernelIR, Port
+from mstmm.ir.graph import Graph
 
 
 def kernel() -> KernelIR:

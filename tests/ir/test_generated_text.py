@@ -15,7 +15,7 @@ import pytest
 from support.c_library import build, compile_library
 from support.random_kernels import element, random_kernel
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.derive.print.kernel import comment, literal, string
 from mstmm.derive.print.render import (
     element_source,
@@ -23,10 +23,10 @@ from mstmm.derive.print.render import (
     registry_source,
     write_generated,
 )
-from mstmm.graph import Graph
 from mstmm.ir import Assign, Constant, Guard, KernelIR, Port, Store, Temporary
-from mstmm.spec import ElementSpec, Param
-from mstmm.stored import element_from_json, element_to_json
+from mstmm.ir.graph import Graph
+from mstmm.ir.spec import ElementSpec, Param
+from mstmm.ir.stored import element_from_json, element_to_json
 
 SPEC = element("drawn", random_kernel("first", 1), random_kernel("second", 2))
 NASTY = 'a "quoted" \\ back\\n slash ??/ trigraph */ end /* begin \x07 Größe\nline \\'

@@ -13,9 +13,9 @@ from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from mstmm.derive.audit.evaluate import evaluate
-from mstmm.graph import Graph, Node
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Port
-from mstmm.tangent import derivative
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.tangent import derivative
 
 DIGITS = 80
 Tree = Any

@@ -14,7 +14,7 @@ from support.random_kernels import INPUTS, element, random_inputs, random_kernel
 
 from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Statement, from_json, to_json
-from mstmm.tape import compile_tape
+from mstmm.ir.tape import compile_tape
 
 SEEDS = range(30)
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")

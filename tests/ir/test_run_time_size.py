@@ -10,12 +10,12 @@ import pytest
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
-from mstmm.graph import Graph
 from mstmm.ir import LOOP_INDEX, Element, KernelIR, Port, Solve, Store, from_json, to_json
-from mstmm.spec import ElementSpec
-from mstmm.tape import compile_tape
+from mstmm.ir.graph import Graph
+from mstmm.ir.spec import ElementSpec
+from mstmm.ir.tape import compile_tape
 
 SIZES = (0, 1, 3, 17)
 NOT_DEFINITE = 9

@@ -19,10 +19,10 @@ from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Sol
 from mstmm.derive.lower.kernel import lower
 from mstmm.derive.show.ir import listing
 from mstmm.errors import NumericalFailure
-from mstmm.graph import Graph
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json
+from mstmm.ir.graph import Graph
+from mstmm.ir.tangent import tangent
 from mstmm.runtime.kernels import vectorized
-from mstmm.tangent import tangent
 
 n = sp.Symbol("n", integer=True, positive=True)
 SIZES = (1, 2, 3, 4)

@@ -15,9 +15,9 @@ from support.complex_arithmetic import complex_step
 from support.random_kernels import random_inputs, random_kernel
 
 from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
-from mstmm.graph import Graph
 from mstmm.ir import Constant, KernelIR, Port, Store
-from mstmm.tangent import tangent
+from mstmm.ir.graph import Graph
+from mstmm.ir.tangent import tangent
 
 Arrays = dict[str, list[float]]
 

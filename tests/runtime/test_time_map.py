@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from mstmm.expression import Expression, parse
+from mstmm.expression.expression import Expression, parse
 from mstmm.runtime.breaks.acting import Acting
 from mstmm.runtime.breaks.enclosures import enclose, of_time
 from mstmm.runtime.breaks.intervals import Interval

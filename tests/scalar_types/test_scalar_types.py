@@ -11,8 +11,8 @@ from support.scalar_kernels import ScalarKernel
 
 from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
 from mstmm.derive.print.scalar_function import SCALARS, scalar_source
-from mstmm.graph import Graph
 from mstmm.ir import KernelIR, Port
+from mstmm.ir.graph import Graph
 
 #: What the type can hold, times the operations of a kernel and their conditioning.
 ACCURACY = {"float": 1e-4, "double": 1e-12, "quadruple": 1e-30}

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from reference.random_scenes import random_scene
 
-from mstmm.hinge_types import HINGE_TYPES, effort_unit
-from mstmm.rotations import norm
+from mstmm.ir.stored import element_from_json
+from mstmm.numbers.rotations import norm
 from mstmm.scene import Hinge, Scene, load_scene
-from mstmm.scene_law import SpringLaw
-from mstmm.stored import element_from_json
+from mstmm.scene.tables.hinge_types import HINGE_TYPES, effort_unit
+from mstmm.scene.tables.law import SpringLaw
 from scene.scenes import arm, body, changed, hinge, one
 
 ROOT = Path(__file__).parents[2]
@@ -337,7 +337,7 @@ def test_schema_is_published_with_units() -> None:
 
 def test_reading_a_scene_loads_neither_numpy_nor_sympy() -> None:
     code = (
-        "import sys, mstmm.scene, mstmm.topology; "
+        "import sys, mstmm.scene, mstmm.scene.checks.topology; "
         "print([m for m in ('numpy', 'sympy', 'scipy', 'cffi', 'jinja2') if m in sys.modules])"
     )
     path = [*sys.path, str(ROOT)]

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from mstmm import topology
 from mstmm.errors import SceneError
-from mstmm.expression import parse
+from mstmm.expression.expression import parse
 from mstmm.scene import Scene, load_scene
-from mstmm.scene_shapes import ShapeFunction, shape_at
-from mstmm.scene_skeleton import rigid_beam
+from mstmm.scene.checks import topology
+from mstmm.scene.tables.rigid import rigid_beam
+from mstmm.scene.tables.shapes import ShapeFunction, shape_at
 from scene.scenes import Data, bladed, hinge
 
 WHOLE = """

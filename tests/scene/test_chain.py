@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from mstmm import topology
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
+from mstmm.scene.checks import topology
 from scene.scenes import Data, arm, body, hinge
 
 LINK = {key: value for key, value in body().items() if key != "name"}

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import mpmath as mp
 import pytest
 
-from mstmm.drive import motion_at
-from mstmm.expression import parse
-from mstmm.expression_parser import Term
+from mstmm.expression.drive import motion_at
+from mstmm.expression.expression import parse
+from mstmm.expression.parser import Term
 
 MP: dict[str, Callable[..., mp.mpf]] = {
     "neg": lambda a: -a, "add": lambda a, b: a + b, "sub": lambda a, b: a - b,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from mstmm import topology
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
+from mstmm.scene.checks import topology
 from scene.scenes import Data
 
 ROOT: Data = {"plane": [1, 0, 0, 0.0]}

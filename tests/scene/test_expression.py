@@ -9,11 +9,11 @@ import time
 
 import pytest
 
-from mstmm.drive import value
 from mstmm.errors import ExpressionError
-from mstmm.expression import Expression, Name, number, parse
-from mstmm.expression_parser import FUNCTIONS
-from mstmm.graph import Graph, Node
+from mstmm.expression.drive import value
+from mstmm.expression.expression import Expression, Name, number, parse
+from mstmm.expression.parser import FUNCTIONS
+from mstmm.ir.graph import Graph, Node
 
 T, X, Y = 0.37, 1.9, -0.6
 VALUES = {"t": T, "x": X, "y": Y, "q[1]": 2.5, "arm.q": 0.2, "rod1.tip.vx": -3.0}

@@ -7,10 +7,10 @@ import math
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mstmm.drive import value
 from mstmm.errors import ExpressionError
-from mstmm.expression import parse
-from mstmm.graph import Graph
+from mstmm.expression.drive import value
+from mstmm.expression.expression import parse
+from mstmm.ir.graph import Graph
 
 PIECES = st.sampled_from(
     "0 1 2.5 1e3 1e308 1e999 .5 pi t q u q[0] arm.q[1] rod.tip.x sin( cos( atan2( min( max( where( "

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mstmm import rotations as r
+from mstmm.numbers import rotations as r
 
 
 def test_roll_pitch_yaw_is_about_fixed_axes_in_turn(rng: np.random.Generator) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from mstmm import topology
 from mstmm.errors import SceneError
 from mstmm.scene import Body, Hinge, Scene
+from mstmm.scene.checks import topology
 from scene.scenes import Data, body, hinge
 
 

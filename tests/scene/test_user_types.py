@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from mstmm.errors import SceneError
+from mstmm.ir.spec import ElementSpec, Param
 from mstmm.scene import Scene, load_scene
-from mstmm.spec import ElementSpec, Param
 from scene.scenes import arm, body, changed, hinge, one
 
 KNEE = ElementSpec(

@@ -12,10 +12,10 @@ from typing import Any
 
 import cffi
 
-from mstmm import abi
+from mstmm.border import elements as abi
 from mstmm.derive.print.render import write_generated
-from mstmm.spec import ElementSpec
-from mstmm.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
+from mstmm.ir.spec import ElementSpec
+from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 
 #: C17 with every warning an error; no contraction and no functions folded by the compiler, so that
 #: each operation rounds as in Python.

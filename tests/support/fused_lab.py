@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.border.fused import FLAGS
 from mstmm.derive.print.scene import function_text, support
 from mstmm.derive.print.straight_line import LANES, NUMBERS
-from mstmm.fused_abi import FLAGS
 from mstmm.ir import KernelIR
 
 Array = NDArray[np.float64]

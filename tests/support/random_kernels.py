@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 
-from mstmm.graph import Graph, Node
 from mstmm.ir import OPERATIONS, KernelIR, Port
-from mstmm.spec import ElementSpec, Param
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.spec import ElementSpec, Param
 
 INPUTS = (Port("x", (4,)), Port("A", (2, 3)))
 

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 import mstmm
+from mstmm.bridge.compilation import generate_published
 from mstmm.cli.app import app
-from mstmm.compilation import generate_published
 from mstmm.derive.catalogue.registry import published
 
 MODULE = """

@@ -11,7 +11,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import mstmm
-from mstmm.crosscheck import crosscheck_definition
+from mstmm.bridge.crosscheck import crosscheck_definition
 from mstmm.derive import ForceElement, Hinge, Param, rotation_about
 from mstmm.derive.audit.definition import check
 from mstmm.derive.language.switches import slope

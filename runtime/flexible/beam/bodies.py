@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.scene_parts import Load
+from mstmm.scene.tables.loads import Load
 
 from ..computable import computed
 from ..definiteness import stays_definite
@@ -28,7 +28,7 @@ from .shape_fields import DIRECTIONS, Mode
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
-    from mstmm.scene_beam import Beam
+    from mstmm.scene.tables.beam import Beam
 
 
 class BeamBodies:

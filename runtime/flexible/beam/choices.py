@@ -38,7 +38,7 @@ from .holding import Holding
 from .static_shapes import stiffness_of
 
 if TYPE_CHECKING:
-    from mstmm.scene_beam import Beam
+    from mstmm.scene.tables.beam import Beam
 
 BENDING = ("y", "z")
 _NATURAL = {CLAMPED_FREE: "tangent", SIMPLY_SUPPORTED: "chord", FREE_FREE: "mean"}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 if TYPE_CHECKING:
-    from mstmm.scene_beam import Beam
+    from mstmm.scene.tables.beam import Beam
 
 
 @dataclass(frozen=True)

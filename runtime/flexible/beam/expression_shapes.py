@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.expression import Expression, Name
-from mstmm.graph import Graph, Node
-from mstmm.tangent import derivative
+from mstmm.expression.expression import Expression, Name
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.tangent import derivative
 
 #: Operations that numpy has under another name than the expressions' own meaning.
 _VECTORISED: dict[str, Any] = {

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.scene_flexible_checks import free_axes
-from mstmm.scene_parts import Load, Spring
-from mstmm.scene_rules import split
+from mstmm.scene.checks.flexible import free_axes
+from mstmm.scene.rules.values import split
+from mstmm.scene.tables.loads import Load, Spring
 
 from .data import BeamData
 from .static_shapes import stiffness_of
 
 if TYPE_CHECKING:
     from mstmm.scene import Chain, Scene
-    from mstmm.scene_beam import Beam
-    from mstmm.scene_hinge_table import Hinge
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.hinge import Hinge
 
 #: Deflection along y turns the section about z, along z about y, and twist turns it about x.
 AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.ir import KernelIR
-from mstmm.stored import element_from_json
+from mstmm.ir.stored import element_from_json
 
 from ...kernels import vectorized
 

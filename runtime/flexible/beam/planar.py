@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.scene_rules import GROUND, split
+from mstmm.scene.rules.values import GROUND, split
 
 if TYPE_CHECKING:
-    from mstmm.expression import Expression
+    from mstmm.expression.expression import Expression
     from mstmm.scene import Scene
-    from mstmm.scene_hinge_table import Hinge
-    from mstmm.scene_parts import Load
+    from mstmm.scene.tables.hinge import Hinge
+    from mstmm.scene.tables.loads import Load
 
 #: Angles, and heights relative to the largest, below this are rounding.
 _ROUNDING = 1e-9

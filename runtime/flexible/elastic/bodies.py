@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.scene_rules import GROUND, split
+from mstmm.scene.rules.values import GROUND, split
 
 from ...host.apart import apart
 from ..computable import computed
@@ -34,7 +34,7 @@ from .prestress import SecondOrder, second_order
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
-    from mstmm.scene_elastic import Elastic
+    from mstmm.scene.tables.elastic import Elastic
 
 __all__ = [
     "elastic_bodies", "elastic_body", "modal_body", "model_of", "rigid_of", "save_matrices",

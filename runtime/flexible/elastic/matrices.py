@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.scene_errors import near
+from mstmm.scene.rules.messages import near
 
 from ...host.files import read_arrays, refuse_special
 from .model import ElasticModel

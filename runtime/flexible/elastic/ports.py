@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from mstmm.arrays import Array, Integers
-from mstmm.rotations import from_orientation
-from mstmm.scene_errors import near
+from mstmm.numbers.rotations import from_orientation
+from mstmm.scene.rules.messages import near
 
 from .model import ElasticModel, rigid_columns
 

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from mstmm.errors import SceneError
-from mstmm.expression import Expression, parse
-from mstmm.rotations import rows, to_quaternion
+from mstmm.expression.expression import Expression, parse
+from mstmm.numbers.rotations import rows, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split
-from mstmm.scene_body import End
-from mstmm.scene_parts import Load
+from mstmm.scene.tables.body import End
+from mstmm.scene.tables.loads import Load
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import MassPoint, ModalPort

@@ -16,17 +16,17 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.expression import Expression, parse
-from mstmm.rotations import Matrix, to_quaternion
+from mstmm.expression.expression import Expression, parse
+from mstmm.numbers.rotations import Matrix, to_quaternion
 from mstmm.scene import Body, End, Hinge, Load, Scene, Spring, split
-from mstmm.scene_skeleton import rigid_beam
+from mstmm.scene.tables.rigid import rigid_beam
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
 
 if TYPE_CHECKING:
-    from mstmm.scene_beam import Beam
-    from mstmm.scene_elastic import Elastic
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.elastic import Elastic
 
     from ...flexible.elastic.ports import Port
 
@@ -188,7 +188,7 @@ def _times(entry: Expression, length: float) -> Expression:
 
 
 def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
-    from mstmm.scene_beam import Beam
+    from mstmm.scene.tables.beam import Beam
 
     from ...flexible.beam.bodies import beam_body
     from ...flexible.elastic.bodies import modal_body
@@ -199,7 +199,7 @@ def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
 
 
 def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
-    from mstmm.scene_beam import Beam
+    from mstmm.scene.tables.beam import Beam
 
     from ...flexible.elastic.bodies import rigid_of
 

@@ -11,7 +11,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
-from mstmm.scene_errors import near
+from mstmm.scene.rules.messages import near
 
 from .loads import LineLoad, PointLoad
 from .motion import Motion

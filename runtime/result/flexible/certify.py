@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
-from mstmm.scene_lines import lines
+from mstmm.scene.checks.welded import lines
 
 from ...flexible.parts import slices
 from . import estimators as e

@@ -9,8 +9,8 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.hinge_types import HINGE_TYPES
 from mstmm.scene import split
+from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ...engine.compiled import Compiled
 from ...pack.flexible.rigidified import with_level

@@ -1,0 +1,1 @@
+"""What joins derivation and numbers: compiling a scene, fusing it, and comparing both."""

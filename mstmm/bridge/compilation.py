@@ -1,0 +1,148 @@
+"""Scene -> Model: chooses the engine and says why.  With `crosscheck`, the bridge between rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import ElementError, SceneError
+from ..ir.spec import ElementSpec
+from ..scene import Scene
+from ..scene.tables.hinge_types import HINGE_TYPES
+
+if TYPE_CHECKING:
+    from ..derive.catalogue.registry import Element
+    from ..runtime.model.model import Model
+    from ..runtime.pack.bodies import Known
+    from ..runtime.pack.packed import Packed
+
+ENGINES = ("auto", "fused", "looped")
+SWEEPS = ("riccati", "product")
+
+
+@dataclass(frozen=True)
+class Generated:
+    """An element of the kernel store: its kernels, its folder, and how it runs."""
+
+    spec: ElementSpec
+    folder: Path
+    how: str
+
+
+def compile_scene(
+    scene: Scene,
+    engine: str = "auto",
+    sweep: str = "riccati",
+    accuracy: float = 1e-8,
+    bake: bool = False,
+    flexibility: str | None = None,
+) -> Model:
+    """Model of a scene, ready to compute.
+
+    Args:
+        scene: validated scene (`load_scene`, or `Scene(...)`).
+        engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
+            of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
+            up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
+            is used, and a run or batch long enough to repay the compiler has it built.
+        sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
+            matrices, chains only, guarded).
+        accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
+            largest acceleration, that is not an error.
+        bake: with "fused", make the scene's numbers part of the code instead of reading them at run
+            time: somewhat faster, but other parameters need the compiler again.
+        flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
+            the run, then respond elastically to its motion and loads) or "rigid"; None takes each
+            body's own `model`.
+
+    Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
+    leave a motion of the start undetermined; EnvironmentFailure if engine="fused" and there is no
+    compiler or it fails.
+    """
+    if engine not in ENGINES:
+        raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
+    if sweep not in SWEEPS:
+        raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
+    if not accuracy > 0:
+        raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
+    from ..runtime.kernels import store
+    from ..runtime.model.model import Model
+    from ..runtime.pack.flexible.rigidified import with_level
+    from .fusion import MOST_ASKED, MOST_BODIES, Fusion
+
+    scene = with_level(scene, flexibility)
+
+    elements, definitions = store.known(store.needed(scene))
+    scene.check_types(definitions)
+    product = accuracy if sweep == "product" else None
+    if engine == "fused" and product is not None:
+        raise SceneError('sweep = "product" has no fused code; use engine = "auto" or "looped"')
+    if bake and engine != "fused":
+        raise SceneError(
+            "bake = True writes the numbers of the scene into its code; "
+            'it goes with engine = "fused"'
+        )
+    refused = "asked for" if engine == "looped" else ""
+    most = MOST_ASKED if engine == "fused" else MOST_BODIES
+
+    def fusing(packed: Packed, known: Known) -> Fusion:
+        return Fusion(packed, known, definitions, refused, bake, most)
+
+    model = Model(scene, elements, fusing, product)
+    model.refuse_undetermined_start()
+    if engine == "fused":
+        model.fusion.build()
+    elif engine == "auto":
+        model.fusion.find()
+    return model
+
+
+def generate(elements: Iterable[Element]) -> list[Generated]:
+    """Check, derive, generate and compile elements into the user's kernel store.
+
+    Raises ElementError naming the equation that is wrong, EnvironmentFailure if the store cannot be
+    written.  A name that a built-in element has is refused.
+    """
+    from ..derive.audit.definition import check
+    from ..derive.catalogue.registry import kind_of
+    from ..derive.catalogue.specs import spec_of
+    from ..derive.print.render import element_source, header
+    from ..runtime.kernels import prebuilt, store
+
+    made = []
+    for element in elements:
+        kind, name = kind_of(element), element.name
+        if (kind, name) in prebuilt.elements() or (kind == "hinge" and name in HINGE_TYPES):
+            raise ElementError(f"{kind} {name!r} is built in; choose another name")
+        check(element)
+        spec = spec_of(element)
+        files = {"mstmm.h": header(), f"{spec.kind}_{spec.name}.c": element_source(spec)}
+        place, how = store.keep(spec, files)
+        made.append(Generated(spec, place, how))
+    return made
+
+
+def generate_file(path: str | Path) -> list[Generated]:
+    """`generate` for every element that a Python file defines.  The file is executed: trust it."""
+    from ..derive.catalogue.registry import load_file
+
+    return generate(load_file(path))
+
+
+def generate_published() -> list[Generated]:
+    """`generate` for every element that installed packages publish as entry points.
+
+    The group is "mstmm.elements"; an entry names a class or a module of classes.
+    """
+    from ..derive.catalogue.registry import published
+
+    return generate(element for _, elements in published() for element in elements)
+
+
+def register(element: type[Element]) -> Generated:
+    """Make a hinge, body or force element of your own known to scenes by its name."""
+    from ..derive.catalogue.registry import instance
+
+    return generate([instance(element)])[0]

@@ -1,0 +1,290 @@
+"""The fused code of one scene: looked for in the cache, built when that pays, or out of reach.
+
+Together with `compilation` this joins the rooms: the structure and the numbers come from runtime,
+the text from derive, the library from the cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..border import columns as columns_abi
+from ..border.fused import ABI, FLAGS, TUNING
+from ..errors import ElementError, EnvironmentFailure, SceneError
+from ..ir import KernelIR, from_json
+from ..ir.spec import ElementSpec
+from ..ir.structure import BodyStructure, Key, Structure
+from ..runtime.kernels.columns import ColumnsLibrary, open_columns
+from ..runtime.kernels.fused import FusedLibrary, open_library
+from ..runtime.libraries.cache import Built, Recipe, find, opened
+from ..runtime.pack.structure import structure_of
+
+if TYPE_CHECKING:
+    from ..derive.fuse.scene import Fused
+    from ..runtime.pack.bodies import Known
+    from ..runtime.pack.packed import Packed
+
+#: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
+#: asks for it: the compiler's time grows with their square while the advantage shrinks.
+MOST_BODIES = 64
+#: More than this are not fused at all: the compiler would take many minutes.
+MOST_ASKED = 400
+#: Seconds that a compiler takes for the scalar code, by bodies and their square, and seconds that
+#: one evaluation saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
+#: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
+_SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.1, 0.03, 0.0015
+_SAVED_PER_BODY = 6e-8
+#: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
+_MODES_PER_BODY = 24
+
+#: What decides the text besides structure and kernels: the folders that print it.
+PRINTERS = {
+    "mstmm": ("border", "ir"),
+    "mstmm.derive": ("fuse", "print"),
+}
+
+
+class Fusion:
+    """Fused libraries of one packed scene; `numbers` is the vector p that they read."""
+
+    def __init__(
+        self,
+        packed: Packed,
+        known: Known,
+        definitions: Mapping[Key, ElementSpec],
+        obstacle: str = "",
+        bake: bool = False,
+        most: int = MOST_BODIES,
+    ) -> None:
+        self._definitions = definitions
+        self.obstacle = obstacle or _obstacle(packed, most)
+        self._looped_by_nature = bool(self.obstacle)
+        self.library: FusedLibrary | None = None
+        self.lanes: FusedLibrary | None = None
+        self.note = ""
+        self._insisted = False  # engine="fused": batches too
+        if not self.obstacle:
+            self.structure, self.numbers = structure_of(packed, known, bake)
+
+    def find(self) -> FusedLibrary | None:
+        """The scalar library if it is in the cache; no compiler is started."""
+        return self._get("scalar", build=False)
+
+    def build(self) -> FusedLibrary:
+        """The scalar library, compiled if it is not in the cache.
+
+        Raises SceneError if such a scene has no fused code, EnvironmentFailure if there is no
+        compiler or it fails.
+        """
+        self._insisted = True
+        found = self._get("scalar", build=True)
+        if found is None and self._looped_by_nature:
+            raise SceneError(
+                f'scene: no fused code: {self.obstacle}; use engine = "auto" or "looped"'
+            )
+        if found is None:
+            raise EnvironmentFailure(f"this scene cannot be fused: {self.obstacle}")
+        return found
+
+    def follow(self, other: Fusion) -> None:
+        """Take over the libraries of the same scene with other numbers.
+
+        Where a structural zero was touched another library is needed: it is compiled if the other
+        had one, and without a compiler the scene falls back to the looped engine and says so.
+        """
+        if self.obstacle or other.obstacle:
+            return
+        if self.structure == other.structure:
+            self.library, self.lanes, self.note = other.library, other.lanes, other.note
+        elif other.library is not None:
+            try:
+                self.build()
+            except EnvironmentFailure as error:
+                self.obstacle = str(error)
+
+    def ready(self, evaluations: float) -> FusedLibrary | None:
+        """The scalar library if it is there, or if so many evaluations are worth a compiler run."""
+        return self._ready("scalar", evaluations)
+
+    def ready_lanes(self, evaluations: float) -> FusedLibrary | None:
+        """The same for the library that computes several states side by side.
+
+        After `build` it is made whatever the number of evaluations; raises EnvironmentFailure if
+        it cannot be.
+        """
+        if self._insisted:
+            return self._get("lanes", build=True)
+        return self._ready("lanes", evaluations)
+
+    def _ready(self, part: str, evaluations: float) -> FusedLibrary | None:
+        found = self._get(part, build=False)
+        if found is None and not self.obstacle and evaluations > self._break_even():
+            try:
+                found = self._get(part, build=True)
+            except EnvironmentFailure as error:
+                self.obstacle = self.note = str(error)
+        return found
+
+    def _break_even(self) -> float:
+        modes = modes_at(self.structure)
+        n = sum(1 + count**2 / _MODES_PER_BODY for count in modes)
+        seconds = _SECONDS + n * (_SECONDS_PER_BODY + n * _SECONDS_PER_PAIR)
+        return seconds / (_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
+
+    def _get(self, part: str, build: bool) -> FusedLibrary | None:
+        attribute = "library" if part == "scalar" else "lanes"
+        found: FusedLibrary | None = getattr(self, attribute)
+        if found is not None or self.obstacle:
+            return found
+        recipe = self._recipe(part)
+        try:
+            if build or find(recipe) is not None:
+                found, built = opened(recipe, open_library)
+                self.note = _note(built)
+        except EnvironmentFailure:
+            if build:
+                raise
+        setattr(self, attribute, found)
+        return found
+
+    def _recipe(self, part: str) -> Recipe:
+        identity = {
+            "structure": self.structure.identity(), "part": part, "abi": str(ABI),
+            "printers": _printers_hash(), "kernels": _manifest_hash(),
+        }  # fmt: skip
+        sources = partial(self._sources, part)
+        return Recipe("fused", identity, sources, FLAGS, optional=TUNING)
+
+    def _sources(self, part: str, key: str) -> dict[str, str]:
+        from ..derive.print.scene import fused_sources
+
+        return fused_sources(self.fused(self.structure), key, part)
+
+    def columns(
+        self,
+        structure: Structure,
+        kernels: Callable[[], Sequence[KernelIR]],
+        what: str,
+        build: bool,
+    ) -> ColumnsLibrary | None:
+        """The library of tangent kernels (`what` names them) of a structure; None if there is none.
+
+        Without `build` it is only looked for.  Raises EnvironmentFailure if it cannot be built.
+        """
+        if self.obstacle:
+            return None
+
+        def sources(key: str) -> dict[str, str]:
+            from ..derive.print.columns import columns_sources
+
+            return columns_sources(kernels(), key)
+
+        identity = {
+            "structure": structure.identity(), "part": f"columns {what}",
+            "abi": str(columns_abi.ABI), "printers": _printers_hash(), "kernels": _manifest_hash(),
+        }  # fmt: skip
+        recipe = Recipe("columns", identity, sources, FLAGS, (columns_abi.SYMBOL,), TUNING)
+        if not build and find(recipe) is None:
+            return None
+        return opened(recipe, open_columns)[0]
+
+    def fused(self, structure: Structure) -> Fused:
+        """The IR of a structure whose elements this scene has; no compiler, no cache."""
+        from ..derive.fuse.scene import fuse
+
+        return fuse(structure, kernels_of(self._definitions))
+
+
+def modes_at(structure: Structure) -> list[int]:
+    """Body by body, how many modes of a flexible body its own equations or connection carry."""
+
+    def count(body: BodyStructure) -> int:
+        frame = body if body.section is None else structure.bodies[body.section.frame]
+        return 0 if frame.modal is None or body.idle else frame.modal.n
+
+    return [count(body) for body in structure.bodies]
+
+
+def _note(built: Built) -> str:
+    more = f"; {built.note}" if built.note else ""
+    if built.how == "cached":
+        return f"its code was in the cache{more}"
+    return f"its code was compiled in {built.seconds:.2f} s and kept{more}"
+
+
+def _obstacle(packed: Packed, most: int) -> str:
+    """Why a scene is not fused; empty if it can be."""
+    count = int(packed.model.n_bodies)
+    if packed.releases:
+        names = ", ".join(f'"{name}"' for name in packed.releases)
+        return f"hinge {names} is released during the run, which changes the structure"
+    if count > most:
+        asked = f' ({MOST_ASKED} with engine = "fused")' if most < MOST_ASKED else ""
+        return f"it has {count} bodies; fused code is for {most} at most{asked}"
+    if packed.model.product != packed.ffi.NULL:
+        return "the product of classical matrices is looped"
+    if any(packed.model.bodies[i].tape != packed.ffi.NULL for i in range(count)):
+        return "a hinge is interpreted because it was generated without a compiler"
+    return ""
+
+
+def printers() -> list[Path]:
+    """The files in the folders named by PRINTERS, in the order of their names."""
+    folders = [
+        Path(str(files(room).joinpath(name))) for room in PRINTERS for name in PRINTERS[room]
+    ]
+    return [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+
+
+@cache
+def _printers_hash() -> str:
+    found = hashlib.sha256()
+    for path in printers():
+        found.update(path.read_bytes())
+    for path in sorted(Path(str(files("mstmm.templates"))).glob("fused_*.c")):
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+@cache
+def _manifest_hash() -> str:
+    return hashlib.sha256(
+        files("mstmm.generated").joinpath("manifest.json").read_bytes()
+    ).hexdigest()
+
+
+def kernels_of(definitions: Mapping[Key, ElementSpec]) -> Callable[[Key, str], KernelIR]:
+    """Kernels by element and name: of users' definitions, else of the prebuilt elements.
+
+    The function raises ElementError if there is no such kernel.
+    """
+
+    def kernel(key: Key, name: str) -> KernelIR:
+        if key not in definitions:
+            return _prebuilt(key, name)
+        for found in definitions[key].kernels:
+            if found.name == name:
+                return found
+        raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
+
+    return kernel
+
+
+@cache
+def _stored(key: Key) -> dict[str, Any]:
+    text = files("mstmm.generated").joinpath(f"{key[0]}_{key[1]}.json").read_text(encoding="utf-8")
+    return {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
+
+
+@cache
+def _prebuilt(key: Key, name: str) -> KernelIR:
+    found = _stored(key).get(name)
+    if found is None:
+        raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
+    return from_json(json.dumps(found))

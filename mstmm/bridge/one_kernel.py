@@ -1,0 +1,29 @@
+"""One KernelIR -> a compiled function in float, double or quadruple precision.
+
+Joins the rooms like `compilation`: the text comes from derive, the library from the cache.
+"""
+
+from __future__ import annotations
+
+from hashlib import sha256
+
+from ..border.scalars import FLAGS, NEEDS, SCALARS, SYMBOL
+from ..derive.print.scalar_library import library_source
+from ..ir import KernelIR
+from ..runtime.kernels.scalar import ScalarKernel
+from ..runtime.libraries.cache import Recipe, opened
+
+
+def compile_kernel(kernel: KernelIR, scalar: str = "double") -> ScalarKernel:
+    """A straight-line kernel in "float", "double" or "quadruple" (IEEE binary128) precision.
+
+    Raises ValueError for another scalar type or a kernel of run-time size, EnvironmentFailure if
+    there is no compiler or it does not have the type.
+    """
+    if scalar not in SCALARS:
+        raise ValueError(f"scalar type {scalar!r}: there are {', '.join(SCALARS)}")
+    text = library_source(kernel, scalar)
+    identity = {"text": sha256(text.encode()).hexdigest(), "scalar": scalar}
+    flags = (*FLAGS, *NEEDS.get(scalar, ()))
+    recipe = Recipe("kernel", identity, lambda key: {"kernel.c": text}, flags, (SYMBOL,))
+    return opened(recipe, lambda path, key: ScalarKernel(kernel, scalar, path))[0]

@@ -1,0 +1,262 @@
+"""Expressions of scene files: numbers, names, + - * / ^, comparisons, `pi` and a few functions.
+
+`parse` turns text into a frozen `Expression`; `Expression.build` puts it into a
+`mstmm.ir.graph.Graph`, from where it reaches the tape, C, and its exact derivatives like every
+derived equation.  Nothing is ever evaluated as Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+
+from ..errors import ExpressionError
+from ..ir.terms import Node, Terms
+from .parser import FUNCTIONS, MAX_LENGTH, MEANING, Name, Parser, Term
+
+__all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
+
+#: Operations that change branch where their argument, or the difference of the two, is zero.
+SWITCHES = frozenset({"sign", "abs", "lt", "le", "gt", "ge", "min", "max"})
+
+_SYMBOLS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_Line = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.  Two are equal when their texts are.
+
+    `names` are the names it refers to, each once, in the order of the text; `terms` is the flat
+    syntax tree (arguments before the operation), `root` the number of the outermost term.
+    """
+
+    text: str
+    names: tuple[Name, ...] = field(compare=False)
+    terms: tuple[Term, ...] = field(compare=False, repr=False)
+    root: int = field(compare=False, repr=False)
+
+    # --- what it depends on -------------------------------------------------------------------
+
+    @property
+    def is_constant(self) -> bool:
+        """True when no name occurs in it."""
+        return not self.names
+
+    @property
+    def constant(self) -> float | None:
+        """The value of a constant expression, else None."""
+        return self.terms[self.root].constant
+
+    @property
+    def is_zero(self) -> bool:
+        """True for an expression that is exactly the constant zero."""
+        return self.terms[self.root].constant == 0
+
+    @property
+    def depends_on_time_only(self) -> bool:
+        """True when `t` is the only name in it (constants included)."""
+        return all(name.parts == ("t",) and name.index is None for name in self.names)
+
+    @property
+    def is_condition(self) -> bool:
+        """True when the whole expression is a comparison."""
+        return self.terms[self.root].is_condition
+
+    @property
+    def comparison(self) -> tuple[Expression, str, Expression] | None:
+        """(left, "<" | "<=" | ">" | ">=", right) of a top-level comparison, else None."""
+        top = self.terms[self.root]
+        if not top.is_condition:
+            return None
+        left, right = (self._part(i) for i in top.args)
+        return left, _SYMBOLS[top.op], right
+
+    def _part(self, root: int) -> Expression:
+        term = self.terms[root]
+        needed = self._needed(root)
+        names = _distinct(t.name for i, t in enumerate(self.terms) if i in needed and t.name)
+        # `text` was stripped before parsing, so that positions point into it.
+        return Expression(self.text[term.start : term.end], names, self.terms, root)
+
+    @property
+    def needed(self) -> frozenset[int]:
+        """Numbers of the terms that the value depends on."""
+        return frozenset(self._needed(self.root))
+
+    def _needed(self, root: int) -> set[int]:
+        needed: set[int] = set()
+        stack = [root]
+        while stack:
+            number = stack.pop()
+            needed.add(number)
+            stack.extend(self.terms[number].args)
+        return needed
+
+    # --- meaning --------------------------------------------------------------------------------
+
+    def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
+        """The expression as a node of `graph`; `resolve` gives the node of each name.
+
+        A comparison becomes 1 where it holds and 0 elsewhere.
+        """
+        return self.nodes(graph, resolve)[self.root]
+
+    def nodes(self, graph: Terms, resolve: Callable[[Name], Node]) -> dict[int, Node]:
+        """The nodes of all terms that the value depends on, by their numbers."""
+        nodes: dict[int, Node] = {}
+        needed = self._needed(self.root)
+        for number, term in enumerate(self.terms):
+            if number in needed:
+                nodes[number] = _node(graph, term, [nodes[i] for i in term.args], resolve)
+        return nodes
+
+    def evaluate(self, values: Callable[[Name], float]) -> float:
+        """Value in double precision; nan or an infinity where the mathematics has none."""
+        known: dict[int, float] = {}
+        needed = self._needed(self.root)
+        for number, term in enumerate(self.terms):
+            if number not in needed:
+                continue
+            if term.constant is not None:
+                known[number] = term.constant
+            elif term.name is not None:
+                known[number] = float(values(term.name))
+            else:
+                known[number] = _apply(term.op, [known[i] for i in term.args])
+        return known[self.root]
+
+    def time_breaks(self) -> tuple[float, ...]:
+        """Times, ascending, at which the expression switches exactly: where a comparison, sign,
+        abs, min or max of something linear in `t` alone changes side."""
+        times = (time for time in self.linear_switches().values() if time is not None)
+        return tuple(sorted(set(times)))
+
+    def linear_switches(self) -> dict[int, float | None]:
+        """Term -> the time at which it switches, for what compares straight lines in `t` alone;
+        None for one that never switches."""
+        lines: list[_Line | None] = []
+        needed = self._needed(self.root)
+        found: dict[int, float | None] = {}
+        for number, term in enumerate(self.terms):
+            args = [lines[i] for i in term.args]
+            lines.append(_line(term, args))
+            known = [line for line in args if line is not None]
+            switches = term.op in SWITCHES and term.constant is None and number in needed
+            if switches and len(known) == len(args):
+                found[number] = _switch(term.op, known)
+        return found
+
+
+def parse(text: str, where: str = "") -> Expression:
+    """Parse `text`; `where` (file, element, key) begins every message.
+
+    Raises ExpressionError with the position marked and one way out.
+    """
+    try:
+        return _parse(_checked(text))
+    except ExpressionError as error:
+        raise ExpressionError(f"{where}: {error}" if where else str(error)) from None
+
+
+def _checked(text: object) -> str:
+    if not isinstance(text, str):
+        raise ExpressionError(f"an expression is text, not {type(text).__name__}")
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(
+            f"the expression has {len(text)} characters, the limit is {MAX_LENGTH}; "
+            "split it over several loads, or shorten it"
+        )
+    stripped = text.strip(" \t\r\n")
+    if not stripped:
+        raise ExpressionError("the expression is empty; write 0 for nothing")
+    return stripped
+
+
+def number(value: float) -> Expression:
+    """The expression that is this finite number."""
+    return _parse(repr(float(value)))
+
+
+@lru_cache(maxsize=4096)
+def _parse(text: str) -> Expression:
+    parser = Parser(text)
+    root = parser.run()
+    names = _distinct(term.name for term in parser.terms if term.name is not None)
+    return Expression(text, names, tuple(parser.terms), root)
+
+
+def _distinct(names: object) -> tuple[Name, ...]:
+    return tuple(dict.fromkeys(names))  # type: ignore[call-overload]
+
+
+# --- terms as nodes, numbers and straight lines ---------------------------------------------------
+
+
+def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], Node]) -> Node:
+    if term.exact is not None:
+        return graph.constant(term.exact)
+    if term.name is not None:
+        return resolve(term.name)
+    if term.op == "pi":
+        return graph.pi
+    if term.op == "where":
+        return graph.select(*args)
+    if term.op in ("gt", "ge"):
+        return graph.call("lt" if term.op == "gt" else "le", args[1], args[0])
+    return graph.call(term.op, *args)
+
+
+def _apply(op: str, args: list[float]) -> float:
+    try:
+        return float(MEANING[op](*args))
+    except ZeroDivisionError:
+        return float("nan") if args[0] == 0 else float("inf")
+    except OverflowError:
+        return float("inf")
+    except ValueError:
+        return float("nan")
+
+
+def _line(term: Term, args: list[_Line | None]) -> _Line | None:
+    """(slope, offset) of a term that is slope*t + offset and nothing else."""
+    if term.constant is not None:
+        return Fraction(0), term.exact if term.exact is not None else Fraction(term.constant)
+    if term.name is not None:
+        is_time = term.name.parts == ("t",) and term.name.index is None
+        return (Fraction(1), Fraction(0)) if is_time else None
+    lines = [line for line in args if line is not None]
+    if len(lines) < len(args) or any(_is_long(line) for line in lines):
+        return None
+    if term.op == "neg":
+        return -lines[0][0], -lines[0][1]
+    if term.op in ("add", "sub"):
+        sign = 1 if term.op == "add" else -1
+        return lines[0][0] + sign * lines[1][0], lines[0][1] + sign * lines[1][1]
+    if term.op == "mul":
+        one, other = lines if lines[0][0] == 0 else reversed(lines)
+        return (one[1] * other[0], one[1] * other[1]) if one[0] == 0 else None
+    if term.op == "div" and lines[1][0] == 0 and lines[1][1] != 0:
+        return lines[0][0] / lines[1][1], lines[0][1] / lines[1][1]
+    return None
+
+
+def _is_long(line: _Line) -> bool:
+    """Products of many long constants: not worth an exact time."""
+    return any(max(abs(x.numerator), x.denominator).bit_length() > 8000 for x in line)
+
+
+def _switch(op: str, lines: list[_Line]) -> float | None:
+    """Time at which an operation on straight lines changes branch."""
+    if op in ("sign", "abs"):
+        slope, offset = lines[0]
+    else:
+        slope, offset = lines[0][0] - lines[1][0], lines[0][1] - lines[1][1]
+    if slope == 0:
+        return None
+    try:
+        return float(-offset / slope)
+    except OverflowError:
+        return None

@@ -1,0 +1,413 @@
+"""Text of the small expression grammar -> a flat list of terms.  No recursion, no eval.
+
+    comparison := sum [("<" | "<=" | ">" | ">=") sum]
+    sum        := product {("+" | "-") product}
+    product    := factor {("*" | "/") factor}
+    factor     := ("-" | "+") factor | power
+    power      := atom ["^" factor]                      (right associative: 2^3^2 = 2^9)
+    atom       := number | "pi" | name | function "(" comparison {"," comparison} ")" | "(" .. ")"
+    name       := word [place] {"." word} ["[" whole number "]"]
+    place      := "[" (whole number | "last") "]"        (of a chain's member, as in rope[3].tip.x)
+
+An operator stack (shunting yard) replaces the call stack, so that no text can overflow it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from ..errors import ExpressionError
+
+MAX_LENGTH = 4000
+MAX_DEPTH = 100
+MAX_WORD = 64
+#: An exact constant is kept as a fraction up to this many bits, and rounded to double beyond.
+_MAX_BITS = 2100
+
+#: Function name -> number of arguments (None: two or more).
+FUNCTIONS: dict[str, int | None] = {
+    "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "atan2": 2, "sinh": 1,
+    "cosh": 1, "tanh": 1, "exp": 1, "log": 1, "sqrt": 1, "abs": 1, "sign": 1, "min": None,
+    "max": None, "where": 3,
+}  # fmt: skip
+
+COMPARISONS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
+_OPERATORS = {"+": ("add", 2), "-": ("sub", 2), "*": ("mul", 3), "/": ("div", 3), "^": ("pow", 5)}
+_PREFIX_PRECEDENCE = 4
+
+_TOKEN = re.compile(
+    r"(?P<space>[ \t\r\n]+)"
+    r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\[(?:[0-9]{1,8}|last)\](?=\.))?"
+    r"(?:\.[A-Za-z_][A-Za-z0-9_]*)*(?:\[[0-9]{1,6}\])?)"
+    r"|(?P<symbol><=|>=|[-+*/^<>(),])"
+)
+_WAYS_OUT = {
+    "**": "write ^ for a power",
+    "=": "a comparison is one of < <= > >=",
+    "!": "a comparison is one of < <= > >=",
+    "&": "nest where(condition, a, b) to combine conditions",
+    "|": "nest where(condition, a, b) to combine conditions",
+    "[": "an index follows its name directly and is a whole number, as in q[0]",
+    "]": "an index follows its name directly and is a whole number, as in q[0]",
+    "%": "the functions are " + ", ".join(FUNCTIONS),
+    "\N{MINUS SIGN}": "write the plain - of the keyboard",
+    "\N{MIDDLE DOT}": "write * for a product",
+    "\N{MULTIPLICATION SIGN}": "write * for a product",
+    "'": "an expression holds no text",
+    '"': "an expression holds no text",
+}
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1.
+
+    Of a chain's members there are `rope[3].tip.x` and `rope[3].hinge.q`.
+    """
+
+    parts: tuple[str, ...]
+    index: int | None = None
+    position: int = field(default=0, compare=False)
+
+    @property
+    def text(self) -> str:
+        """The name as it is written."""
+        return ".".join(self.parts) + ("" if self.index is None else f"[{self.index}]")
+
+    @property
+    def owner(self) -> str:
+        """Hinge or body the name belongs to; "" for `t`, the own `q`, `u` and parameters."""
+        return self.parts[0] if len(self.parts) > 1 else ""
+
+    @property
+    def hinge(self) -> str:
+        """Hinge whose `q` or `u` it is, "shoulder" or "rope[3].hinge"; "" for the own ones."""
+        return ".".join(self.parts[:-1])
+
+    @property
+    def is_member(self) -> bool:
+        """True where it begins with the member of a chain."""
+        return self.parts[0].endswith("]")
+
+    @property
+    def quantity(self) -> str:
+        """Last part: t, q, u, x, y, z, vx, vy, vz or the name of a parameter."""
+        return self.parts[-1]
+
+
+@dataclass(frozen=True)
+class Term:
+    """One operation; `args` point to earlier terms of the same list.
+
+    `op` is number, pi, name, a comparison (lt le gt ge), an arithmetic operation or a function.
+    `exact` is the rational value of a constant term, `constant` its value in double precision.
+    """
+
+    op: str
+    args: tuple[int, ...]
+    start: int
+    end: int
+    exact: Fraction | None = None
+    constant: float | None = None
+    name: Name | None = None
+
+    @property
+    def is_condition(self) -> bool:
+        return self.op in ("lt", "le", "gt", "ge")
+
+
+def _power(base: float, exponent: float) -> float:
+    return math.pow(base, exponent)
+
+
+def _sign(x: float) -> float:
+    return float((x > 0) - (x < 0))
+
+
+#: What each operation means in double precision.
+MEANING: dict[str, Callable[..., float]] = {
+    "neg": lambda a: -a, "add": lambda a, b: a + b, "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b, "div": lambda a, b: a / b, "pow": _power,
+    "lt": lambda a, b: float(a < b), "le": lambda a, b: float(a <= b),
+    "gt": lambda a, b: float(a > b), "ge": lambda a, b: float(a >= b),
+    "where": lambda c, a, b: a if c != 0 else b, "abs": abs, "sign": _sign, "min": min, "max": max,
+    "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "tan": math.tan, "asin": math.asin,
+    "acos": math.acos, "atan": math.atan, "atan2": math.atan2, "sinh": math.sinh,
+    "cosh": math.cosh, "tanh": math.tanh, "exp": math.exp, "log": math.log,
+}  # fmt: skip
+
+_EXACT: dict[str, Callable[..., Fraction]] = {
+    "neg": lambda a: -a, "add": lambda a, b: a + b, "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b, "div": lambda a, b: a / b, "abs": abs, "min": min, "max": max,
+    "lt": lambda a, b: Fraction(a < b), "le": lambda a, b: Fraction(a <= b),
+    "gt": lambda a, b: Fraction(a > b), "ge": lambda a, b: Fraction(a >= b),
+    "where": lambda c, a, b: a if c != 0 else b,
+    "sign": lambda a: Fraction((a > 0) - (a < 0)),
+}  # fmt: skip
+
+
+@dataclass
+class _Pending:
+    """An operator, or an open parenthesis (op "(" or the function's name), that waits."""
+
+    op: str
+    precedence: int
+    position: int
+    arguments: int = 0
+    is_group: bool = False
+
+
+class Parser:
+    """Parses one text; `terms` and `root` are the outcome of `run`."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.terms: list[Term] = []
+        self._operands: list[tuple[int, int, int]] = []  # term, start and end with parentheses
+        self._waiting: list[_Pending] = []
+        self._depth = 0
+
+    def error(self, message: str, position: int) -> ExpressionError:
+        """The error with its position marked by an arrow in a piece of the text."""
+        before, after = self.text[max(0, position - 30) : position], self.text[position:]
+        before = ("..." if position > 30 else "") + before
+        after = after[:30] + ("..." if len(after) > 30 else "")
+        shown = f"{before} -->{after}".encode("unicode_escape").decode("ascii")
+        return ExpressionError(f"{message} (character {position + 1}: {shown.strip()})")
+
+    # --- the loop over tokens ---------------------------------------------------------------
+
+    def run(self) -> int:
+        """Parse everything; the number of the outermost term."""
+        expects_operand, position = True, 0
+        while position < len(self.text):
+            match = _TOKEN.match(self.text, position)
+            if match is None:
+                raise self._unknown_character(position)
+            kind, token = str(match.lastgroup), match.group()
+            if kind != "space":
+                if expects_operand:
+                    expects_operand, end = self._operand(kind, token, position, match.end())
+                else:
+                    expects_operand, end = self._operator(kind, token, position), match.end()
+                position = end
+            else:
+                position = match.end()
+        if expects_operand:
+            raise self.error("the expression ends where a value is expected", len(self.text))
+        self._reduce_to_group()
+        if self._waiting:
+            opened = self._waiting[-1].position
+            raise self.error("this parenthesis is never closed: add )", opened)
+        return self._operands[-1][0]
+
+    def _unknown_character(self, position: int) -> ExpressionError:
+        character = self.text[position]
+        way_out = _WAYS_OUT.get(character, "see the grammar: numbers, names, + - * / ^, functions")
+        return self.error(f"{character!a} is not part of an expression; {way_out}", position)
+
+    def _operand(self, kind: str, token: str, start: int, end: int) -> tuple[bool, int]:
+        """A value is expected here: (still expecting a value, where to go on)."""
+        if kind == "number":
+            self._push(self._number(token, start, end), start, end)
+            return False, end
+        if kind == "name":
+            return self._word(token, start, end)
+        if token == "(":
+            self._open("(", start)
+        elif token == "-":
+            self._waiting.append(_Pending("neg", _PREFIX_PRECEDENCE, start))
+        elif token == ")" and self._waiting and self._waiting[-1].is_group:
+            raise self.error("a value is missing before )", start)
+        elif token == "*" and self.text[max(0, start - 1) : start] == "*":
+            raise self.error(_WAYS_OUT["**"], start - 1)
+        elif token != "+":
+            raise self.error(f"a value is expected before {token}", start)
+        return True, end
+
+    def _word(self, token: str, start: int, end: int) -> tuple[bool, int]:
+        follows = end
+        while follows < len(self.text) and self.text[follows] in " \t\r\n":
+            follows += 1
+        if follows < len(self.text) and self.text[follows] == "(":
+            if token not in FUNCTIONS:
+                raise self.error(f"unknown function {token[:MAX_WORD]!r}; {_near(token)}", start)
+            self._open(token, start)
+            return True, follows + 1
+        if token == "pi":
+            self._push(Term("pi", (), start, end, constant=math.pi), start, end)
+            return False, end
+        if token in FUNCTIONS:
+            raise self.error(f"the function {token} needs its argument in parentheses", end)
+        self._push(Term("name", (), start, end, name=self._name(token, start)), start, end)
+        return False, end
+
+    def _name(self, token: str, start: int) -> Name:
+        words, bracket, index = token, "", ""
+        if token.endswith("]"):
+            words, bracket, index = token.rpartition("[")
+        parts = tuple(words.split("."))
+        if len(parts) > 3:
+            raise self.error("a name has at most three parts, as in body.end.x", start)
+        if any(len(part.partition("[")[0]) > MAX_WORD for part in parts):
+            raise self.error(f"a word has at most {MAX_WORD} characters", start)
+        return Name(parts, int(index[:-1]) if bracket else None, start)
+
+    def _operator(self, kind: str, token: str, start: int) -> bool:
+        """A value has just ended: an operator, a comma or a closing parenthesis may follow."""
+        if kind != "symbol" or token == "(":
+            raise self.error("an operator is missing here: write * for a product", start)
+        if token == ")":
+            self._close(start)
+            return False
+        if token == ",":
+            self._comma(start)
+            return True
+        op, precedence = _OPERATORS.get(token) or (COMPARISONS[token], 1)
+        while self._waiting and not self._waiting[-1].is_group:
+            top = self._waiting[-1].precedence
+            if precedence == 1 and top == 1:
+                raise self.error("comparisons cannot be chained; nest where(..) instead", start)
+            if top < precedence or (top == precedence and token == "^"):
+                break
+            self._reduce()
+        self._waiting.append(_Pending(op, precedence, start))
+        return True
+
+    # --- groups and functions ---------------------------------------------------------------
+
+    def _open(self, op: str, start: int) -> None:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise self.error(f"more than {MAX_DEPTH} nested parentheses", start)
+        self._waiting.append(_Pending(op, 0, start, is_group=True))
+
+    def _reduce_to_group(self) -> None:
+        while self._waiting and not self._waiting[-1].is_group:
+            self._reduce()
+
+    def _comma(self, start: int) -> None:
+        self._reduce_to_group()
+        if not self._waiting or self._waiting[-1].op == "(":
+            raise self.error(
+                "a comma separates the arguments of a function only; write decimals with a point",
+                start,
+            )
+        self._waiting[-1].arguments += 1
+
+    def _close(self, start: int) -> None:
+        self._reduce_to_group()
+        if not self._waiting:
+            raise self.error("this parenthesis was never opened", start)
+        group = self._waiting.pop()
+        self._depth -= 1
+        if group.op == "(":
+            term, _, _ = self._operands.pop()
+            self._operands.append((term, group.position, start + 1))
+            return
+        count, wanted = group.arguments + 1, FUNCTIONS[group.op]
+        if count != wanted and not (wanted is None and count >= 2):
+            takes = "two or more arguments" if wanted is None else _count(wanted)
+            raise self.error(f"{group.op} takes {takes}, not {count}", group.position)
+        arguments = self._operands[-count:]
+        del self._operands[-count:]
+        # min(a, b, c) is min(min(a, b), c)
+        groups = [arguments]
+        if wanted is None:
+            groups = [arguments[:2], *([a] for a in arguments[2:])]
+        for members in groups:
+            numbers = [m[0] for m in members]
+            if members is not groups[0]:
+                numbers.insert(0, len(self.terms) - 1)
+            self._make(group.op, tuple(numbers), group.position, group.position, start + 1)
+        self._operands.append((len(self.terms) - 1, group.position, start + 1))
+
+    # --- making terms -------------------------------------------------------------------------
+
+    def _push(self, term: Term, start: int, end: int) -> None:
+        self.terms.append(term)
+        self._operands.append((len(self.terms) - 1, start, end))
+
+    def _number(self, token: str, start: int, end: int) -> Term:
+        value = float(token)
+        if math.isinf(value):
+            raise self.error("this number is too large (the limit is about 1.8e308)", start)
+        if value == 0:
+            if re.search("[1-9]", re.split("[eE]", token)[0]):
+                raise self.error("this number is too small (the limit is about 4.9e-324)", start)
+            return Term("number", (), start, end, Fraction(0), 0.0)
+        return Term("number", (), start, end, _limited(Fraction(token), value), value)
+
+    def _reduce(self) -> None:
+        pending = self._waiting.pop()
+        count = 1 if pending.op == "neg" else 2
+        members = self._operands[-count:]
+        del self._operands[-count:]
+        start = pending.position if count == 1 else members[0][1]
+        end = members[-1][2]
+        self._make(pending.op, tuple(m[0] for m in members), pending.position, start, end)
+        self._operands.append((len(self.terms) - 1, start, end))
+
+    def _make(self, op: str, args: tuple[int, ...], mark: int, start: int, end: int) -> None:
+        terms = [self.terms[i] for i in args]
+        for number, term in enumerate(terms):
+            wants_condition = op == "where" and number == 0
+            if term.is_condition and not wants_condition:
+                raise self.error(
+                    "a comparison is not a number here; write where(condition, 1, 0)", term.start
+                )
+            if wants_condition and not term.is_condition:
+                raise self.error(
+                    "where(condition, a, b) begins with a comparison such as t < 1", term.start
+                )
+        if op == "div" and terms[1].constant == 0:
+            raise self.error("division by zero", mark)
+        exact, constant = self._fold(op, terms, mark)
+        self.terms.append(Term(op, args, start, end, exact, constant))
+
+    def _fold(self, op: str, terms: list[Term], mark: int) -> tuple[Fraction | None, float | None]:
+        """Value of an operation on constants: (exact if rational and short, double)."""
+        values = [t.constant for t in terms if t.constant is not None]
+        if len(values) < len(terms):
+            return None, None
+        try:
+            value = float(MEANING[op](*values))
+        except (ArithmeticError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.error(f"this {_WORDS.get(op, op)} has no finite real value", mark)
+        exact = [t.exact for t in terms if t.exact is not None]
+        if len(exact) < len(terms):
+            return None, value
+        if op == "pow":
+            base, exponent = exact
+            if exponent.denominator != 1 or abs(exponent) > 16:
+                return None, value
+            return _limited(base ** int(exponent), value), value
+        return (_limited(_EXACT[op](*exact), value) if op in _EXACT else None), value
+
+
+_WORDS = {"pow": "power", "add": "sum", "sub": "difference", "mul": "product", "div": "quotient"}
+
+
+def _limited(exact: Fraction, value: float) -> Fraction:
+    """The exact number, or the nearest double where its digits would grow without bound."""
+    bits = max(exact.numerator.bit_length(), exact.denominator.bit_length())
+    return exact if bits <= _MAX_BITS else Fraction(value)
+
+
+def _count(number: int) -> str:
+    return "one argument" if number == 1 else f"{number} arguments"
+
+
+def _near(name: str) -> str:
+    close = difflib.get_close_matches(name[:MAX_WORD].lower(), FUNCTIONS, n=1, cutoff=0.5)
+    if close:
+        return f"did you mean {close[0]}?"
+    return "the functions are " + ", ".join(FUNCTIONS)

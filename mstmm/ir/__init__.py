@@ -1,0 +1,41 @@
+"""KernelIR: the one intermediate form between derived equations and everything that computes.
+
+A kernel is a list of scalar statements in single-assignment order over typed inputs and outputs.
+It holds plain text and whole numbers only (no SymPy), is frozen, hashable, and stored as JSON.
+
+Shapes are whole numbers, or one declared size symbol `n` (modal sizes).  With `n` present there
+are three loops and no others: an indexed sum over k < n or l < n, a store over k, l or both, and
+the primitive `solve`.  A sum may stand inside another loop over the other letter, so that loops are
+at most two deep.  There are no branches except `select` and guards.
+
+With `n` present an output that is complete (every entry stored, or solved for) and does not
+accumulate may be read by the statements behind.
+"""
+
+from __future__ import annotations
+
+from .kernel import KernelIR, assignments, check, from_json, to_json
+from .statements import (
+    INNER_INDEX,
+    LOOP_INDEX,
+    LOOPS,
+    OPERATIONS,
+    Assign,
+    Constant,
+    Element,
+    Guard,
+    Inner,
+    Operand,
+    Port,
+    Solve,
+    Statement,
+    Store,
+    Sum,
+    Temporary,
+)
+
+__all__ = [
+    "INNER_INDEX", "LOOPS", "LOOP_INDEX", "OPERATIONS", "Assign", "Constant", "Element", "Guard",
+    "Inner", "KernelIR", "Operand", "Port", "Solve", "Statement", "Store", "Sum", "Temporary",
+    "assignments", "check", "from_json", "to_json",
+]  # fmt: skip

@@ -1,0 +1,48 @@
+"""ElementSpec: one element as numbers and text, ready to print as C.  No SymPy."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+from .kernel import KernelIR
+
+#: Entry points in which installed packages name their elements: a class, or a module of them.
+ENTRY_POINTS = "mstmm.elements"
+
+
+@dataclass(frozen=True)
+class Param:
+    """A named number of an element: unit in SI, bounds inclusive, None where there is none."""
+
+    name: str
+    unit: str = ""
+    meaning: str = ""
+    default: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+@dataclass(frozen=True)
+class ElementSpec:
+    """What generation needs of an element: its coordinates, parameters and kernels.
+
+    `kind` is one of hinge, body, force, law, sweep, classical.
+    """
+
+    kind: str
+    name: str
+    title: str
+    coordinates: tuple[Param, ...]
+    speeds: tuple[Param, ...]
+    parameters: tuple[Param, ...]
+    kernels: tuple[KernelIR, ...]
+    sources: tuple[str, ...] = ()
+
+    def hash(self) -> str:
+        """SHA-256 over everything that reaches the C file."""
+        parts = [self.kind, self.name]
+        for group in (self.coordinates, self.speeds, self.parameters):
+            parts += [f"{p.name}|{p.unit}" for p in group]
+        parts += [kernel.hash() for kernel in self.kernels]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -1,0 +1,49 @@
+"""Stored form of an ElementSpec: one JSON file an element, kernels as `ir.to_json` writes them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import astuple
+
+from .kernel import KernelIR, from_json, to_json
+from .spec import ElementSpec, Param
+
+
+def element_to_json(spec: ElementSpec) -> str:
+    """The same bytes on every machine; `element_from_json` is the inverse."""
+    head = {
+        "kind": spec.kind,
+        "name": spec.name,
+        "title": spec.title,
+        "sources": list(spec.sources),
+        "coordinates": [list(astuple(p)) for p in spec.coordinates],
+        "speeds": [list(astuple(p)) for p in spec.speeds],
+        "parameters": [list(astuple(p)) for p in spec.parameters],
+    }
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+    kernels = ",\n".join(to_json(kernel).rstrip("\n") for kernel in spec.kernels)
+    return "{\n" + ",\n".join(lines) + ',\n"kernels": [\n' + kernels + "\n]}\n"
+
+
+def element_from_json(text: str) -> ElementSpec:
+    """The element again.  ValueError if the text is not JSON, or a kernel in it is refused."""
+    data = json.loads(text)
+    groups = {
+        group: tuple(Param(*entry) for entry in data[group])
+        for group in ("coordinates", "speeds", "parameters")
+    }
+    return ElementSpec(
+        kind=data["kind"],
+        name=data["name"],
+        title=data["title"],
+        kernels=tuple(from_json(json.dumps(kernel)) for kernel in data["kernels"]),
+        sources=tuple(data["sources"]),
+        **groups,
+    )
+
+
+def kernel_from_json(text: str, name: str) -> KernelIR:
+    """One kernel of a stored element, without making the others.  KeyError if it has none of this
+    name, ValueError as above."""
+    stored = {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
+    return from_json(json.dumps(stored[name]))

@@ -1,0 +1,193 @@
+"""From nodes to statements: what the outputs of a graph need, in dependency order, each once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from .statements import (
+    LOOPS,
+    Assign,
+    Constant,
+    Element,
+    Guard,
+    Inner,
+    Operand,
+    Port,
+    Solve,
+    Statement,
+    Store,
+    Sum,
+    Temporary,
+)
+from .terms import LOOP_BITS, Node, Number, Terms
+
+
+@dataclass(frozen=True)
+class GuardRequest:
+    """Leave with `code` unless `condition` holds."""
+
+    condition: Node
+    code: int
+    message: str
+
+
+@dataclass(frozen=True)
+class StoreRequest:
+    """Write an output; `value` as `Graph.kernel` takes it."""
+
+    port: Port
+    value: object
+
+
+class _Level:
+    """What stands inside the same loops: statements, and operands known there."""
+
+    def __init__(self, loops: int, outer: _Level | None, statements: list[Any]) -> None:
+        self.loops, self.outer, self.statements = loops, outer, statements
+        self.known: dict[int, Operand] = {}
+
+    def home(self, node: Node) -> _Level:
+        """The outermost level that runs through every loop which `node` depends on."""
+        level = self
+        while level.outer is not None and not node.loops & ~level.outer.loops:
+            level = level.outer
+        return level
+
+
+class Writer:
+    """Emits nodes in dependency order, each once, with temporaries numbered densely."""
+
+    def __init__(self, graph: Terms) -> None:
+        self.graph = graph
+        self.statements: list[Statement] = []
+        self._outside = _Level(0, None, self.statements)
+        self._next = 0
+
+    def _number(self) -> int:
+        self._next += 1
+        return self._next - 1
+
+    def operand(self, node: Node) -> Operand:
+        return self._emit(node, self._outside)
+
+    def request(self, request: GuardRequest | Solve | StoreRequest) -> None:
+        if isinstance(request, Solve):
+            self.statements.append(request)
+        elif isinstance(request, StoreRequest):
+            self.store(request.port, request.value)
+        else:
+            condition = self.operand(request.condition)
+            self.statements.append(Guard(condition, request.code, request.message))
+
+    def as_made(
+        self, guards: Iterable[GuardRequest], outputs: Iterable[Port], values: dict[str, object]
+    ) -> None:
+        """Everything in the order of the nodes' numbers."""
+        waiting: dict[int, list[Callable[[], Statement]]] = {}
+        roots: list[Node] = []
+
+        def wait(node: Node, statement: Callable[[], Statement]) -> None:
+            roots.append(node)
+            waiting.setdefault(node.number, []).append(statement)
+
+        for g in guards:
+            wait(g.condition, lambda g=g: Guard(self.operand(g.condition), g.code, g.message))  # type: ignore[misc]
+        for port in outputs:
+            for index, entry in _flatten(values[port.name], port.shape):
+                node = self.graph.node(entry)  # type: ignore[arg-type]
+                wait(node, lambda p=port.name, i=index, n=node: Store(p, i, self.operand(n)))  # type: ignore[misc]
+        for node in sorted(_behind(roots), key=lambda n: n.number):
+            self.operand(node)
+            self.statements += [statement() for statement in waiting.get(node.number, ())]
+
+    def _leaf(self, node: Node) -> Operand | None:
+        if isinstance(node.leaf, Fraction):
+            return Constant(str(node.leaf))
+        if isinstance(node.leaf, Element):
+            return node.leaf
+        return Constant("pi") if node.op == "pi" else None
+
+    def _emit(self, root: Node, level: _Level) -> Operand:
+        """What depends on a loop goes inside; what does not is computed before the loop."""
+        stack = [root]
+        while stack:
+            node = stack[-1]
+            home = level.home(node)
+            if node.number in home.known:
+                stack.pop()
+                continue
+            leaf = self._leaf(node)
+            if leaf is not None:
+                home.known[node.number] = leaf
+                continue
+            if node.op == "sum":
+                home.known[node.number] = self._emit_sum(node, home)
+                continue
+            missing = [a for a in node.args if a.number not in level.home(a).known]
+            if missing:
+                stack.extend(reversed(missing))
+                continue
+            number = self._number()
+            operands = tuple([level.home(a).known[a.number] for a in node.args])
+            home.statements.append(Assign(number, node.op, operands))
+            home.known[node.number] = Temporary(number)
+        return level.home(root).known[root.number]
+
+    def _emit_sum(self, node: Node, home: _Level) -> Operand:
+        over = str(node.leaf)
+        if home.loops & LOOP_BITS[over]:
+            raise ValueError(
+                "loops are nested more than two deep; store an inner product as an output first"
+            )
+        inner = _Level(home.loops | LOOP_BITS[over], home, [])
+        value = self._emit(node.args[0], inner)
+        number = self._number()
+        home.statements.append(Sum(number, tuple(inner.statements), value, over))
+        return Temporary(number)
+
+    def store(self, port: Port, value: object) -> None:
+        for index, entry in _flatten(value, port.shape):
+            if entry is None:
+                continue
+            node = self.graph.node(entry)
+            loops = sum(LOOP_BITS[letter] for letter in LOOPS if letter in index)
+            if loops:
+                level = _Level(loops, self._outside, [])
+                operand = self._emit(node, level)
+                body: tuple[Inner, ...] = tuple(level.statements)
+                self.statements.append(Store(port.name, index, operand, body))
+            else:
+                self.statements.append(Store(port.name, index, self.operand(node)))
+
+
+def _behind(roots: Iterable[Node]) -> list[Node]:
+    """`roots` and everything that they are made of."""
+    found: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        node = stack.pop()
+        if node.number not in found:
+            found[node.number] = node
+            stack.extend(node.args)
+    return list(found.values())
+
+
+def _flatten(
+    value: object, shape: tuple[int | str, ...], letters: tuple[str, ...] = LOOPS
+) -> list[tuple[tuple[int | str, ...], Node | Number | None]]:
+    """Entries with their indices; along a run-time size one value stands for all k (l) < n."""
+    if not shape:
+        return [((), value)]  # type: ignore[list-item]
+    if isinstance(shape[0], str):
+        inside = _flatten(value, shape[1:], letters[1:])
+        return [((letters[0], *rest), v) for rest, v in inside]
+    if not isinstance(value, (list, tuple)) or len(value) != shape[0]:
+        raise ValueError(f"{value!r} does not fill the shape {shape}")
+    return [
+        ((i, *rest), v)
+        for i, entry in enumerate(value)
+        for rest, v in _flatten(entry, shape[1:], letters)
+    ]

@@ -1,0 +1,1 @@
+"""Numbers without numpy: rotations, and numbers with their derivatives."""

@@ -1,0 +1,25 @@
+"""The public face of scenes: the tables that a scene is built from, and how one is read."""
+
+from __future__ import annotations
+
+from .files.read import read
+from .load import load_scene
+from .rules.values import split
+from .scene import Scene
+from .tables.beam import Beam
+from .tables.beam_keys import Modes, Section, Shapes
+from .tables.body import Body, End
+from .tables.chain import Chain
+from .tables.elastic import Elastic
+from .tables.elastic_keys import Arrays, Box, ElasticEnd
+from .tables.flexible import Damping, Start
+from .tables.hinge import Hinge
+from .tables.hinge_keys import Initial
+from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
+from .tables.loads import Event, Load, Spring
+
+__all__ = [
+    "Arrays", "Beam", "Body", "Box", "Chain", "Damping", "Elastic", "ElasticEnd", "End", "Event",
+    "Friction", "Hinge", "Initial", "Law", "LawEntry", "Limits", "Load", "Modes", "Scene",
+    "Section", "Shapes", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
+]  # fmt: skip

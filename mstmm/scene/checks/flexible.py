@@ -1,0 +1,260 @@
+"""Flexible bodies among the other elements of a scene: loads per length, hinges, frames, bases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import hypot, sqrt
+from typing import TYPE_CHECKING
+
+from ...numbers.rotations import Vector, apply, dot, norm, unit
+from ..rules.values import Location, split
+from .welded import lines as lines_of
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+    from ..tables.beam import Beam
+    from ..tables.hinge import Hinge
+
+Problem = tuple[Location, str]
+
+#: Length over height of the section below which shear and rotary inertia are no longer small.
+SLENDER = 10.0
+#: A direction counts as free to turn about when so much of it lies among the axes of the hinge.
+_MOSTLY = 0.7
+_ALONG: Vector = (1.0, 0.0, 0.0)
+#: Direction of deflection -> axis about which the beam turns with it.
+_TURNS: dict[str, Vector] = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0)}
+_AXES: tuple[Vector, ...] = (_ALONG, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_CF, _FF, _SS = "clamped-free", "free-free", "simply-supported"
+
+
+# --- loads per length -----------------------------------------------------------------------------
+
+
+def problems(scene: SceneTables) -> Iterator[Problem]:
+    """Everything in which flexible bodies and other elements do not fit each other."""
+    beams = {beam.name: beam for beam in scene.beam}
+    for i, load in enumerate(scene.load):
+        if load.force_per_length is None:
+            continue
+        beam = beams.get(load.on)
+        if beam is None:
+            if scene.skeleton.bodies.find(load.on) is not None:
+                message = f'"{load.on}" is no beam, and a load per length acts on beams alone; '
+                yield ("load", i, "on"), message + "write force at one of its ends"
+            continue
+        if load.span is not None and load.span[1] > beam.length * (1 + 1e-9):
+            yield (
+                ("load", i, "span"),
+                f'expected a part of the beam "{beam.name}", 0 to {beam.length:g} m, found '
+                f"[{load.span[0]:g}, {load.span[1]:g}]",
+            )
+        if load.name in beam.ends:
+            yield (
+                ("load", i, "name"),
+                f'"{load.name}" is also an end of the beam "{beam.name}"; name the load otherwise',
+            )
+
+
+# --- what hinges leave free -----------------------------------------------------------------------
+
+
+def spins(scene: SceneTables) -> Iterator[Problem]:
+    """Beams without inertia about their axis where a hinge lets them spin about it."""
+    carriers = {name for name, _ in _carried(scene)}
+    released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
+    released |= {event.hinge for event in scene.event if event.hinge is not None}
+    for i, beam, hinge in _held(scene):
+        if any(piece.polar_inertia_per_length is not None for piece in beam.sections):
+            continue
+        rotor = any(hinge.law.inertia)
+        if beam.name in carriers or rotor:
+            continue
+        free = _share(beam, hinge, _ALONG, hinge.name in released) > 1 - 1e-9
+        if free and hinge.type != "screw":
+            yield (
+                ("beam", i, "polar_inertia_per_length"),
+                f'missing; hinge "{hinge.name}" lets the beam spin about its axis and nothing '
+                "resists it; expected rho I_p in kg m, more than 0, or rotary_inertia, or "
+                "another hinge",
+            )
+
+
+def _held(scene: SceneTables) -> Iterator[tuple[int, Beam, Hinge]]:
+    """(number, beam, the hinge that holds it); checked to be one."""
+    holding = {hinge.outboard_body: hinge for hinge in scene.hinge}
+    for i, beam in enumerate(scene.beam):
+        if beam.name in holding:
+            yield i, beam, holding[beam.name]
+
+
+def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
+    """(body, end) of everything that a hinge or chain hangs on."""
+    for hinge in scene.hinge:
+        yield split(hinge.inboard)
+    for chain in scene.chain:
+        yield split(chain.inboard)
+
+
+def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
+    """Unit axes, in the axes of the outboard end at q = 0, about which a hinge of a built-in type
+    turns and is not driven, or, with `released`, turns once it is let go; none for a user's type.
+    """
+    if released and hinge.type == "fixed":
+        return _AXES
+    axis, axis2 = hinge.unit_axis, hinge.unit_axis2
+    turns: dict[str, dict[int, Vector]] = {
+        "pin": {0: axis}, "screw": {0: axis}, "cylindrical": {1: axis}, "planar": {2: axis},
+        "universal": {0: axis, 1: axis2 or axis}, "gimbal": dict(enumerate(_AXES)),
+        "ball": dict(enumerate(_AXES)), "free": dict(enumerate(_AXES)),
+        "elastic": dict(enumerate(_AXES)),
+    }  # fmt: skip
+    drive = () if released else hinge.drive or ()
+    return tuple(
+        direction
+        for k, direction in turns.get(hinge.type, {}).items()
+        if k >= len(drive) or drive[k] is None
+    )
+
+
+def _share(beam: Beam, hinge: Hinge, direction: Vector, released: bool = False) -> float:
+    """How much of a direction of the beam its hinge leaves free to turn about: 0 to 1."""
+    turn = beam.ends[hinge.outboard_end].rotation
+    return _within(direction, [apply(turn, axis) for axis in free_axes(hinge, released)])
+
+
+def _within(direction: Vector, axes: list[Vector]) -> float:
+    """Length of the part of a unit vector in the span of others."""
+    basis: list[Vector] = []
+    for axis in axes:
+        for known in basis:
+            along = dot(axis, known)
+            axis = (axis[0] - along * known[0], axis[1] - along * known[1],
+                    axis[2] - along * known[2])  # fmt: skip
+        if norm(axis) > 1e-9:
+            x, y, z = unit(axis)
+            basis.append((x, y, z))
+    return hypot(*(dot(direction, known) for known in basis))
+
+
+# --- warnings -------------------------------------------------------------------------------------
+
+
+def warnings(scene: SceneTables) -> Iterator[str]:
+    """What is accepted but worth knowing of flexible bodies."""
+    yield from short_beams(scene)
+    for body in (*scene.beam, *scene.elastic):
+        if max(body.damping.ratio) >= 1:
+            yield (
+                f"{_called(scene, body.name)}: damping: a ratio of {max(body.damping.ratio):g} is "
+                "critical or more; 0.01 is 1 percent"
+            )
+    for _, beam, hinge in _held(scene):
+        if beam.model != "rigid":
+            yield from _loose_frame(beam, hinge)
+    for beam in scene.beam:
+        if beam.model != "rigid":
+            yield from _weak_basis(scene, beam)
+    tangent = {e.name for e in scene.elastic if e.frame == "tangent" and e.model != "rigid"}
+    for hinge in scene.hinge:
+        if hinge.outboard_body in tangent and free_axes(hinge):
+            yield _loose(f'elastic "{hinge.outboard_body}"', hinge)
+
+
+def _called(scene: SceneTables, name: str) -> str:
+    word = "beam" if any(beam.name == name for beam in scene.beam) else "elastic"
+    return f'{word} "{name}"'
+
+
+def short_beams(scene: SceneTables) -> Iterator[str]:
+    """Beams that are short for their height; those welded in line are one, and named once."""
+    if not scene.beam:
+        return
+    lines, said = lines_of(scene), set[str]()
+    for beam in scene.beam:
+        height, direction, source = max(_heights(beam), default=(0.0, "", ""))
+        line = lines[beam.name]
+        if not 0 < line.length < SLENDER * height or line.first in said or beam.model == "rigid":
+            continue
+        said.add(line.first)
+        whole = "its length is" if line.length == beam.length else "the line it is welded into is"
+        yield (
+            f'beam "{beam.name}": {whole} {line.length / height:.2g} times the height of the '
+            f"section along {direction} ({height:.3g} m from {source}), less than {SLENDER:g}: "
+            "shear, which Euler-Bernoulli beams leave out, is not small; use an elastic body from "
+            "a mesh"
+        )
+
+
+def _heights(beam: Beam) -> Iterator[tuple[float, str, str]]:
+    """(height in m, direction, keys it comes from) of the sections, as of rectangles: sqrt(12)
+    times the radius of gyration, from rotary inertia or else from E I / E A."""
+    for piece in beam.sections:
+        rotary, bending = piece.rotary_inertia, piece.bending_stiffness
+        for k, direction in enumerate(("z", "y")):
+            if not _bends(beam, direction):
+                continue
+            if rotary is not None and piece.mass_per_length:
+                source = "rotary_inertia and mass_per_length"
+                yield sqrt(12 * rotary[k] / piece.mass_per_length), direction, source
+            elif rotary is None and bending is not None and piece.axial_stiffness:
+                source = "bending_stiffness and axial_stiffness"
+                yield sqrt(12 * bending[k] / piece.axial_stiffness), direction, source
+
+
+def _bends(beam: Beam, direction: str) -> bool:
+    return beam.modes is None or bool(getattr(beam.modes, direction))
+
+
+def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[str]:
+    """A tangent frame at an end that its hinge leaves free to turn."""
+    at = hinge.outboard_end
+    if beam.frame_kind != "tangent" or beam.frame_end not in ("", at) or beam.quadrature:
+        return
+    for direction, axis in _TURNS.items():
+        if _bends(beam, direction) and _share(beam, hinge, axis) > _MOSTLY:
+            yield _loose(f'beam "{beam.name}"', hinge)
+            return
+
+
+def _loose(body: str, hinge: Hinge) -> str:
+    return (
+        f'{body}: frame: a tangent frame at "{hinge.outboard_end}", which hinge "{hinge.name}" '
+        "leaves free to turn, keeps little inertia there: the more shapes, the smaller the steps; "
+        'write frame = "auto"'
+    )
+
+
+def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[str]:
+    """A basis asked for by name whose shapes have no bending moment where a hinge carries one."""
+    if beam.basis not in (_CF, _FF, _SS):
+        return
+    slack = 1e-9 * beam.length
+    for hinge in scene.hinge:
+        for reference in (hinge.inboard, hinge.outboard):
+            name, at = split(reference)
+            if name != beam.name:
+                continue
+            x = beam.end_x(at)
+            moment_free = x >= beam.length - slack or (x <= slack and beam.basis != _CF)
+            if moment_free and _carries_moment(beam, hinge, at, reference == hinge.outboard):
+                yield (
+                    f'beam "{beam.name}": basis: {beam.basis} shapes have no bending moment at '
+                    f'"{at}", but hinge "{hinge.name}" carries one there, so that they converge '
+                    'slowly; write basis = "static+fixed-interface" or "auto"'
+                )
+                return
+
+
+def _carries_moment(beam: Beam, hinge: Hinge, at: str, outboard: bool) -> bool:
+    """Does a hinge hold the section against turning in a plane in which the beam bends?"""
+    if hinge.builtin is None:
+        return False
+    turn = beam.ends[at].rotation
+    back = (lambda v: v) if outboard else (lambda v: apply(hinge.rotation, v))
+    axes = [apply(turn, back(axis)) for axis in free_axes(hinge)]
+    sprung = any(hinge.law.stiffness)
+    return any(
+        _bends(beam, direction) and (sprung or _within(axis, axes) < _MOSTLY)
+        for direction, axis in _TURNS.items()
+    )

@@ -1,0 +1,178 @@
+"""Elements of users' own types against their definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ...expression.expression import Expression
+from ...ir.spec import ElementSpec
+from ..rules.messages import Problem, near
+from ..rules.values import Location
+from ..tables.hinge_types import HINGE_TYPES, effort_unit
+from .names import index_problem
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+    from ..tables.hinge import HingeTable
+
+#: Table of the scene -> (kind of the definition, built-in types).
+_KINDS = {
+    "body": ("body", ("rigid",)),
+    "hinge": ("hinge", tuple(HINGE_TYPES)),
+    "spring": ("force", ("spring",)),
+}
+
+
+def tables(scene: SceneTables) -> Iterator[tuple[str, Location, Any]]:
+    """(kind of definition, place, table) of everything that has a type, patterns of chains too."""
+    for table, (kind, _) in _KINDS.items():
+        for i, element in enumerate(getattr(scene, table)):
+            yield kind, (table, i), element
+    for i, chain in enumerate(scene.chain):
+        for table in ("body", "hinge"):
+            for k, element in enumerate(getattr(chain, table)):
+                yield _KINDS[table][0], ("chain", i, table, k), element
+
+
+def types(scene: SceneTables) -> set[tuple[str, str]]:
+    """(kind, type) of everything in a scene."""
+    return {(kind, element.type) for kind, _, element in tables(scene)}
+
+
+def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
+    """Unknown types, and elements that do not fit the definition of their type."""
+    found: list[Problem] = []
+    builtin = dict(_KINDS.values())
+    for kind, place, element in tables(scene):
+        if element.type in builtin[kind]:
+            continue
+        spec = known.get((kind, element.type))
+        if spec is None:
+            mine = [name for k, name in known if k == kind]
+            found.append((
+                (*place, "type"),
+                f'there is no {kind} type "{element.type}"'
+                f"{near(element.type, [*builtin[kind], *mine])}",
+            ))  # fmt: skip
+        else:
+            found += _element(scene, place, element, spec)
+    return found
+
+
+def problems_with(scene: SceneTables, spec: ElementSpec) -> list[Problem]:
+    """What does not fit in the elements of this one type."""
+    return [
+        problem
+        for kind, place, element in tables(scene)
+        if kind == spec.kind and element.type == spec.name
+        for problem in _element(scene, place, element, spec)
+    ]
+
+
+def _element(
+    scene: SceneTables, place: Location, element: Any, spec: ElementSpec
+) -> Iterator[Problem]:
+    yield from _parameters(place, element.parameters, spec)
+    if spec.kind == "hinge":
+        yield from _counts(place, element, spec)
+        yield from _indices(scene, element, spec)
+
+
+def _parameters(
+    place: Location, given: Mapping[str, float], spec: ElementSpec
+) -> Iterator[Problem]:
+    known = {p.name: p for p in spec.parameters}
+    for name, value in given.items():
+        at = (*place, "parameters", name)
+        parameter = known.get(name)
+        if parameter is None:
+            yield at, f'{spec.name} has no parameter "{name}"{near(name, known)}'
+        elif parameter.minimum is not None and value < parameter.minimum:
+            yield at, f"expected {parameter.minimum:g} {parameter.unit} or more, found {value:g}"
+        elif parameter.maximum is not None and value > parameter.maximum:
+            yield at, f"expected {parameter.maximum:g} {parameter.unit} or less, found {value:g}"
+    for parameter in spec.parameters:
+        if parameter.default is None and parameter.name not in given:
+            unit = f" in {parameter.unit}" if parameter.unit else ""
+            meaning = f" ({parameter.meaning})" if parameter.meaning else ""
+            at = (*place, "parameters", parameter.name)
+            yield at, f"missing; expected a number{unit}{meaning}"
+
+
+def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
+    """Lengths of start values, drive and law."""
+    lists: list[tuple[Location, Any, int]] = []
+    if hinge.initial is not None:
+        lists.append((("initial", "q"), hinge.initial.q, len(spec.coordinates)))
+        lists.append((("initial", "u"), hinge.initial.u, len(spec.speeds)))
+    if hinge.drive is not None:
+        lists.append((("drive",), hinge.drive, len(spec.coordinates)))
+        if len(spec.coordinates) != len(spec.speeds):
+            yield (*place, "drive"), f"{spec.name} has speeds of its own and cannot be driven"
+    for key in type(hinge.law).model_fields:
+        values = getattr(hinge.law, key)
+        if len(values) > 1 or (values and not spec.speeds):
+            lists.append((("law", key), values, len(spec.speeds)))
+        elif values and len({s.unit for s in spec.speeds}) > 1:
+            units = ", ".join(effort_unit(s.unit) for s in spec.speeds)
+            yield (
+                (*place, "law", key),
+                f"one number cannot stand for efforts in {units}; "
+                f"give a list with {len(spec.speeds)} entries",
+            )
+    for at, values, count in lists:
+        if values is not None and len(values) != count:
+            yield (*place, *at), f"{spec.name} has {count} entries here, found {len(values)}"
+
+
+def _indices(scene: SceneTables, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
+    """Indices of this hinge's coordinates in all expressions of the scene."""
+    for place, expression, own in _all_expressions(scene):
+        for name in expression.names:
+            if name.quantity not in ("q", "u"):
+                continue
+            meant = own if len(name.parts) == 1 else _table(scene, name.hinge)
+            if meant is not hinge:
+                continue
+            entries = spec.coordinates if name.quantity == "q" else spec.speeds
+            message = index_problem(name, name.hinge or _called(scene, place), len(entries))
+            if message is not None:
+                yield place, message
+
+
+def _called(scene: SceneTables, place: Location) -> str:
+    """Name of the hinge at a place: of a chain's pattern, the first member that has it."""
+    if place[0] == "chain":
+        return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
+    return scene.hinge[int(place[1])].name
+
+
+def _table(scene: SceneTables, name: str) -> HingeTable | None:
+    """The table that describes the hinge of this name."""
+    index = scene.hinges.find(name)
+    if index is None or index < len(scene.hinge):
+        return None if index is None else scene.hinge[index]
+    chain, k = scene.hinges.member(index)
+    return scene.chain[chain].hinge_of(k)
+
+
+def _all_expressions(
+    scene: SceneTables,
+) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
+    """(place, expression, hinge whose q and u need no prefix)."""
+    for kind, place, table in tables(scene):
+        if kind == "hinge":
+            for k, effort in enumerate(table.law.effort):
+                yield (*place, "law", "effort", k), effort, table
+    for i, hinge in enumerate(scene.hinge):
+        if hinge.release is not None:
+            yield ("hinge", i, "release"), hinge.release, hinge
+    for i, load in enumerate(scene.load):
+        for key in ("force", "moment", "force_per_length"):
+            for k, entry in enumerate(getattr(load, key) or ()):
+                yield ("load", i, key, k), entry, None
+    for i, event in enumerate(scene.event):
+        yield ("event", i, "when"), event.when, None
+    for i, spring in enumerate(scene.spring):
+        yield ("spring", i, "law", "effort"), spring.law.effort, None

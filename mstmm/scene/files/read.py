@@ -1,0 +1,133 @@
+"""Reading scene files: TOML or JSON by suffix, a message for each kind of unreadable file."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from ...errors import SceneError
+from ..rules.messages import near
+
+#: Largest file in MB by ending: what is read and validated within about half a minute.
+MAX_SIZE = {".toml": 8, ".json": 64}
+#: Most parts of a dotted key: tables nest four deep, and each part costs all before it once more.
+MAX_PARTS = 64
+_LONG_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}+"""
+)
+
+
+def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
+    """(the path as messages show it, the tables of the file), not yet validated."""
+    try:
+        shown = os.fsdecode(os.fspath(path))
+    except TypeError:
+        raise SceneError(f"expected the path of a scene file, found {path!r:.60}") from None
+    where = shown if shown.isprintable() else ascii(shown)
+    suffix = Path(shown).suffix.lower()
+    if suffix not in (".toml", ".json"):
+        raise SceneError(
+            f"{where}: expected a scene file ending in .toml or .json; rename it if it is one"
+        )
+    text = _text(Path(shown), where)
+    data = _toml(text, where) if suffix == ".toml" else _json(text, where)
+    return where, data
+
+
+def _text(path: Path, where: str) -> str:
+    content = _content(path, where)
+    if not content.strip():
+        raise SceneError(f"{where}: the file is empty; a scene begins with gravity = [0, -9.81, 0]")
+    if b"\0" in content:
+        raise SceneError(f"{where}: this is a binary file; a scene is text (TOML or JSON)")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        number = content[: error.start].count(b"\n") + 1
+        raise SceneError(
+            f"{where}: line {number} is not UTF-8 text; save the file as UTF-8"
+        ) from None
+
+
+def _content(path: Path, where: str) -> bytes:
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise SceneError(f"{where}: this is a folder; name the scene file inside it")
+        if not stat.S_ISREG(status.st_mode):
+            raise SceneError(f"{where}: this is not a regular file; name a scene file")
+        ending = path.suffix.lower()
+        limit = MAX_SIZE[ending]
+        if status.st_size > limit * 2**20:
+            way_out = "build large scenes in Python, repeated bodies with [[chain]]"
+            if ending == ".toml":
+                way_out += f", or write JSON, up to {MAX_SIZE['.json']} MB"
+            raise SceneError(
+                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is {limit} MB; "
+                + way_out
+            )
+        with path.open("rb") as file:
+            return file.read(limit * 2**20 + 1)
+    except FileNotFoundError:
+        raise SceneError(f"{where}: there is no such file{_neighbour(path)}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"{where}: cannot be read: {reason}") from None
+
+
+def _neighbour(path: Path) -> str:
+    """A file beside the missing one with a similar name."""
+    try:
+        names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in (".toml", ".json")]
+    except OSError:
+        return "; check the folder"
+    hint = near(path.name, names)
+    return hint if "did you mean" in hint else "; check the path"
+
+
+def _toml(text: str, where: str) -> dict[str, Any]:
+    if long := _LONG_KEY.search(text):
+        raise SceneError(
+            f"{where}: line {text.count(chr(10), 0, long.start()) + 1}: a key of more than "
+            f"{MAX_PARTS} parts, {long.group()[:20]}...; tables of a scene nest four deep at most"
+        )
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        once = "Cannot overwrite a value" in str(error)
+        hint = "; tables that repeat take two brackets, as in [[hinge]]" if once else ""
+        raise SceneError(f"{where}: not valid TOML: {error}{hint}") from None
+    except RecursionError:
+        raise SceneError(f"{where}: lists or tables are nested too deeply") from None
+    except ValueError as error:
+        raise SceneError(f"{where}: not valid TOML: {error}") from None
+
+
+def _json(text: str, where: str) -> dict[str, Any]:
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        table: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in table:
+                raise SceneError(f"{where}: the key {key!r:.60} appears twice in one table")
+            table[key] = value
+        return table
+
+    def constant(name: str) -> Any:
+        raise SceneError(f"{where}: {name} is not a finite number; write a number")
+
+    try:
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
+    except json.JSONDecodeError as error:
+        raise SceneError(f"{where}: not valid JSON: {error}") from None
+    except RecursionError:
+        raise SceneError(f"{where}: lists or tables are nested too deeply") from None
+    except ValueError as error:
+        raise SceneError(f"{where}: not valid JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise SceneError(f"{where}: expected one table (an object in braces) with gravity and body")
+    return data

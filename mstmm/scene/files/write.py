@@ -1,0 +1,65 @@
+"""A scene as TOML, every default filled in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..rules.messages import TABLES
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+
+#: Keys that say the same as another key of the same hinge.
+_TWICE = {"planar": "axis"}
+
+
+def to_toml(scene: SceneTables) -> str:
+    """TOML text that loads back to an equal scene."""
+    data = scene.model_dump(by_alias=True)
+    lines = [
+        f"{key} = {_value(value)}"
+        for key, value in data.items()
+        if not isinstance(value, tuple) or key == "gravity"
+    ]
+    for table in TABLES:
+        for element in data[table]:
+            lines += ["", f"[[{table}]]", f"name = {_value(element['name'])}"]
+            lines += [
+                f"{key} = {_value(value)}"
+                for key, value in element.items()
+                if key != "name" and _is_written(table, element, key, value)
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def _is_written(table: str, element: dict[str, Any], key: str, value: Any) -> bool:
+    """Leave out what TOML cannot say (nothing) and what a built-in type does not take."""
+    if value is None or value == {}:
+        return False
+    return not (table == "hinge" and key == _TWICE.get(element["type"]))
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, str):
+        return _string(value)
+    if isinstance(value, dict):
+        inside = ", ".join(f"{k} = {_value(v)}" for k, v in value.items() if _is_said(v))
+        return "{ " + inside + " }" if inside else "{}"
+    return "[" + ", ".join(_value(v) for v in value) + "]"
+
+
+def _is_said(value: Any) -> bool:
+    """TOML has no word for nothing; an empty list is the default everywhere it may stand."""
+    return value is not None and value != ()
+
+
+def _string(text: str) -> str:
+    """A basic string of TOML."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

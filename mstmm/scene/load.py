@@ -1,0 +1,35 @@
+"""Reading a scene from a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..ir.spec import ElementSpec
+from .files.read import read
+from .scene import Scene
+from .tables.elastic_keys import FOLDER
+
+
+def load_scene(
+    path: str | os.PathLike[str],
+    known_types: Mapping[tuple[str, str], ElementSpec] | None = None,
+) -> Scene:
+    """Read and validate a scene file (.toml or .json).
+
+    Relative paths in it start from its folder; no file that it names is opened.
+
+    `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
+    types.  When it is given every type must be built in or in it; without it types that are not
+    built in are left to `Scene.check_types`.  Raises SceneError.
+    """
+    where, data = read(path)
+    token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
+    try:
+        scene = Scene.from_data(data, where)
+    finally:
+        FOLDER.reset(token)
+    if known_types is not None:
+        scene.check_types(known_types, where)
+    return scene

@@ -1,0 +1,186 @@
+"""From pydantic's findings to one line per problem: file, element, key, expected, way out."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from ...errors import SceneError
+from .values import Location, Refused, Rule, Shorthand, found
+
+MAX_LINES = 10
+#: Where to stop looking: a file in which every element is wrong should not take minutes.
+MAX_PROBLEMS = 60
+#: Nearest names are looked for among this many at most.
+_MAX_OPTIONS = 2000
+#: Keys kept free for coming releases, and what they will hold.
+RESERVED = {
+    "loop": "closed loops",
+    "loops": "closed loops",
+    "closure": "closed loops",
+    "thermal": "thermal data",
+    "temperature": "thermal data",
+    "import": "imports",
+    "imports": "imports",
+    "include": "imports",
+}
+
+#: The lists of tables of a scene.
+TABLES = ("body", "hinge", "chain", "beam", "elastic", "load", "event", "spring")
+
+Problem = tuple[Location, str]
+
+
+def near(name: str, options: Iterable[str]) -> str:
+    """'; did you mean "x"?', or the options themselves where none is near and they are few."""
+    choices = list(dict.fromkeys(islice(options, _MAX_OPTIONS)))
+    lowered = {option.lower(): option for option in reversed(choices)}
+    close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
+    if close:
+        return f'; did you mean "{lowered[close[0]]}"?'
+    if not choices:
+        return "; there is none"
+    if len(choices) > 12:
+        return f"; the first of them are {', '.join(choices[:5])}"
+    if len(choices) == 1:
+        return f"; there is only {choices[0]}"
+    return "; one of " + ", ".join(choices)
+
+
+def scene_error(
+    error: ValidationError, model: type[BaseModel], data: Any, where: str
+) -> SceneError:
+    """The error a user sees for a scene that pydantic refused."""
+    return report(list(islice(problems(error, model), MAX_PROBLEMS)), data, where)
+
+
+def report(found_problems: Sequence[Problem], data: Any, where: str) -> SceneError:
+    """One line per problem, at most MAX_LINES; `data` gives the names of the elements."""
+    unique = list(dict.fromkeys(found_problems))
+    lines = [f"{where}: {line(place, message, data)}" for place, message in unique[:MAX_LINES]]
+    if len(unique) > MAX_LINES:
+        more = "many" if len(unique) >= MAX_PROBLEMS else len(unique) - MAX_LINES
+        lines.append(f"{where}: and {more} more problems")
+    return SceneError("\n".join(lines))
+
+
+def problems(error: ValidationError, model: type[BaseModel]) -> Iterator[Problem]:
+    """Every problem with its place."""
+    for item in error.errors(include_url=False):
+        place: Location = tuple(item["loc"])
+        cause = item.get("ctx", {}).get("error")
+        if isinstance(cause, Refused):
+            for inner, message in cause.problems:
+                yield (*place, *inner), message
+        else:
+            yield place, _words(item, place, model)
+
+
+def _words(item: Mapping[str, Any], place: Location, model: type[BaseModel]) -> str:
+    """pydantic's own findings in the words of the format."""
+    if item["type"] == "missing":
+        return f"missing; expected {_expected(model, place)}"
+    if item["type"] == "extra_forbidden":
+        return _unknown_key(str(place[-1]), _model_at(model, place[:-1]), place)
+    return f"expected {_expected(model, place)}, found {found(item['input'])}"
+
+
+#: Keys of bodies and hinges that the members of a chain do not have.
+_OF_CHAINS = {
+    "name": 'a chain names its members itself, as in "rope[3]"; leave it out',
+    "inboard": "the first member hangs on the chain's own inboard, every other on the one before",
+    "outboard": "a member is held at its origin; leave it out",
+    "position": "the chain itself takes the position; leave it out here",
+    "release": "members of a chain cannot be released; write this hinge as a [[hinge]]",
+}
+
+
+#: What else the keys of beams are called.
+_SYMBOLS = {
+    "EI": "bending_stiffness", "EA": "axial_stiffness", "GJ": "torsional_stiffness",
+    "GIt": "torsional_stiffness", "rhoA": "mass_per_length", "mu": "mass_per_length",
+    "rhoI": "rotary_inertia", "mass": "mass_per_length", "L": "length", "E": "young",
+    "nu": "poisson", "rho": "density",
+}  # fmt: skip
+
+
+def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
+    if len(place) == 5 and place[0] == "chain" and key in _OF_CHAINS:
+        return _OF_CHAINS[key]
+    if key in RESERVED:
+        return f"{RESERVED[key]} come in a later release; leave {key} out for now"
+    keys = [f.alias or name for name, f in model.model_fields.items()]
+    if _SYMBOLS.get(key) in keys:
+        return f'unknown key; did you mean "{_SYMBOLS[key]}"?'
+    return f"unknown key{near(key, keys)}"
+
+
+def _expected(model: type[BaseModel], place: Location) -> str:
+    """What the key at `place` holds, from the annotation of its field."""
+    parent = _model_at(model, place[:-1]) if place else model
+    key = place[-1] if place else ""
+    for name, info in parent.model_fields.items():
+        if key not in (name, info.alias):
+            continue
+        for mark in info.metadata:
+            if isinstance(mark, (Rule, Shorthand)):
+                return mark.expected
+        if "tuple" in str(info.annotation):
+            names = ".".join(part for part in place if isinstance(part, str))
+            return f"a list of tables; write [[{names}]]"
+    return "a table"
+
+
+def _model_at(model: type[BaseModel], place: Location) -> type[BaseModel]:
+    """The model of the table that `place` leads to."""
+    current = model
+    for part in place:
+        for name, info in current.model_fields.items():
+            if part in (name, info.alias):
+                current = _inner(info.annotation) or current
+    return current
+
+
+def _inner(annotation: Any) -> type[BaseModel] | None:
+    """The first model class inside an annotation such as tuple[Body, ...]."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in get_args(annotation):
+        inner = _inner(part)
+        if inner is not None:
+            return inner
+    return None
+
+
+def line(place: Location, message: str, data: Any) -> str:
+    """'hinge "shoulder": axis: message'."""
+    parts = list(place)
+    label = ""
+    if len(parts) >= 2 and parts[0] in TABLES and isinstance(parts[1], int):
+        table, index = str(parts.pop(0)), int(parts.pop(0))
+        label = f"{table} {_element(data, table, index)}: "
+    key = ""
+    for part in parts:
+        key += f"[{part}]" if isinstance(part, int) else f".{_key(part)}" if key else _key(part)
+    return f"{label}{key}: {message}" if key else f"{label}{message}"
+
+
+def _key(part: str) -> str:
+    plain = part.isascii() and part.replace("_", "").isalnum() and len(part) <= 64
+    return part if plain else found(part)
+
+
+def _element(data: Any, table: str, index: int) -> str:
+    """The name of an element, or its place in the file."""
+    try:
+        element = data[table][index]
+        name = element["name"] if isinstance(element, dict) else element.name
+    except (KeyError, IndexError, TypeError, AttributeError):
+        name = None
+    if isinstance(name, str) and name.isprintable() and 0 < len(name) <= 64:
+        return f'"{name}"'
+    return f"number {index + 1}"

@@ -1,0 +1,50 @@
+"""Units that the format does not have: what to write in place of "30 deg" or a bare 90."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from ...errors import ExpressionError
+from ...expression.expression import parse
+
+#: What people write behind a number -> its size in SI units and rad.
+_UNITS = {
+    "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
+    "deg/s": math.pi / 180, "°/s": math.pi / 180, "rad": 1.0, "rad/s": 1.0,
+    "rev": 2 * math.pi, "turn": 2 * math.pi, "turns": 2 * math.pi, "rpm": math.pi / 30,
+    "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048,
+    "m/s": 1.0, "mm/s": 1e-3, "km/h": 1 / 3.6, "ms": 1e-3, "s": 1.0, "min": 60.0,
+    "g": 1e-3, "kg": 1.0, "t": 1e3, "N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "Nm": 1.0,
+    "N*m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "kg*m2": 1.0, "kg*m^2": 1.0,
+    "N/m": 1.0, "N/mm": 1e3, "kN/m": 1e3, "%": 0.01,
+}  # fmt: skip
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*?)?\s*")
+
+
+def instead(text: str) -> str:
+    """The way out for a text that stands where a number is expected, as '; write ...'."""
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        value = _constant(text)
+        return "" if value is None else f"; no expression is taken here: write {value:.12g}"
+    if not match[2]:
+        return "; write the number without quotes"
+    return with_unit(text) or "; write the number alone, without quotes, in SI units and rad"
+
+
+def with_unit(text: str) -> str:
+    """The same for a number with a unit that is known here; else empty."""
+    match = _QUANTITY.fullmatch(text)
+    if match is None or match[2] not in _UNITS:
+        return ""
+    value = float(match[1]) * _UNITS[match[2]]
+    return f"; units are not written, all are SI and rad: write {value:.12g}"
+
+
+def _constant(text: str) -> float | None:
+    """The value of an expression without names, such as "pi/6"."""
+    try:
+        return parse(text).constant
+    except ExpressionError:
+        return None

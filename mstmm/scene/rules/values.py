@@ -1,0 +1,327 @@
+"""What one value of a scene may be: strict, finite, and with a message that says what was expected.
+
+A `Rule` annotates a pydantic field: it checks and normalises the value as it comes from TOML, JSON
+or Python, and publishes the accepted form in the JSON Schema.  Numbers are never taken from text
+or truth values.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import CoreSchema, core_schema
+
+from ...numbers.rotations import norm, unit
+from .units import instead
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+#: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
+BODY = re.compile(rf"{NAME.pattern}(\[([0-9]{{1,8}}|last)\])?")
+NAME_SHAPE = "a letter, then letters, digits or _ (64 characters at most)"
+GROUND = "ground"
+
+Location = tuple[str | int, ...]
+Numbers = tuple[float, ...]
+Orientation = tuple[float, ...]
+
+
+class Refused(ValueError):
+    """One or several problems of a value, each with its place inside the value."""
+
+    def __init__(self, *problems: tuple[Location, str]) -> None:
+        super().__init__("; ".join(message for _, message in problems))
+        self.problems = problems
+
+
+def refuse(message: str, *place: str | int) -> Refused:
+    """The one problem `message` at `place` inside the value."""
+    return Refused((place, message))
+
+
+def found(value: object, depth: int = 0) -> str:
+    """The value as a message shows it: short, printable, in the words of a scene file."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return ascii(value) if len(value) <= 40 else f"{ascii(value[:37])[:-1]}...'"
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return "a whole number of more than 30 digits"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, (list, tuple)):
+        if depth == 2:
+            return f"a list of {len(value)}"
+        inside = ", ".join(found(v, depth + 1) for v in value[:7])
+        inside += ", ..." if len(value) > 7 else ""
+        return f"[{inside}]" if len(inside) <= 60 else f"a list of {len(value)}"
+    if isinstance(value, (int, float)):
+        return f"{float(value):.6g}"
+    return type(value).__name__
+
+
+class _Published(GenerateJsonSchema):
+    """Writes the default of a field as its rule does: pydantic would dump it by its type."""
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
+        inner: dict[str, Any] = dict(schema["schema"])
+        dump = inner.get("serialization", {}).get("function")
+        if dump is not None and "default" in schema:
+            schema = {**schema, "default": dump(schema["default"])}
+        return super().default_schema(schema)
+
+
+class Table(BaseModel):
+    """Base of all tables: frozen, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    @classmethod
+    def model_json_schema(cls, *args: Any, **options: Any) -> dict[str, Any]:
+        """The JSON Schema of the table's file format, defaults as a file writes them."""
+        return super().model_json_schema(*args, **{"schema_generator": _Published} | options)
+
+
+def split(reference: str) -> tuple[str, str]:
+    """("rod1", "tip") of "rod1.tip"; ("rod1", "") of "rod1"."""
+    body, _, at = reference.partition(".")
+    return body, at
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Annotation of a field: `check` returns the normalised value or raises `Refused`."""
+
+    expected: str
+    check: Callable[[Any], Any]
+    schema: dict[str, Any]
+    dump: Callable[[Any], Any] | None = None
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        dump = self.dump
+        serialization = (
+            core_schema.plain_serializer_function_ser_schema(dump) if dump is not None else None
+        )
+        check = self.check
+        if type(None) in get_args(source):
+            return core_schema.no_info_plain_validator_function(
+                lambda value: None if value is None else check(value), serialization=serialization
+            )
+        return core_schema.no_info_plain_validator_function(check, serialization=serialization)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"description": self.expected, **self.schema}
+
+
+@dataclass(frozen=True)
+class Shorthand:
+    """Annotation of a field: a short form of a table is widened before the table is read."""
+
+    expected: str
+    widen: Callable[[Any], Any]
+    schema: dict[str, Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.widen, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        inner = handler(schema["schema"])
+        return {"description": self.expected, "anyOf": [inner, self.schema]}
+
+
+# --- numbers ---------------------------------------------------------------------------------
+
+
+def plain(value: Any) -> Any:
+    """Arrays and numbers of other libraries as Python's own (scenes built in Python)."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def finite(value: Any, expected: str, *place: str | int) -> float:
+    """A finite number, or Refused."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        hint = instead(value) if isinstance(value, str) else ""
+        raise refuse(f"expected {expected}, found {found(value)}{hint}", *place)
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise refuse(f"expected {expected}, found {found(value)}, which is not finite", *place)
+    return result
+
+
+def _unit(name: str) -> str:
+    return f" in {name}" if name else ""
+
+
+def number(of: str = "", minimum: float | None = None, above: float | None = None) -> Rule:
+    """A finite number in the unit `of`, not below `minimum`, strictly above `above`."""
+    bound = f", {minimum:g} or more" if minimum is not None else ""
+    bound += f", more than {above:g}" if above is not None else ""
+    expected = f"a number{_unit(of)}{bound}"
+    schema: dict[str, Any] = {"type": "number"}
+    schema |= {} if minimum is None else {"minimum": minimum}
+    schema |= {} if above is None else {"exclusiveMinimum": above}
+
+    def check(value: Any) -> float:
+        result = finite(plain(value), expected)
+        _within(result, expected, minimum, above)
+        return result
+
+    return Rule(expected, check, schema)
+
+
+def whole(minimum: int, maximum: int) -> Rule:
+    """A whole number between two others, both included."""
+    expected = f"a whole number from {minimum} to {maximum}"
+
+    def check(value: Any) -> int:
+        value = plain(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise refuse(f"expected {expected}, found {found(value)}")
+        if not minimum <= value <= maximum:
+            raise refuse(f"expected {expected}, found {found(value)}")
+        return value
+
+    return Rule(expected, check, {"type": "integer", "minimum": minimum, "maximum": maximum})
+
+
+def _within(
+    value: float, expected: str, minimum: float | None, above: float | None, *place: str | int
+) -> None:
+    if (minimum is not None and value < minimum) or (above is not None and value <= above):
+        raise refuse(f"expected {expected}, found {found(value)}", *place)
+
+
+def entries_of(value: Any, expected: str) -> Sequence[Any]:
+    """The entries of a list, or Refused."""
+    value = plain(value)
+    if not isinstance(value, (list, tuple)):
+        raise refuse(f"expected {expected}, found {found(value)}")
+    return value
+
+
+def counted(entries: int) -> str:
+    """The number of entries in words."""
+    return "1 entry" if entries == 1 else f"{entries} entries"
+
+
+def collect(
+    values: Sequence[Any], expected: str, check: Callable[[Any, int], Any]
+) -> tuple[Any, ...]:
+    """Check every entry; the problems of all entries together."""
+    problems: list[tuple[Location, str]] = []
+    results = []
+    for i, value in enumerate(values):
+        try:
+            results.append(check(value, i))
+        except Refused as refused:
+            problems.extend(refused.problems)
+    if problems:
+        raise Refused(*problems)
+    return tuple(results)
+
+
+def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str = "") -> Rule:
+    """A list of finite numbers of one of these lengths (any length when none is given).
+
+    Without lengths a single number stands for the list with this one entry.  `of` is the unit.
+    """
+    entry = f"a number{_unit(of)}" + (f", {minimum:g} or more" if minimum is not None else "")
+
+    def one(value: Any, i: int) -> float:
+        result = finite(plain(value), entry, i)
+        _within(result, entry, minimum, None, i)
+        return result
+
+    def check(value: Any) -> tuple[float, ...]:
+        value = plain(value)
+        if not lengths and not isinstance(value, (list, tuple)):
+            result = finite(value, expected)
+            _within(result, expected, minimum, None)
+            return (result,)
+        entries = entries_of(value, expected)
+        if lengths and len(entries) not in lengths:
+            raise refuse(f"expected {expected}, found {counted(len(entries))}")
+        return collect(entries, expected, one)
+
+    item: dict[str, Any] = {"type": "number"} | ({} if minimum is None else {"minimum": minimum})
+    array: dict[str, Any] = {"type": "array", "items": item}
+    if not lengths:
+        return Rule(expected, check, {"anyOf": [item, array]})
+    forms = [array | {"minItems": n, "maxItems": n} for n in lengths]
+    return Rule(expected, check, forms[0] if len(forms) == 1 else {"anyOf": forms})
+
+
+#: Entries of vectors: products of two of them must be numbers as well.
+_LARGEST = 1e150
+
+
+def vector(of: str) -> Rule:
+    """Three numbers in the unit `of`, whose squares are finite."""
+    inner = numbers(f"three numbers{_unit(of)}", 3, of=of.partition(",")[0])
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        for i, entry in enumerate(result):
+            if abs(entry) > _LARGEST:
+                raise refuse(
+                    f"expected a number{_unit(of)} of {_LARGEST:g} at most in size, found "
+                    f"{found(entry)}; its square is beyond what numbers hold",
+                    i,
+                )
+        return result
+
+    return Rule(inner.expected, check, inner.schema)
+
+
+def direction() -> Rule:
+    """Three numbers, not all zero; any length, the direction alone counts."""
+    expected = "three numbers, not all zero (a direction)"
+    inner = numbers(expected, 3)
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        if norm(result) < 1e-12:
+            raise refuse(f"expected {expected}, found {found(result)}; write for example [0, 0, 1]")
+        return result
+
+    return Rule(expected, check, inner.schema)
+
+
+def orientation() -> Rule:
+    """[roll, pitch, yaw] in rad, or a quaternion [w, x, y, z], which is normalised."""
+    expected = "[roll, pitch, yaw] in rad or a quaternion [w, x, y, z]"
+    inner = numbers(expected, 3, 4)
+
+    def check(value: Any) -> tuple[float, ...]:
+        result: tuple[float, ...] = inner.check(value)
+        return quaternion(result, expected) if len(result) == 4 else result
+
+    return Rule(expected, check, inner.schema)
+
+
+def quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[float, ...]:
+    """q / |q|; a quaternion (practically) zero is refused."""
+    if norm(q) < 1e-6:
+        raise refuse(
+            f"expected {expected}, found a quaternion of zero length; no rotation is [1, 0, 0, 0]",
+            *place,
+        )
+    return unit(q)

@@ -1,0 +1,136 @@
+"""A scene: bodies, hinges, beams, loads, events and springs, validated and frozen.
+
+The same model is read from TOML and JSON (`load_scene`) and built in Python
+(`Scene(gravity=[...], body=[{...}], hinge=[{...}])`).  Everything that does not describe a system
+raises SceneError, one line per problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextvars import ContextVar
+from typing import Any
+
+from pydantic import ConfigDict, ValidationError, model_validator
+
+from ..ir.spec import ElementSpec
+from .checks import scene as checks
+from .checks import types
+from .files.write import to_toml
+from .rules.messages import TABLES, report, scene_error
+from .rules.values import Refused
+from .tables.all import SceneTables
+from .tables.beam_keys import ROOT
+
+#: What messages call the scene that is being read.
+_source: ContextVar[str] = ContextVar("source", default="scene")
+
+
+class Scene(SceneTables):
+    """Everything a simulation needs to know, SI units and radians, frozen.
+
+    `gravity` in m/s^2, inertial axes.  Lists keep the order of the file: hinge coordinates appear
+    in q and u in the order of `hinge`, then those of the chains in the order of `chain`, then the
+    modal coordinates in the order of `beam` and of `elastic`.
+    """
+
+    model_config = ConfigDict(title="mstmm scene")
+
+    def __init__(self, /, **data: Any) -> None:
+        """Validate; SceneError names every problem (at most ten lines)."""
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise scene_error(error, type(self), data, _source.get()) from None
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any], where: str = "scene") -> Scene:
+        """Scene from the keys of a file; `where` begins every message."""
+        token = _source.set(where)
+        try:
+            return cls(**data)
+        finally:
+            _source.reset(token)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is accepted but worth knowing, one sentence each."""
+        return checks.warnings(self)
+
+    def to_toml(self) -> str:
+        """The scene as TOML with every default filled in; it loads back to an equal scene."""
+        return to_toml(self)
+
+    def check_against(self, spec: ElementSpec, where: str = "scene") -> None:
+        """Check every element of a user's type against the definition of that type."""
+        problems = types.problems_with(self, spec)
+        if problems:
+            raise report(problems, self._tables(), where)
+
+    def check_types(
+        self, known_types: Mapping[tuple[str, str], ElementSpec], where: str = "scene"
+    ) -> None:
+        """Check that every type is built in or known, and fits its definition.
+
+        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.
+        """
+        problems = types.problems(self, known_types)
+        if problems:
+            raise report(problems, self._tables(), where)
+
+    def _tables(self) -> dict[str, Any]:
+        return {table: getattr(self, table) for table in TABLES}
+
+    @model_validator(mode="after")
+    def _settle(self) -> Scene:
+        for table in ("load", "event", "spring"):
+            object.__setattr__(self, table, _named(table, getattr(self, table)))
+        for table, elements in _at_roots(self).items():
+            object.__setattr__(self, table, elements)
+        problems = checks.problems(self)
+        if problems:
+            raise Refused(*problems)
+        return self
+
+
+def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Elements without a name get "load1" and so on, avoiding names that are taken."""
+    taken = {element.name for element in elements}
+    named = []
+    for i, element in enumerate(elements, 1):
+        if not element.name:
+            name = f"{table}{i}"
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            element = element.model_copy(update={"name": name})
+        named.append(element)
+    return tuple(named)
+
+
+#: The keys that refer to a body or an end of one.
+_REFERENCES = {
+    "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
+    "spring": ("from_", "to"),
+}  # fmt: skip
+
+
+def _at_roots(scene: SceneTables) -> dict[str, tuple[Any, ...]]:
+    """The tables in which a beam's name stands for its root, with "blade.root" in its place.
+
+    Loads per length keep the name of the beam alone.
+    """
+    beams = {beam.name for beam in scene.beam}
+    changed: dict[str, tuple[Any, ...]] = {}
+    for table, keys in _REFERENCES.items() if beams else ():
+        elements = []
+        for element in getattr(scene, table):
+            update = {
+                key: f"{getattr(element, key)}.{ROOT}"
+                for key in keys
+                if getattr(element, key) in beams
+                and getattr(element, "force_per_length", None) is None
+            }
+            elements.append(element.model_copy(update=update) if update else element)
+        changed[table] = tuple(elements)
+    return changed

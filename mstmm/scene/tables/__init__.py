@@ -1,0 +1,1 @@
+"""The tables of a scene, each with its keys and its own rules."""

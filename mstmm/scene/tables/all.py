@@ -1,0 +1,63 @@
+"""All tables of a scene together, as they are written; `Scene` settles and checks them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Any
+
+from ...numbers.rotations import Vector
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import Table
+from .beam import Beam
+from .body import Body
+from .chain import Chain
+from .elastic import Elastic
+from .hinge import Hinge
+from .loads import Event, Load, Spring
+from .members import Bodies, Hinges
+from .rigid import bare
+
+
+def _version(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value != 1:
+        raise rules.refuse(f"expected 1, the only version there is, found {rules.found(value)}")
+    return value
+
+
+class SceneTables(Table):
+    """The tables of a scene, and its bodies and hinges by number and by name."""
+
+    schema_version: Annotated[int, rules.Rule("1", _version, {"const": 1})] = 1
+    gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
+    allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
+    body: tuple[Body, ...] = ()
+    hinge: tuple[Hinge, ...] = ()
+    chain: tuple[Chain, ...] = ()
+    beam: tuple[Beam, ...] = ()
+    elastic: tuple[Elastic, ...] = ()
+    load: tuple[Load, ...] = ()
+    event: tuple[Event, ...] = ()
+    spring: tuple[Spring, ...] = ()
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Every body: `body`, then the members of the chains, made when they are asked for."""
+        return Bodies(self.body, self.chain)
+
+    @cached_property
+    def hinges(self) -> Hinges:
+        """Every hinge: `hinge`, then the members of the chains, made when they are asked for."""
+        return Hinges(self.hinge, self.chain)
+
+    @property
+    def skeleton(self) -> SceneTables:
+        """The same scene with every beam and elastic body as a body with the same ends (and no
+        mass), behind `body`: what names and the tree are checked on."""
+        return self._skeleton if self.beam or self.elastic else self
+
+    @cached_property
+    def _skeleton(self) -> SceneTables:
+        bodies = (*self.body, *map(bare, self.beam), *map(bare, self.elastic))
+        fields = {key: getattr(self, key) for key in type(self).model_fields}
+        return type(self).model_construct(**{**fields, "body": bodies, "beam": (), "elastic": ()})

@@ -1,0 +1,37 @@
+"""[[beam]]: an Euler-Bernoulli beam along its x axis, with ends "root" (x = 0) and "tip"."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from ..rules.values import Refused
+from . import beam_rules as checks
+from .beam_keys import GIVEN, ROOT, TIP, BeamKeys
+from .body import End
+from .flexible import AUTO
+
+
+class Beam(BeamKeys):
+    """An Euler-Bernoulli beam.
+
+    `modes` is None for "auto", `quadrature` likewise.  `ends` holds "root" and "tip" too.  What a
+    piece in `section` leaves out it takes from the beam; `sections` are the pieces filled in.
+    """
+
+    @model_validator(mode="after")
+    def _settle(self) -> Beam:
+        object.__setattr__(self, "ends", self._all_ends())
+        if self.shapes is not None and self.basis == AUTO:
+            object.__setattr__(self, "basis", GIVEN)
+        if self.shapes is not None and self.modes is None:
+            object.__setattr__(self, "modes", self.shapes.modes)
+        problems = list(checks.problems(self))
+        if problems:
+            raise Refused(*problems)
+        object.__setattr__(self, "section", checks.joined(self))
+        return self
+
+    def _all_ends(self) -> dict[str, End]:
+        own = {ROOT: (0.0, 0.0, 0.0), TIP: (self.length, 0.0, 0.0)}
+        always = {name: End.model_construct(position=at) for name, at in own.items()}
+        return always | self.ends

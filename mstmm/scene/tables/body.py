@@ -1,0 +1,110 @@
+"""[[body]]: a rigid body, or one of a user's own type, and its ends."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from ...numbers.rotations import IDENTITY, Matrix, Vector, from_orientation
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import (
+    NAME,
+    Location,
+    Numbers,
+    Orientation,
+    Refused,
+    Shorthand,
+    Table,
+    found,
+    refuse,
+)
+from .inertia import without_dust
+
+
+class End(Table):
+    """An output end of a body: where it is (m) and how its axes lie, in body axes."""
+
+    position: Annotated[Vector, rules.vector("m")]
+    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+
+    @property
+    def rotation(self) -> Matrix:
+        """Rotation matrix: axes of the end -> body axes."""
+        return from_orientation(self.orientation)
+
+
+def _as_end(value: Any) -> Any:
+    return {"position": value} if isinstance(value, (list, tuple)) else value
+
+
+def _as_ends(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise refuse(f"expected a table such as {{ tip = [1, 0, 0] }}, found {found(value)}")
+    for key in value:
+        if not isinstance(key, str) or not NAME.fullmatch(key):
+            raise refuse(f"expected the name of an end, found {found(key)}")
+    return {key: _as_end(v) for key, v in value.items()}
+
+
+class BodyTable(Table):
+    """What a body is, without its name: a rigid body, or one of a user's own type with
+    `parameters`.
+
+    Body axes have their origin at the input end.  `inertia` is about the centre of mass as
+    (xx, yy, zz, xy, xz, yz), tensor entries (Jxy = -int xy dm), kg m^2.
+    """
+
+    type: Annotated[str, texts.name("a body type")] = "rigid"
+    mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
+    center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    inertia: Annotated[
+        Numbers,
+        rules.numbers("[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2", 3, 6, of="kg m^2"),
+    ] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
+    ends: Annotated[
+        dict[str, End],
+        Shorthand(
+            "output ends: name -> [x, y, z] in m, or a table with position and orientation",
+            _as_ends,
+            {"type": "object", "additionalProperties": {"type": "array"}},
+        ),
+    ] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+
+    @property
+    def inertia_matrix(self) -> Matrix:
+        """The inertia tensor about the centre of mass, body axes, kg m^2, without moments that
+        are negative by rounding."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return without_dust(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), self.mass)
+
+    def end_position(self, at: str) -> Vector:
+        """Position (m) of the end `at` in body axes; "" is the body's own origin."""
+        return self.ends[at].position if at else (0.0, 0.0, 0.0)
+
+    def end_rotation(self, at: str) -> Matrix:
+        """Rotation matrix of the end `at`: its axes -> body axes."""
+        return self.ends[at].rotation if at else IDENTITY
+
+    @model_validator(mode="after")
+    def _settle(self) -> Self:
+        if len(self.inertia) == 3:
+            object.__setattr__(self, "inertia", (*self.inertia, 0.0, 0.0, 0.0))
+        problems: list[tuple[Location, str]] = []
+        if self.type == "rigid" and "mass" not in self.model_fields_set:
+            problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
+        if self.type == "rigid" and self.parameters:
+            way_out = "give the type of your own body"
+            problems.append((("parameters",), f"a rigid body has no parameters; {way_out}"))
+        if problems:
+            raise Refused(*problems)
+        return self
+
+
+class Body(BodyTable):
+    """A body of the scene."""
+
+    name: Annotated[str, texts.name("the body's name")]

@@ -1,0 +1,24 @@
+"""[[elastic]]: a general elastic body, from mass and stiffness matrices or from a mesh."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from ..rules.values import Refused
+from . import elastic_rules as checks
+from .elastic_keys import ElasticKeys
+
+
+class Elastic(ElasticKeys):
+    """A general elastic body; its axes are those of its mesh.
+
+    Exactly one of `matrices` (a .npz file), `arrays`, `mesh` (a file) and `box` tells what it is
+    made of.  `modes` is the number of fixed-interface modes, None for "auto".
+    """
+
+    @model_validator(mode="after")
+    def _check(self) -> Elastic:
+        problems = list(checks.problems(self))
+        if problems:
+            raise Refused(*problems)
+        return self

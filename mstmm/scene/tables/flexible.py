@@ -1,0 +1,156 @@
+"""What beams and elastic bodies have in common: damping, start values, frame, level of model."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import model_validator
+
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import NAME, Refused, Rule, Shorthand, Table, found, plain, refuse
+
+Numbers = tuple[float, ...]
+
+#: Levels of model: coupled with the rigid motion; no deformation; rigid motion first, then the
+#: linear response to it.
+MODELS = ("flexible", "rigid", "one-way")
+
+AUTO = "auto"
+_TANGENT = re.compile(rf"tangent(@{NAME.pattern})?")
+
+
+class Damping(Table):
+    """Damping of the shapes: D = 2 ratio omega m per shape, plus `stiffness` times K.
+
+    `ratio` is one modal ratio for all, or one per shape; `stiffness` is a time in s.
+    """
+
+    ratio: Annotated[
+        Numbers, rules.numbers("a modal damping ratio, or a list, one per shape", minimum=0)
+    ] = (0.0,)
+    stiffness: Annotated[float, rules.number("s", minimum=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Damping:
+        if not self.ratio:
+            raise refuse("expected a modal damping ratio or more, found an empty list", "ratio")
+        return self
+
+    @property
+    def acts(self) -> bool:
+        """True when there is any damping."""
+        return self.stiffness > 0 or any(self.ratio)
+
+
+def _as_damping(value: Any) -> Any:
+    value = plain(value)
+    return value if isinstance(value, (dict, Damping)) else {"ratio": value}
+
+
+DAMPING = Shorthand(
+    "a modal damping ratio, a list of them, one per shape, or a table { ratio, stiffness }",
+    _as_damping,
+    {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]},
+)
+
+
+class Start(Table):
+    """Deformation at t = 0: modal coordinates and their rates (None: zero).
+
+    With `static` the deformation is that under the loads at t = 0.
+    """
+
+    static: Annotated[bool, texts.flag()] = False
+    eta: Annotated[Numbers | None, rules.numbers("one number per shape")] = None
+    etad: Annotated[Numbers | None, rules.numbers("one number per shape")] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Start:
+        if self.static and self.eta is not None:
+            raise refuse("static gives the deformation itself; leave one of them out", "eta")
+        for key in ("eta", "etad"):
+            if getattr(self, key) == ():
+                raise refuse("expected one number per shape, found none; leave it out", key)
+        return self
+
+
+_STARTS: dict[str, dict[str, Any]] = {"undeformed": {}, "static": {"static": True}}
+
+
+def _as_start(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value not in _STARTS:
+        expected = '"undeformed", "static" or a table { eta, etad }'
+        raise refuse(f"expected {expected}, found {found(value)}")
+    return _STARTS[value]
+
+
+START = Shorthand(
+    '"undeformed", "static" or a table { eta = [...], etad = [...] }',
+    _as_start,
+    {"enum": list(_STARTS)},
+)
+
+
+def framed(*words: str, at_end: bool = False) -> Rule:
+    """The floating frame: one of these words, and "tangent@mid" where `at_end` is set."""
+    expected = ", ".join(f'"{word}"' for word in words[:-1]) + f' or "{words[-1]}"'
+    if at_end:
+        expected += ' ("tangent@mid": at that end, else at the end that a hinge holds)'
+
+    def check(value: Any) -> str:
+        if isinstance(value, str) and (
+            value in words or (at_end and _TANGENT.fullmatch(value) is not None)
+        ):
+            return str(value)
+        raise refuse(f"expected {expected}, found {found(value)}")
+
+    forms: list[dict[str, Any]] = [{"enum": list(words)}]
+    if at_end:
+        forms.append({"type": "string", "pattern": f"^{_TANGENT.pattern}$"})
+    return Rule(expected, check, {"anyOf": forms})
+
+
+def decided(rule: Rule) -> Rule:
+    """The values of another rule, or "auto", which becomes None."""
+    expected = f'{rule.expected} or "{AUTO}"'
+
+    def check(value: Any) -> Any:
+        if isinstance(value, str):
+            if value == AUTO:
+                return None
+            raise refuse(f"expected {expected}, found {found(value)}")
+        try:
+            return rule.check(value)
+        except Refused as refused:
+            if all(not place for place, _ in refused.problems):
+                raise refuse(f"expected {expected}, found {found(plain(value))}") from None
+            raise
+
+    return Rule(expected, check, {"anyOf": [rule.schema, {"const": AUTO}]})
+
+
+class FlexibleTable(Table):
+    """What every flexible body has.
+
+    `stiffening` takes second-order displacements into the kinematics.
+    """
+
+    name: Annotated[str, texts.name("the body's name")]
+    stiffening: Annotated[bool, texts.flag()] = True
+    damping: Annotated[Damping, DAMPING] = Damping()
+    initial: Annotated[Start, START] = Start()
+    model: Annotated[str, texts.choice(*MODELS)] = MODELS[0]
+
+    @property
+    def frame_kind(self) -> str:
+        """The word of `frame` alone: "auto", "tangent", "chord" or "mean"."""
+        return str(getattr(self, "frame", AUTO)).partition("@")[0]
+
+    @property
+    def frame_end(self) -> str:
+        """The end a tangent frame is asked for at; "" is the one that a hinge holds."""
+        return str(getattr(self, "frame", AUTO)).partition("@")[2]

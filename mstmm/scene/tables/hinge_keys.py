@@ -1,0 +1,77 @@
+"""The keys of a hinge and its start values; what they say to each other is settled elsewhere."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from ...expression.expression import Expression
+from ...numbers.rotations import Matrix, Vector, from_orientation, reject, unit
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import Location, Numbers, Orientation, Table
+from .hinge_types import HINGE_TYPES, HingeType
+from .law import Law
+
+
+class Initial(Table):
+    """Start values of a hinge: q (quaternions w, x, y, z) and u, one entry per coordinate."""
+
+    q: Annotated[Numbers | None, rules.numbers("one number per coordinate")] = None
+    u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
+
+
+class HingeKeys(Table):
+    """The keys of a hinge, as they are written and as `HingeTable` leaves them."""
+
+    type: Annotated[str, texts.name("a hinge type", ", ".join(HINGE_TYPES) + " or your own")]
+    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
+    axis2: Annotated[Vector | None, rules.direction()] = None
+    normal: Annotated[Vector | None, rules.direction()] = None
+    lead: Annotated[float | None, rules.number("m per turn")] = None
+    initial: Initial | None = None
+    law: Law = Law()
+    drive: Annotated[
+        tuple[Expression | None, ...] | None,
+        texts.expressions(
+            'an expression of t, or a list with one per coordinate ("free" where none)', free=True
+        ),
+    ] = None
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+
+    @property
+    def builtin(self) -> HingeType | None:
+        """The built-in type, None for a user's type."""
+        return HINGE_TYPES.get(self.type)
+
+    @property
+    def rotation(self) -> Matrix:
+        """Rotation matrix at q = 0: axes of the outboard end -> axes of the inboard end."""
+        return from_orientation(self.orientation)
+
+    @property
+    def unit_axis(self) -> Vector:
+        """The axis (planar: the normal) with length 1."""
+        x, y, z = unit(self.axis)
+        return (x, y, z)
+
+    @property
+    def unit_axis2(self) -> Vector | None:
+        """The second axis with length 1; planar: made perpendicular to the normal."""
+        if self.axis2 is None:
+            return None
+        if self.type == "planar":
+            return reject(self.axis2, self.axis)
+        x, y, z = unit(self.axis2)
+        return (x, y, z)
+
+    def misplaced(self) -> list[tuple[Location, str]]:
+        """What is wrong with the ends it joins; a table without ends has none to be wrong."""
+        return []
+
+    @property
+    def lets_go(self) -> bool:
+        """True when it is released by itself."""
+        return False

@@ -1,0 +1,110 @@
+"""Can a body have this inertia?  Checks on the tensor itself, free of any choice of axes."""
+
+from __future__ import annotations
+
+import math
+
+from ...numbers.rotations import Matrix, Vector
+
+#: Relative size of a violation that is put down to rounding.
+_ROUNDING = 1e-12
+_TRIANGLE_ROUNDING = 1e-6
+#: A radius of gyration (m) below this is rounding: no body of a scene is that small.
+_GYRATION = 1e-8
+
+
+def principal_moments(inertia: Matrix) -> Vector:
+    """Eigenvalues of a symmetric 3x3 tensor, ascending (cyclic Jacobi rotations)."""
+    a = [list(row) for row in inertia]
+    for _ in range(30):  # five suffice; the bound is for entries that are not finite
+        if a[0][1] == a[0][2] == a[1][2] == 0:
+            break
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            _rotate(a, p, q)
+    first, second, third = sorted((a[0][0], a[1][1], a[2][2]))
+    return (first, second, third)
+
+
+def _rotate(a: list[list[float]], p: int, q: int) -> None:
+    """One Jacobi rotation that makes a[p][q] zero."""
+    if a[p][q] == 0:
+        return
+    half = (a[q][q] - a[p][p]) / (2 * a[p][q])
+    t = 0.0 if math.isinf(half) else math.copysign(1, half) / (abs(half) + math.hypot(1, half))
+    c = 1 / math.hypot(1, t)
+    s, r = t * c, 3 - p - q
+    change = t * a[p][q]
+    a[p][p] -= change
+    a[q][q] += change
+    a[p][q] = a[q][p] = 0.0
+    arp, arq = a[r][p], a[r][q]
+    a[r][p] = a[p][r] = c * arp - s * arq
+    a[r][q] = a[q][r] = s * arp + c * arq
+
+
+def _scaled(inertia: Matrix) -> tuple[Vector, float]:
+    """Principal moments divided by the largest entry, and that entry."""
+    largest = max(abs(x) for row in inertia for x in row)
+    if largest == 0:
+        return (0.0, 0.0, 0.0), 1.0
+    scaled = [[x / largest for x in row] for row in inertia]
+    return principal_moments((_row(scaled[0]), _row(scaled[1]), _row(scaled[2]))), largest
+
+
+def _row(x: list[float]) -> Vector:
+    return (x[0], x[1], x[2])
+
+
+def is_dust(entry: float, others: float, mass: float) -> bool:
+    """True for a moment of inertia (kg m^2) that is rounding beside the largest entry of its tensor
+    or, with the mass (kg), a radius of gyration below any body's."""
+    return abs(entry) <= max(_ROUNDING * others, mass * _GYRATION**2)
+
+
+def without_dust(inertia: Matrix, mass: float) -> Matrix:
+    """The tensor with moments that are negative by rounding as zeros; itself where none is."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
+    if xx >= 0 and yy >= 0 and zz >= 0:
+        return inertia
+    largest = max(abs(x) for row in inertia for x in row)
+    xx, yy, zz = (0.0 if x < 0 and is_dust(x, largest, mass) else x for x in (xx, yy, zz))
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def negative_moment(inertia: Matrix) -> str | None:
+    """What is wrong with a tensor that has a negative moment about some axis; None for others."""
+    for entry, label in zip((inertia[i][i] for i in range(3)), ("xx", "yy", "zz"), strict=True):
+        if entry < 0:
+            return (
+                f"expected moments of inertia of 0 kg m^2 or more, found {label} = {entry:.6g}; "
+                "remove the sign"
+            )
+    moments, scale = _scaled(inertia)
+    if moments[0] >= -_ROUNDING * moments[2]:
+        return None
+    return (
+        f"no body has this tensor: its principal moments are {shown(moments, scale)}, one "
+        "negative; check the products of inertia (tensor entries, Jxy = -int xy dm)"
+    )
+
+
+def triangle_excess(inertia: Matrix) -> str | None:
+    """What breaks the triangle inequality of the principal moments, None where nothing does; of
+    negative moments that they are negative.
+
+    Every mass distribution has J1 + J2 >= J3.
+    """
+    moments, scale = _scaled(inertia)
+    if moments[0] + moments[1] >= moments[2] * (1 - _TRIANGLE_ROUNDING):
+        return None
+    if moments[0] < -_ROUNDING * abs(moments[2]):
+        return f"the principal moments {shown(moments, scale)} are not all positive"
+    return (
+        f"the principal moments {shown(moments, scale)} break the triangle inequality "
+        "(each at most the sum of the other two)"
+    )
+
+
+def shown(moments: Vector, scale: float) -> str:
+    """Moments as text, in kg m^2."""
+    return "[" + ", ".join(f"{m * scale:.4g}" for m in moments) + "] kg m^2"

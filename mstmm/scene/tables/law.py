@@ -1,0 +1,154 @@
+"""The tables inside a law: what acts along the coordinates of a hinge or along a spring."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import BaseModel, model_validator
+
+from ...expression.expression import Expression, number
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import Table
+
+Numbers = tuple[float, ...]
+
+
+class Friction(Table):
+    """Coulomb and Stribeck friction, regularised; efforts in N or N m, velocities m/s or rad/s.
+
+    All zero means no friction.  `static` 0 means equal to `coulomb`.
+    """
+
+    coulomb: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
+    static: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
+    stribeck_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.01
+    regularisation_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.001
+
+    @property
+    def acts(self) -> bool:
+        """True when there is any friction."""
+        return self.static > 0
+
+    @model_validator(mode="after")
+    def _settle(self) -> Friction:
+        if self.static == 0:
+            object.__setattr__(self, "static", self.coulomb)
+        if self.static < self.coulomb:
+            raise rules.refuse(
+                f"static friction {self.static:g} is below coulomb friction {self.coulomb:g}; "
+                "leave it out, or make it at least as large", "static",
+            )  # fmt: skip
+        return self
+
+
+class Limits(Table):
+    """Stops of one coordinate: one-sided springs and dampers below `lower`, above `upper`."""
+
+    lower: Annotated[float | None, rules.number("m or rad")] = None
+    upper: Annotated[float | None, rules.number("m or rad")] = None
+    stiffness: Annotated[float, rules.number("N/m or N m/rad", minimum=0)] = 0.0
+    damping: Annotated[float, rules.number("N s/m or N m s/rad", minimum=0)] = 0.0
+
+    @property
+    def acts(self) -> bool:
+        """True when there is a stop."""
+        return self.lower is not None or self.upper is not None
+
+    @model_validator(mode="after")
+    def _check(self) -> Limits:
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            raise rules.refuse(
+                f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
+            )
+        if self.acts and self.stiffness == 0:
+            raise rules.refuse(
+                "a stop needs a stiffness above 0 (N/m or N m/rad); "
+                "write for example stiffness = 1e5", "stiffness",
+            )  # fmt: skip
+        if not self.acts and (self.stiffness > 0 or self.damping > 0):
+            raise rules.refuse("limits need lower, upper or both", "lower")
+        return self
+
+
+class LawEntry(NamedTuple):
+    """The law of one coordinate."""
+
+    stiffness: float
+    rest: float
+    damping: float
+    effort: Expression
+    inertia: float
+    friction: Friction
+    limits: Limits
+
+
+def _one_or_list(value: Any) -> Any:
+    return [value] if isinstance(value, (dict, BaseModel)) else value
+
+
+def _per_coordinate(one: str, minimum: float | None = None) -> rules.Rule:
+    bound = "" if minimum is None else f", {minimum:g} or more"
+    expected = f"{one}{bound}, or a list, one per coordinate"
+    return rules.numbers(expected, minimum=minimum, of=one.removeprefix("a number in "))
+
+
+_TABLES = rules.Shorthand(
+    "a table, or a list of tables, one per coordinate", _one_or_list, {"type": "object"}
+)
+
+
+_NO_EFFORT, _NO_FRICTION, _NO_LIMITS = number(0), Friction(), Limits()
+
+
+class Law(Table):
+    """What acts along the coordinates of a hinge: one entry per speed.
+
+    effort > 0 pushes the outboard body along +u; `inertia` is reflected rotor inertia.  In a file
+    one number may stand for all coordinates.
+    """
+
+    stiffness: Annotated[Numbers, _per_coordinate("a number in N/m or N m/rad", minimum=0)] = ()
+    rest: Annotated[Numbers, _per_coordinate("a number in m or rad")] = ()
+    damping: Annotated[Numbers, _per_coordinate("a number in N s/m or N m s/rad", minimum=0)] = ()
+    effort: Annotated[
+        tuple[Expression, ...],
+        texts.expressions("a number or expression in N or N m, or a list, one per coordinate"),
+    ] = ()
+    inertia: Annotated[Numbers, _per_coordinate("a number in kg or kg m^2", minimum=0)] = ()
+    friction: Annotated[tuple[Friction, ...], _TABLES] = ()
+    limits: Annotated[tuple[Limits, ...], _TABLES] = ()
+
+    def entries(self) -> tuple[LawEntry, ...]:
+        """The laws of all coordinates; at least one, which does nothing where nothing is said."""
+        count = max(1, *(len(getattr(self, key)) for key in type(self).model_fields))
+        return tuple(self.entry(k) for k in range(count))
+
+    def entry(self, k: int) -> LawEntry:
+        """The law of coordinate k; a list with one entry is shared by all, none means no effect."""
+
+        def pick(values: tuple[Any, ...], default: Any) -> Any:
+            if not values:
+                return default
+            return values[k] if len(values) > 1 else values[0]
+
+        return LawEntry(
+            pick(self.stiffness, 0.0), pick(self.rest, 0.0), pick(self.damping, 0.0),
+            pick(self.effort, _NO_EFFORT), pick(self.inertia, 0.0),
+            pick(self.friction, _NO_FRICTION), pick(self.limits, _NO_LIMITS),
+        )  # fmt: skip
+
+
+class SpringLaw(Table):
+    """Law of a spring: tension = stiffness (length - rest) + damping rate - effort.
+
+    effort > 0 pushes the two ends apart; in it `q` is the length (m), `u` its rate (m/s).
+    """
+
+    stiffness: Annotated[float, rules.number("N/m", minimum=0)] = 0.0
+    rest: Annotated[float, rules.number("m", minimum=0)] = 0.0
+    damping: Annotated[float, rules.number("N s/m", minimum=0)] = 0.0
+    effort: Annotated[
+        Expression,
+        texts.one_expression("a number or expression in N"),
+    ] = number(0)

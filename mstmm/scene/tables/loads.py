@@ -1,0 +1,119 @@
+"""[[load]], [[event]] and [[spring]]: what acts on the bodies, and what happens to them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from ...expression.expression import Expression, number
+from ...numbers.rotations import Vector
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import GROUND, Table, found, refuse, split
+from .law import SpringLaw
+
+_ZERO = (number(0), number(0), number(0))
+
+
+class Load(Table):
+    """A force (N) and a moment (N m) on an end of a body; three expressions each.
+
+    On a beam alternatively `force_per_length` (N/m), the same everywhere on `span`, from one x to
+    another in m (None: the whole length).  `axes` is "inertial", "body" (the loaded body's own; of
+    a beam those of the loaded section, for `force_per_length` those of the floating frame) or the
+    name of another body.
+    """
+
+    name: Annotated[str, texts.name("the load's name")] = ""
+    on: Annotated[str, texts.end(ground=False)]
+    force: Annotated[
+        tuple[Expression, Expression, Expression],
+        texts.expressions("three numbers or expressions in N", 3),
+    ] = _ZERO
+    moment: Annotated[
+        tuple[Expression, Expression, Expression],
+        texts.expressions("three numbers or expressions in N m", 3),
+    ] = _ZERO
+    force_per_length: Annotated[
+        tuple[Expression, Expression, Expression] | None,
+        texts.expressions("three numbers or expressions in N/m", 3),
+    ] = None
+    span: Annotated[
+        tuple[float, float] | None, rules.numbers("[from, to] along the beam in m", 2, of="m")
+    ] = None
+    axes: Annotated[str, texts.body('"inertial", "body" or the name of a body')] = "inertial"
+
+    @model_validator(mode="after")
+    def _check(self) -> Load:
+        if self.force_per_length is None:
+            if self.span is not None:
+                raise refuse("only force_per_length acts on a span; leave it out", "span")
+            return self
+        for key in ("force", "moment"):
+            if not all(entry.is_zero for entry in getattr(self, key)):
+                raise refuse(
+                    f"{key} acts on one point, force_per_length on a beam; write two loads", key
+                )
+        if split(self.on)[1]:
+            raise refuse(
+                "expected the name of a beam alone for a load per length, found "
+                f"{found(self.on)}; write {found(split(self.on)[0])}, and span for a part of it",
+                "on",
+            )
+        if self.span is not None and not 0 <= self.span[0] < self.span[1]:
+            raise refuse(
+                f"expected [from, to] in m with 0 <= from < to, found {found(self.span)}", "span"
+            )
+        return self
+
+
+class Event(Table):
+    """Something that happens when a comparison begins to hold: stop, or release a hinge."""
+
+    name: Annotated[str, texts.name("the event's name")] = ""
+    when: Annotated[Expression, texts.condition('a comparison such as "rod1.x < 0.1"')]
+    do: Annotated[str, texts.choice("stop", "release")]
+    hinge: Annotated[str | None, texts.name("the hinge to release")] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Event:
+        if self.do == "release" and self.hinge is None:
+            raise refuse('missing; do = "release" needs the name of a hinge', "hinge")
+        if self.do == "stop" and self.hinge is not None:
+            raise refuse('only do = "release" takes a hinge; leave it out', "hinge")
+        return self
+
+
+class Spring(Table):
+    """A spring, damper and actuator between two ends, or a force element of a user's own type.
+
+    `position` (m) is the place of the end that is on the ground.
+    """
+
+    name: Annotated[str, texts.name("the spring's name")] = ""
+    type: Annotated[str, texts.name("a force element type")] = "spring"
+    from_: Annotated[str, texts.end()] = Field(alias="from")
+    to: Annotated[str, texts.end()]
+    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    law: SpringLaw = SpringLaw()
+    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check(self) -> Spring:
+        bodies = (split(self.from_)[0], split(self.to)[0])
+        if bodies[0] == bodies[1]:
+            raise refuse(
+                f'both ends are on "{bodies[0]}", so it does nothing; join two bodies', "to"
+            )
+        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
+            raise refuse(
+                "only a spring on the ground takes a position; give the body an end there",
+                "position",
+            )
+        if self.type == "spring" and self.parameters:
+            raise refuse("a spring has no parameters; give the type of your own element",
+                         "parameters")  # fmt: skip
+        if self.type != "spring" and self.law != SpringLaw():
+            raise refuse('law belongs to type "spring"; use parameters', "law")
+        return self

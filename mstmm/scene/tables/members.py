@@ -1,0 +1,175 @@
+"""Every body and every hinge of a scene, by number and by name: its tables, then its chains'
+members in the order of the chains.
+
+Members of chains are made when they are asked for; a chain of a million bodies costs nothing here.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
+from typing import Generic, TypeVar, overload
+
+from ..rules.messages import near
+from ..rules.values import NAME
+from .body import Body
+from .chain import HINGE, Chain
+from .hinge import Hinge
+
+_MEMBER = re.compile(rf"({NAME.pattern})\[([0-9]+|last)\]")
+
+T = TypeVar("T", bound=Body | Hinge)
+
+
+class Members(Sequence[T], Generic[T]):
+    """Bodies or hinges of a scene; `len`, index and iteration as a tuple, and by name."""
+
+    #: What follows the member's name: "" for bodies, ".hinge" for hinges.
+    behind = ""
+    word = ""
+
+    def __init__(self, tables: tuple[T, ...], chains: tuple[Chain, ...]) -> None:
+        self.tables, self.chains = tables, chains
+        self._index = {table.name: i for i, table in enumerate(tables)}
+        self._chain = {chain.name: i for i, chain in enumerate(chains)}
+        counts = accumulate((chain.count for chain in chains), initial=len(tables))
+        #: Number of each chain's first member; behind them how many there are.
+        self.starts = tuple(counts)
+
+    def __len__(self) -> int:
+        return self.starts[-1]
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[T]: ...
+    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        index = index + len(self) if index < 0 else index
+        if 0 <= index < len(self.tables):
+            return self.tables[index]
+        chain, k = self.member(index)
+        return self._make(self.chains[chain], k)
+
+    def _make(self, chain: Chain, k: int) -> T:
+        raise NotImplementedError
+
+    def member(self, index: int) -> tuple[int, int]:
+        """(chain, place in it) of a number behind the tables.  IndexError if there is none."""
+        if not len(self.tables) <= index < len(self):
+            raise IndexError(f"there are {len(self)}, not {index}")
+        chain = bisect_right(self.starts, index) - 1
+        return chain, index - self.starts[chain]
+
+    def name(self, index: int) -> str:
+        """The name of number `index`: "rod1" or "rope[3]"."""
+        if index < len(self.tables):
+            return self.tables[index].name
+        chain, k = self.member(index)
+        return f"{self.chains[chain].name}[{k}]{self.behind}"
+
+    def find(self, name: str) -> int | None:
+        """Number of the one of this name, None if there is none."""
+        known = self._index.get(name)
+        if known is not None or not self.chains or not name.endswith(self.behind):
+            return known
+        place = self.place(name.removesuffix(self.behind) if self.behind else name)
+        if place is None or not 0 <= place[1] < self.chains[place[0]].count:
+            return None
+        return self.starts[place[0]] + place[1]
+
+    def place(self, name: str) -> tuple[int, int] | None:
+        """(chain, k) of "rope[k]" for a chain there is, k perhaps beyond its end."""
+        match = _MEMBER.fullmatch(name)
+        if match is None or match[1] not in self._chain:
+            return None
+        chain = self._chain[match[1]]
+        return chain, self.chains[chain].count - 1 if match[2] == "last" else int(match[2])
+
+    def of_chain(self, name: str) -> bool:
+        """True where a name begins with that of a chain."""
+        return name.partition("[")[0].partition(".")[0] in self._chain
+
+    def missing(self, name: str, shown: str = "") -> str:
+        """Why there is nothing of this name, and what is near it; `shown` is how it is quoted."""
+        shown = shown or f'"{name}"'
+        plain = name.removesuffix(self.behind) if self.behind else name
+        place = self.place(plain)
+        owner = plain.partition("[")[0].partition(".")[0]
+        if place is None and owner in self._chain:
+            place = self._chain[owner], -1
+        if place is None:
+            return f"there is no {self.word} {shown}{near(name, self.names())}"
+        chain = self.chains[place[0]]
+        first, last = (f"{chain.name}[{k}]{self.behind}" for k in (0, chain.count - 1))
+        return f'there is no {self.word} {shown}; the chain "{chain.name}" has {first} to {last}'
+
+    def names(self) -> Iterator[str]:
+        """Every name, in order."""
+        yield from self._index
+        for chain in self.chains:
+            for k in range(chain.count):
+                yield f"{chain.name}[{k}]{self.behind}"
+
+    @property
+    def by_name(self) -> Mapping[str, T]:
+        """The same as a mapping from names."""
+        return ByName(self)
+
+
+class Bodies(Members[Body]):
+    """Every body of a scene."""
+
+    word = "body"
+
+    def _make(self, chain: Chain, k: int) -> Body:
+        return Body.model_construct(name=f"{chain.name}[{k}]", **vars(chain.body_of(k)))
+
+    def ends(self, name: str) -> Mapping[str, object] | None:
+        """The ends of the body of this name, None if there is none."""
+        index = self.find(name)
+        if index is None:
+            return None
+        if index < len(self.tables):
+            return self.tables[index].ends
+        chain, k = self.member(index)
+        return self.chains[chain].body_of(k).ends
+
+
+class Hinges(Members[Hinge]):
+    """Every hinge of a scene."""
+
+    word = "hinge"
+    behind = f".{HINGE}"
+
+    def _make(self, chain: Chain, k: int) -> Hinge:
+        table = vars(chain.hinge_of(k))
+        if k == 0 and chain.orientation is not None:
+            table = {**table, "orientation": chain.orientation}
+        return Hinge.model_construct(
+            name=f"{chain.name}[{k}]{self.behind}", inboard=chain.inboard_of(k),
+            outboard=f"{chain.name}[{k}]", position=chain.position if k == 0 else (0.0, 0.0, 0.0),
+            **table,
+        )  # fmt: skip
+
+
+class ByName(Mapping[str, T]):
+    """Members by their names, made when they are asked for."""
+
+    def __init__(self, members: Members[T]) -> None:
+        self.members = members
+
+    def __getitem__(self, name: str) -> T:
+        index = self.members.find(name)
+        if index is None:
+            raise KeyError(name)
+        return self.members[index]
+
+    def __iter__(self) -> Iterator[str]:
+        return self.members.names()
+
+    def __len__(self) -> int:
+        return len(self.members)
