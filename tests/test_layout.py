@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -185,6 +186,23 @@ def test_import_contracts_hold() -> None:
         [linter, "--no-cache"], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("room", ["mstmm", "derive", "runtime", "tests"])
+def test_a_folder_is_seen_at_one_glance(room: str) -> None:
+    flat = Counter(path.parent.relative_to(ROOT).as_posix() for path in python_files(room))
+    assert not {folder: count for folder, count in flat.items() if count > 23}
+
+
+def test_private_names_stay_in_their_module() -> None:
+    taken = [
+        (path.name, name)
+        for room in ("mstmm", "derive", "runtime")
+        for path in python_files(room)
+        for _, name in imports(path)
+        if any(re.match(r"_[a-zA-Z]", part) for part in name.split("."))
+    ]
+    assert {name for _, name in taken} <= {"mstmm.generated._kernels", "_ctypes", "_signal"}
 
 
 def test_no_module_imports_itself_in_the_end() -> None:

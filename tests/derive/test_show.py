@@ -24,7 +24,7 @@ from mstmm.derive.show.recognise import recognise
 from mstmm.derive.show.text import WIDTH, columns, wrapped
 from mstmm.errors import ElementError
 
-#: Acceleration form; tests/flexible/test_classical_show.py has the discrete-time form.
+#: Acceleration form; tests/flexible/classical/test_show.py has the discrete-time form.
 NAMES = sorted(set(CLASSICAL) - set(FLEXIBLE))
 
 

@@ -27,7 +27,7 @@ SOURCES = (
 HEADERS = (
     "engine_integrate", "engine_step", "engine_wide", "engine_lanes", "engine_lanes_step",
 )  # fmt: skip
-TEST_SYSTEMS = Path(__file__).parent.parent / "integrators" / "systems.c"
+TEST_SYSTEMS = Path(__file__).parent.parent / "integrate" / "systems.c"
 TEST_DECLARATIONS = """
 typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
 parameters;

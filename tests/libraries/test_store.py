@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from cache.workbench import false_compiler
+from libraries.workbench import false_compiler
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.kernels import store
 from mstmm.runtime.libraries.folder import objection

@@ -13,7 +13,7 @@ import pytest
 from mstmm.cli.guard import run
 from mstmm.runtime.integrate import steppers
 
-PAGES = Path(__file__).parents[1] / "docs" / "use" / "extending"
+PAGES = Path(__file__).parents[2] / "docs" / "use" / "extending"
 #: A block, with the file's name where the line before it is one.
 BLOCK = re.compile(r"^(?:`([\w.]+)`:\n\n)?```(python|toml|console)\n(.*?)^```", re.M | re.S)
 

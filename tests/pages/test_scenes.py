@@ -34,7 +34,7 @@ from mstmm.scene import (
 from mstmm.scene.rules.values import Table
 from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
-PAGES = Path(__file__).parents[1] / "docs" / "use"
+PAGES = Path(__file__).parents[2] / "docs" / "use"
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}-{i}")
     for page in sorted(PAGES.glob("*.md"))

@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib
 import pytest
 
-PAGE = Path(__file__).parents[1] / "docs" / "use" / "flexible.md"
+PAGE = Path(__file__).parents[2] / "docs" / "use" / "flexible.md"
 TEXT = PAGE.read_text("utf-8")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 CHECKS = sorted(EXAMPLES.glob("*/check.py"))
 PICTURES = sorted(EXAMPLES.glob("*/picture.py"))
 

@@ -12,7 +12,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from crosscheck.mutations import mutants
+from bridge.mutations import mutants
 from support.discrete_bodies import DIGITS, kernel_inputs
 from support.hinge_premises import body_residual, hinge_residual, matrices
 from support.premises import Premises

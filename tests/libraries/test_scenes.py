@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from cache.workbench import NOBODY, entry_folders, false_compiler
+from libraries.workbench import NOBODY, entry_folders, false_compiler
 from mstmm.bridge.fusion import Fusion
 from mstmm.runtime.kernels.fused import open_library
 from mstmm.runtime.libraries import cache

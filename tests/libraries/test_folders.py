@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from cache.workbench import (
+from libraries.workbench import (
     NOBODY,
     Kernel,
     assert_tidy,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from cache.workbench import Kernel, scaled
+from libraries.workbench import Kernel, scaled
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.host import lock, process  # noqa: F401 - before fork
 from mstmm.runtime.libraries import cache

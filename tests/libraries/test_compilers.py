@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cache.workbench import Kernel, alive, assert_tidy, false_compiler, scaled
+from libraries.workbench import Kernel, alive, assert_tidy, false_compiler, scaled
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.libraries import cache, self_test
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cache.workbench import Kernel, alive, assert_tidy, entry_folders, false_compiler, scaled
+from libraries.workbench import Kernel, alive, assert_tidy, entry_folders, false_compiler, scaled
 from mstmm.runtime.host import lock
 from mstmm.runtime.libraries import cache
 from mstmm.runtime.libraries import entry as entries

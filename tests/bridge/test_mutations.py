@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from crosscheck.mutations import mutants
+from bridge.mutations import mutants
 
 from mstmm.bridge.crosscheck import crosscheck, crosscheck_kernels, mechanics
 from mstmm.derive.catalogue.kernels import Kernel, built_in_kernels

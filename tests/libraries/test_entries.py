@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from cache.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
+from libraries.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.libraries import cache, processor, toolchain
 from mstmm.runtime.libraries.upkeep import clean, listed
