@@ -14,9 +14,10 @@ from typing import Any
 import mpmath
 
 from mstmm.ir import Constant, KernelIR
+from mstmm.ir.floats import Operation
+from mstmm.ir.replay import Values, run
 
-from .arithmetic import Operation, PreciseArithmetic
-from .evaluate import Values, run
+from .arithmetic import PreciseArithmetic
 
 #: Unit roundoff of a double.
 UNIT = 2.0**-53

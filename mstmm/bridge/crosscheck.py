@@ -170,7 +170,9 @@ class _Subject:
         self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
     ) -> tuple[float, float] | str | None:
         """(equations, compiled) errors; None where all are stopped alike; text where not."""
-        from ..derive.audit.evaluate import GuardFailure, evaluate
+        from mstmm.ir.replay import GuardFailure
+
+        from ..derive.audit.evaluate import evaluate
         from ..derive.audit.evaluate_equations import Undefined, evaluate_equations
 
         code, exact = 0, None

@@ -10,9 +10,9 @@ import pytest
 from support.c_library import CLibrary, compile_library, same
 
 from mstmm.border import elements as abi
-from mstmm.derive.audit.evaluate import GuardFailure, evaluate_floats
 from mstmm.derive.audit.rounding import rounding_bounds
 from mstmm.ir import KernelIR, Port
+from mstmm.ir.replay import GuardFailure, evaluate_floats
 from mstmm.ir.spec import ElementSpec
 from mstmm.ir.stored import element_from_json
 from mstmm.ir.tape import compile_tape

@@ -20,7 +20,6 @@ from support.classical_kernels import (
 from support.dense_chain import Array, Body, Joint, accelerations, planar_body, random_body
 from support.sign_flips import Flip, flipped, flips, terms
 
-from mstmm.derive.audit.evaluate import GuardFailure
 from mstmm.derive.classical import (
     acceleration,
     ball,
@@ -34,6 +33,7 @@ from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.hinge_relation import VANISHING_PIVOT, HingeStatement
 from mstmm.derive.language.notation import matrix_symbols
 from mstmm.ir import KernelIR
+from mstmm.ir.replay import GuardFailure
 
 SPATIAL_BODY = kernel(body_spatial.derivation())
 PLANAR_BODY = kernel(body_planar.derivation())

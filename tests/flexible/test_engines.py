@@ -15,9 +15,9 @@ from support.complex_arithmetic import complex_step
 
 import mstmm
 from mstmm.bridge.fusion import Fusion, modes_at
-from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR
+from mstmm.ir.replay import evaluate_floats
 from mstmm.runtime.pack.structure import structure_of
 
 AGREEMENT = 1e-13

@@ -13,7 +13,7 @@ from reference.jets import Array
 from reference.tree import SIZES
 
 import mstmm
-from mstmm.derive.audit.evaluate import evaluate_floats
+from mstmm.ir.replay import evaluate_floats
 from mstmm.runtime.pack.structure import structure_of
 
 AGREEMENT = 1e-13

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.derive.fuse.passes.interleave import merged
 from mstmm.derive.fuse.passes.line import Line, operands
 from mstmm.derive.fuse.passes.registers import thrifty
 from mstmm.derive.fuse.passes.sincos import gather
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
 from mstmm.ir.graph import Graph
+from mstmm.ir.replay import evaluate_floats
 
 
 def lines(kernel: KernelIR) -> list[Line]:

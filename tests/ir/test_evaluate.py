@@ -8,10 +8,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.errors import NumericalFailure
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph
+from mstmm.ir.replay import GuardFailure, evaluate_floats
 
 
 def kernel() -> KernelIR:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.audit.rounding import UNIT, rounding_bounds
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Solve, Store, Temporary
 from mstmm.ir.graph import Graph
+from mstmm.ir.replay import GuardFailure, evaluate_floats
 
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")
 CONTINUOUS = tuple(op for op in OPERATIONS if op not in JUMPS)

@@ -11,9 +11,10 @@ from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
 from mstmm.border import elements as abi
-from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.ir import LOOP_INDEX, Element, KernelIR, Port, Solve, Store, from_json, to_json
 from mstmm.ir.graph import Graph
+from mstmm.ir.replay import GuardFailure, evaluate_floats
 from mstmm.ir.spec import ElementSpec
 from mstmm.ir.tape import compile_tape
 

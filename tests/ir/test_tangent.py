@@ -14,9 +14,10 @@ from ir.test_run_time_size import SIZES, drawn
 from support.complex_arithmetic import complex_step
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import GuardFailure, evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.ir import Constant, KernelIR, Port, Store
 from mstmm.ir.graph import Graph
+from mstmm.ir.replay import GuardFailure, evaluate_floats
 from mstmm.ir.tangent import tangent
 
 Arrays = dict[str, list[float]]

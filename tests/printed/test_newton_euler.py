@@ -13,7 +13,6 @@ import sympy as sp
 from printed.formulas import PRINTED_FORMULAS, PrintedFormula, as_markdown, as_page
 from support.dense_chain import output_state, random_body
 
-from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.derive.elements.body_rigid import RigidBody
 from mstmm.derive.equations import newton_euler as ne
 from mstmm.derive.equations.mass_distribution import POINT, general, of_tensor, point_masses
@@ -22,6 +21,7 @@ from mstmm.derive.language.derivation import tilde
 from mstmm.derive.language.element import Symbols
 from mstmm.derive.language.notation import Matrix
 from mstmm.derive.lower.kernel import lower
+from mstmm.ir.replay import evaluate_floats
 
 ZERO = sp.zeros(3, 1)
 Points = Sequence[tuple[float, tuple[float, float, float]]]

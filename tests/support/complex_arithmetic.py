@@ -9,9 +9,9 @@ import cmath
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from mstmm.derive.audit.arithmetic import FloatArithmetic
-from mstmm.derive.audit.evaluate import run
 from mstmm.ir import Constant, KernelIR
+from mstmm.ir.floats import FloatArithmetic
+from mstmm.ir.replay import run
 
 STEP = 1e-200
 

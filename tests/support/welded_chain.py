@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mstmm.derive.audit.evaluate import evaluate, evaluate_floats
+from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.classical.discrete import body as flexible_body
 from mstmm.derive.classical.discrete import joint as flexible_joint
 from mstmm.derive.classical.discrete.hinge import Pairing
@@ -24,6 +24,7 @@ from mstmm.derive.classical.discrete.state import PLANE
 from mstmm.derive.classical.discrete.statement import BodyStatement
 from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
+from mstmm.ir.replay import evaluate_floats
 
 Array = NDArray[np.float64]
 TURN = 0.3

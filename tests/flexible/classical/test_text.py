@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mstmm.derive.audit.evaluate import evaluate_floats
 from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.lower.kernel import lower
 from mstmm.ir import KernelIR
+from mstmm.ir.replay import evaluate_floats
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Array]
