@@ -65,11 +65,17 @@ def instance(element: type[Element]) -> Element:
 
 
 def builtin_elements() -> list[Element]:
-    """All elements of `derive/elements/`, by file name; the same instances at every call.
+    """All elements of `derive/elements/` with kernels of their own, by file name; the same
+    instances at every call.
 
     Raises ElementError for a name used twice.
     """
-    return list(_builtin_elements())
+    return [e for e in _builtin_elements() if not (isinstance(e, Hinge) and e.runs_as)]
+
+
+def builtin_hinges() -> list[Hinge]:
+    """All hinges of `derive/elements/`, those that run as others too."""
+    return [element for element in _builtin_elements() if isinstance(element, Hinge)]
 
 
 @cache

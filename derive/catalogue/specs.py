@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from mstmm.ir import KernelIR
+from mstmm.ir.facts import HingeFacts, facts_of
 from mstmm.ir.spec import ElementSpec
 
 from ..classical.catalogue import CLASSICAL, classical_spec
@@ -25,11 +28,12 @@ from .kernels import (
     modal_kernels,
     screw_kernels,
 )
-from .registry import Element, builtin_elements, kind_of
+from .registry import Element, builtin_elements, builtin_hinges, kind_of
 
 __all__ = [
     "FRAME_DERIVATIONS",
     "MAX_SPEEDS",
+    "all_facts",
     "all_specs",
     "generic_spec",
     "shared_specs",
@@ -50,6 +54,7 @@ def spec_of(element: Element) -> ElementSpec:
 def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
     """The element with its kernels, once they are derived."""
     hinge = element if isinstance(element, Hinge) else None
+    lowered = _lowered(kernels)
     return ElementSpec(
         kind_of(element),
         element.name,
@@ -57,9 +62,30 @@ def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
         hinge.coordinates if hinge else (),
         speeds_of(hinge) if hinge else (),
         element.parameters,
-        _lowered(kernels),
+        lowered,
         element.sources,
+        None if hinge is None else hinge_facts(hinge, lowered),
     )
+
+
+def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeFacts:
+    """What a hinge leaves free, by its kernel "hinge"."""
+    motion = next(kernel for kernel in kernels if kernel.name == "hinge")
+    return facts_of(
+        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame,
+        hinge.keys, hinge.allows or hinge.title,
+    )  # fmt: skip
+
+
+def all_facts(specs: Sequence[ElementSpec]) -> list[HingeFacts]:
+    """Facts of the built-in hinges, the fewest speeds first."""
+    known = {spec.name: spec.facts for spec in specs if spec.facts is not None}
+    for hinge in builtin_hinges():
+        if hinge.runs_as:
+            known[hinge.name] = replace(
+                known[hinge.runs_as], name=hinge.name, allows=hinge.allows, runs_as=hinge.runs_as
+            )
+    return sorted(known.values(), key=lambda facts: (len(facts.speeds), facts.name))
 
 
 def generic_spec(nu: int) -> ElementSpec:

@@ -11,6 +11,8 @@ class Ball(Hinge):
 
     name = "ball"
     title = "ball hinge"
+    allows = "free rotation"
+    frame = "own"
     coordinates = tuple(Param(n, "", "unit quaternion, outboard to inboard") for n in "wxyz")
     speeds = tuple(Param(f"w{n}", "rad/s", "angular velocity, outboard axes") for n in "xyz")
     sources = ("Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)",)

@@ -10,6 +10,7 @@ class Cylindrical(Hinge):
 
     name = "cylindrical"
     title = "cylindrical hinge"
+    allows = "rotation and translation along one axis"
     coordinates = (
         Param("displacement", "m", "translation along the hinge axis"),
         Param("angle", "rad", "rotation about the hinge axis"),

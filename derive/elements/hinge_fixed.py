@@ -8,3 +8,6 @@ class Fixed(Hinge):
 
     name = "fixed"
     title = "fixed hinge"
+    allows = "rigid connection"
+    frame = "own"
+    keys = ()

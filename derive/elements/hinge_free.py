@@ -20,6 +20,8 @@ class Free(Hinge):
 
     name = "free"
     title = "free hinge"
+    allows = "six degrees of freedom"
+    frame = "own"
     coordinates = COORDINATES
     speeds = SPEEDS
 

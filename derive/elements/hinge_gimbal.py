@@ -10,6 +10,9 @@ class Gimbal(Hinge):
 
     name = "gimbal"
     title = "gimbal hinge (three angles)"
+    allows = "three angles, R = Rz(angle3) Ry(angle2) Rx(angle1)"
+    frame = "own"
+    keys = ()
     coordinates = (
         Param("angle1", "rad", "rotation about x"),
         Param("angle2", "rad", "rotation about y"),

@@ -14,7 +14,7 @@ from fractions import Fraction
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Node
-from mstmm.ir.structure import ANGLE, BodyStructure, Structure
+from mstmm.ir.structure import BodyStructure, Structure, angle_of
 
 from .inline import Nodes
 from .loads import LoadPass
@@ -144,7 +144,7 @@ class _Fusion(FusionState):
             x, y, z = hinge["d"]
             hinge["d"] = [x, y, z + shift]
             if angle.value != 0:
-                place = ANGLE[body.hinge[1]]
+                place = angle_of(body.hinge)
                 turned = [x + angle if k == place else x for k, x in enumerate(q)]
                 hinge["R"] = run(turned)["R"]
         return hinge

@@ -50,6 +50,10 @@ def described(what: str, declared: tuple[Param, ...]) -> str:
 class Hinge:
     """Motion of the outboard point P against the inboard point Q (design: one hinge for all).
 
+    `frame` says how its frame lies in a scene and `keys` which keys of a scene's hinge it reads
+    (`mstmm.ir.facts.FRAMES`); parameters that are no keys are given by name.  `allows` says what
+    moves, in a few words.
+
     Subclasses declare the class attributes and `rotation` (P axes to Q axes, 3 x 3) and
     `position` (P from Q in Q axes, 3 x 1), both in the hinge frame.  The motion subspace and the
     bias acceleration follow from them.  Speeds are the rates of the coordinates unless `rates`
@@ -62,6 +66,11 @@ class Hinge:
     speeds: ClassVar[tuple[Param, ...] | None] = None
     parameters: ClassVar[tuple[Param, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
+    allows: ClassVar[str] = ""
+    frame: ClassVar[str] = "axis"
+    keys: ClassVar[tuple[str, ...]] = ("axis",)
+    #: The hinge whose kernels move this one too, where two types differ in what a scene says alone.
+    runs_as: ClassVar[str] = ""
 
     def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
         """Rotation from P axes to Q axes (3 x 3, orthogonal for every q)."""

@@ -19,6 +19,7 @@ import mstmm.templates
 from mstmm.border import elements as abi
 from mstmm.border import fused as fused_abi
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
+from mstmm.ir.facts import HingeFacts, facts_to_data
 from mstmm.ir.spec import ElementSpec, Param
 from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
@@ -79,8 +80,11 @@ def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
     return json.dumps(found, indent=1) + "\n"
 
 
-def generated_files(specs: Iterable[ElementSpec], *, engine: bool = True) -> dict[str, str]:
-    """File name -> text of everything generated, elements sorted by kind and name.
+def generated_files(
+    specs: Iterable[ElementSpec], *, engine: bool = True, hinges: Sequence[HingeFacts] = ()
+) -> dict[str, str]:
+    """File name -> text of everything generated, elements sorted by kind and name; `hinges` are
+    the facts of those that a scene may name.
 
     `engine=False` leaves out the kernel-free C (for a user's element compiled on its own).
     ValueError if two elements share kind and name.
@@ -95,18 +99,24 @@ def generated_files(specs: Iterable[ElementSpec], *, engine: bool = True) -> dic
         files[f"{stem}.json"] = element_to_json(spec)
     files["registry.c"] = registry_source(ordered)
     files |= engine_sources(ordered) if engine else {}
+    if hinges:
+        files["hinges.json"] = json.dumps([facts_to_data(h) for h in hinges], indent=1) + "\n"
     files["manifest.json"] = manifest(ordered, files)
     return files
 
 
 def write_generated(
-    specs: Iterable[ElementSpec], folder: Path | str, *, engine: bool = True
+    specs: Iterable[ElementSpec],
+    folder: Path | str,
+    *,
+    engine: bool = True,
+    hinges: Sequence[HingeFacts] = (),
 ) -> list[Path]:
     """Write `generated_files` into `folder` (made if missing); returns the paths, sorted."""
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name, text in generated_files(specs, engine=engine).items():
+    for name, text in generated_files(specs, engine=engine, hinges=hinges).items():
         path = target / name
         path.write_text(text, encoding="utf-8", newline="\n")
         paths.append(path)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ElementError, SceneError
+from ..ir.facts import builtin_hinges
 from ..ir.spec import ElementSpec
 from ..scene import Scene
-from ..scene.tables.hinge_types import HINGE_TYPES
 
 if TYPE_CHECKING:
     from ..derive.catalogue.registry import Element
@@ -114,7 +114,7 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
     made = []
     for element in elements:
         kind, name = kind_of(element), element.name
-        if (kind, name) in prebuilt.elements() or (kind == "hinge" and name in HINGE_TYPES):
+        if (kind, name) in prebuilt.elements() or (kind == "hinge" and name in builtin_hinges()):
             raise ElementError(f"{kind} {name!r} is built in; choose another name")
         check(element)
         spec = spec_of(element)

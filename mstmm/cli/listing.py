@@ -28,17 +28,17 @@ class Section(NamedTuple):
 
 
 def _hinges() -> Section:
-    from mstmm.scene.tables.hinge_types import HINGE_TYPES
+    from mstmm.ir.facts import builtin_hinges
 
     from .stored import Entry, with_unit
 
     entries = [
         Entry(
-            "hinge", kind.name, kind.title,
+            "hinge", kind.name, kind.allows,
             tuple(with_unit(c.name, c.unit) for c in kind.coordinates),
             tuple(with_unit(c.name, c.unit) for c in kind.speeds), kind.keys,
         )
-        for kind in HINGE_TYPES.values()
+        for kind in builtin_hinges().values()
     ]  # fmt: skip
     rows = [(e.name, e.title, _joined(e.coordinates), ", ".join(e.parameters)) for e in entries]
     columns = ("hinge", "what it allows", "coordinates q", "keys of its own")

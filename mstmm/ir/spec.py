@@ -5,29 +5,21 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
+from .facts import HingeFacts
 from .kernel import KernelIR
+from .param import Param
+
+__all__ = ["ENTRY_POINTS", "ElementSpec", "Param"]
 
 #: Entry points in which installed packages name their elements: a class, or a module of them.
 ENTRY_POINTS = "mstmm.elements"
 
 
 @dataclass(frozen=True)
-class Param:
-    """A named number of an element: unit in SI, bounds inclusive, None where there is none."""
-
-    name: str
-    unit: str = ""
-    meaning: str = ""
-    default: float | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-
-
-@dataclass(frozen=True)
 class ElementSpec:
     """What generation needs of an element: its coordinates, parameters and kernels.
 
-    `kind` is one of hinge, body, force, law, sweep, classical.
+    `kind` is one of hinge, body, force, law, sweep, classical; hinges have `facts`.
     """
 
     kind: str
@@ -38,6 +30,7 @@ class ElementSpec:
     parameters: tuple[Param, ...]
     kernels: tuple[KernelIR, ...]
     sources: tuple[str, ...] = ()
+    facts: HingeFacts | None = None
 
     def hash(self) -> str:
         """SHA-256 over everything that reaches the C file."""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import astuple
+from typing import Any
 
+from .facts import facts_from_data, facts_of, facts_to_data
 from .kernel import KernelIR, from_json, to_json
 from .spec import ElementSpec, Param
 
 
 def element_to_json(spec: ElementSpec) -> str:
     """The same bytes on every machine; `element_from_json` is the inverse."""
-    head = {
+    head: dict[str, Any] = {
         "kind": spec.kind,
         "name": spec.name,
         "title": spec.title,
@@ -20,6 +22,8 @@ def element_to_json(spec: ElementSpec) -> str:
         "speeds": [list(astuple(p)) for p in spec.speeds],
         "parameters": [list(astuple(p)) for p in spec.parameters],
     }
+    if spec.facts is not None:
+        head["facts"] = facts_to_data(spec.facts)
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
     kernels = ",\n".join(to_json(kernel).rstrip("\n") for kernel in spec.kernels)
     return "{\n" + ",\n".join(lines) + ',\n"kernels": [\n' + kernels + "\n]}\n"
@@ -28,18 +32,21 @@ def element_to_json(spec: ElementSpec) -> str:
 def element_from_json(text: str) -> ElementSpec:
     """The element again.  ValueError if the text is not JSON, or a kernel in it is refused."""
     data = json.loads(text)
-    groups = {
+    groups: dict[str, Any] = {
         group: tuple(Param(*entry) for entry in data[group])
         for group in ("coordinates", "speeds", "parameters")
     }
+    kernels = tuple(from_json(json.dumps(kernel)) for kernel in data["kernels"])
+    facts = None
+    if "facts" in data:
+        facts = facts_from_data(data["facts"])
+    elif data["kind"] == "hinge":  # stored before hinges brought theirs
+        motion = next(kernel for kernel in kernels if kernel.name == "hinge")
+        facts = facts_of(motion, data["name"], **groups)
     return ElementSpec(
-        kind=data["kind"],
-        name=data["name"],
-        title=data["title"],
-        kernels=tuple(from_json(json.dumps(kernel)) for kernel in data["kernels"]),
-        sources=tuple(data["sources"]),
-        **groups,
-    )
+        kind=data["kind"], name=data["name"], title=data["title"], kernels=kernels,
+        sources=tuple(data["sources"]), facts=facts, **groups,
+    )  # fmt: skip
 
 
 def kernel_from_json(text: str, name: str) -> KernelIR:

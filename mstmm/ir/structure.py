@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from .facts import builtin_hinges
 from .kernel import KernelIR
 
 #: A structural constant (float) or a place in p (int).
@@ -18,10 +19,6 @@ Entry = float | int
 Entries = tuple[Entry, ...]
 #: (kind, name) of an element; its kernels are looked up by name.
 Key = tuple[str, str]
-
-
-#: The coordinate that turns a hinge about z, of hinges that move about and along z alone.
-ANGLE = {"pin": 0, "screw": 0, "cylindrical": 1}
 
 
 @dataclass(frozen=True)
@@ -156,3 +153,9 @@ class Structure:
     def identity(self) -> str:
         """SHA-256 over everything that decides the fused code, kernels of mstmm itself aside."""
         return hashlib.sha256(repr(self).encode()).hexdigest()
+
+
+def angle_of(hinge: Key) -> int | None:
+    """The coordinate that turns a built-in hinge about z, of those that move about and along z."""
+    facts = builtin_hinges().get(hinge[1])
+    return facts.turns[0] if facts is not None and facts.axial and facts.turns else None

@@ -14,8 +14,8 @@ from typing import Any
 from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..ir.spec import ElementSpec
+from .checks import flexible, types
 from .checks import scene as checks
-from .checks import types
 from .files.write import to_toml
 from .rules.messages import TABLES, report, scene_error
 from .rules.values import Refused
@@ -72,9 +72,12 @@ class Scene(SceneTables):
     ) -> None:
         """Check that every type is built in or known, and fits its definition.
 
-        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.
+        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.  From
+        then on hinges of users' types have the facts of theirs.
         """
         problems = types.problems(self, known_types)
+        if not problems:
+            problems = types.learn(self, known_types) + list(flexible.spins(self))
         if problems:
             raise report(problems, self._tables(), where)
 

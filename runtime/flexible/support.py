@@ -10,13 +10,10 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.scene.checks.flexible import free_axes
 from mstmm.scene.rules.values import GROUND
+from mstmm.scene.tables.hinge_frames import start_motion
 
 if TYPE_CHECKING:
     from mstmm.scene import Body, Hinge, Scene
-
-
-#: Hinges whose free motions are rotations about the axes of their outboard end alone.
-_TURNING = ("pin", "universal", "ball", "gimbal")
 
 
 @dataclass(frozen=True)
@@ -85,17 +82,19 @@ class Supports:
             return None
         if _prescribed(hinge):
             return np.zeros((6, 0))
-        if hinge.type == "prismatic":
-            return np.array([*hinge.unit_axis, 0.0, 0.0, 0.0])[:, None]
-        if hinge.type not in _TURNING:
+        facts = hinge.facts
+        if facts is None or (facts.slides and (facts.turns or not facts.steady)):
             return None
+        if facts.slides:
+            along = np.array([translation for translation, _ in start_motion(hinge)]).T
+            return np.concatenate([along, np.zeros_like(along)])
         axes = np.array(free_axes(hinge)).reshape(-1, 3).T
         return np.concatenate([np.zeros_like(axes), axes])
 
 
 def _prescribed(hinge: Hinge) -> bool:
     driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
-    return hinge.type == "fixed" or driven
+    return hinge.is_weld or driven
 
 
 def _rotors(hinge: Hinge, motion: Array) -> Array:

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,12 @@ import cffi
 
 from mstmm.border import elements as abi
 from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.ir.facts import builtin_hinges, same_motion
 from mstmm.ir.spec import ElementSpec
-from mstmm.ir.stored import element_from_json, element_to_json
+from mstmm.ir.stored import element_from_json, element_to_json, kernel_from_json
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Scene
 from mstmm.scene.checks.types import types
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..host.files import replacing
 from ..libraries.build import Built, Order, fetched, found, remove
@@ -264,7 +265,7 @@ def needed(scene: Scene) -> list[Key]:
     return sorted(
         key
         for key in types(scene)
-        if key not in elements and not (key[0] == "hinge" and key[1] in HINGE_TYPES)
+        if key not in elements and not (key[0] == "hinge" and key[1] in builtin_hinges())
     )
 
 
@@ -275,6 +276,23 @@ def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpe
     for key in keys:
         stored = spec(key)
         if stored is not None:
-            definitions[key] = stored
-            elements[key] = opened(key, stored.hash())
+            definitions[key] = stored = recognised(stored)
+            if stored.facts is None or stored.facts.runs_as == stored.name:
+                elements[key] = opened(key, stored.hash())
     return elements, definitions
+
+
+def recognised(stored: ElementSpec) -> ElementSpec:
+    """The same, told to run as a built-in hinge if it has the kernel of one: those are compiled,
+    and the sweep has more to offer them."""
+    mine = stored.facts
+    if mine is None:
+        return stored
+    for name, built in builtin_hinges().items():
+        if built.runs_as != name or (mine.varies, mine.straight) != (built.varies, built.straight):
+            continue
+        text = files("mstmm.generated").joinpath(f"hinge_{name}.json").read_text(encoding="utf-8")
+        own = next(kernel for kernel in stored.kernels if kernel.name == "hinge")
+        if same_motion(own, kernel_from_json(text, "hinge")):
+            return replace(stored, facts=replace(mine, runs_as=name))
+    return stored

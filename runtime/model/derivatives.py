@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.tangents import Tangents
 from ..pack.pack import pack
@@ -74,8 +73,7 @@ class Differentiation:
             self.slopes = np.zeros((len(self.p), 0))
         self.tangents = Tangents(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
-        kinds = [HINGE_TYPES.get(hinge.type) for hinge in model.layout.hinges.values()]
-        self._straight = all(kind is not None and kind.quaternion is None for kind in kinds)
+        self._straight = all(hinge.straight for hinge in model.layout.hinges.values())
 
     def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
         """Derivatives of n states, t (n, 1), q (n, nq), u and efforts (n, nu), by the names of

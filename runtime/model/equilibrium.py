@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
 from ..pack.layout import refuse_dense
@@ -68,8 +67,7 @@ def free_speeds(model: Compiled) -> list[int]:
     for number, hinge in enumerate(model.packed.scene.hinges):
         slots = model.layout.slots(number)
         drive = hinge.drive or (None,) * slots.nu
-        held = hinge.type == "fixed"
-        free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not held]
+        free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not hinge.is_weld]
     for slots in model.layout.modal.values():
         free += range(slots.u, slots.u + slots.nu)
     return free
@@ -103,8 +101,7 @@ def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | No
     """Places in q whose rates are the free speeds; None where a hinge has others."""
     places = np.zeros(model.nu, dtype=np.int64)
     for slots in model.layout.hinges.values():
-        kind = HINGE_TYPES.get(slots.type)
-        if slots.nu and (kind is None or kind.quaternion is not None):
+        if slots.nu and not slots.straight:
             return None
         places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
     for slots in model.layout.modal.values():

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 
+from mstmm.ir.facts import builtin_hinges
 from mstmm.numbers.rotations import Matrix, Vector, apply, dot, from_rpy, norm, product
 from mstmm.scene import Body, Hinge
+from mstmm.scene.tables.hinge_frames import hinge_frames
 
-from .placement import KERNEL_OF, Placement, alignment
-
-#: Hinges that move about and along their own axis alone.
-AXIAL = frozenset({"pin", "prismatic", "cylindrical", "screw"})
+from .placement import Placement
 
 #: Entries of rotations, and lengths over the size of the connection, that are rounding (a few
 #: units in the last place of a product of three rotations) and stand for 0 or +-1.
@@ -34,8 +33,10 @@ Link = tuple[float, float, float, float, float]
 
 
 def is_axial(hinge: Hinge) -> bool:
-    """Whether the hinge leaves its frames free to turn about and move along z."""
-    return KERNEL_OF.get(hinge.type, hinge.type) in AXIAL
+    """Whether the hinge leaves its frames free to turn about and move along z, and runs on kernels
+    that know it."""
+    facts = hinge.facts
+    return facts is not None and facts.axial and facts.runs_as in builtin_hinges()
 
 
 def snapped(value: float, size: float = 1.0) -> float:
@@ -53,7 +54,7 @@ def aligned(own: Placement, body: Body, hinge: Hinge, child: tuple[Hinge, str] |
     """
     if child is None or not is_axial(hinge) or not is_axial(child[0]):
         return own
-    inner, _, _ = alignment(child[0])
+    inner, _ = hinge_frames(child[0])
     user = product(product(body.end_rotation(child[1]), child[0].rotation), inner)
     turned, position = own.axes(user), own.point(body.end_position(child[1]))
     axis = (turned[0][2], turned[1][2], turned[2][2])

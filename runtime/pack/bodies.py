@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mstmm.errors import SceneError
+from mstmm.ir.facts import builtin_hinges
+from mstmm.ir.param import Param
 from mstmm.ir.tape import Tape
 from mstmm.numbers.rotations import Matrix
 from mstmm.scene import Body, Hinge, Scene
 from mstmm.scene.checks.topology import Run, Topology
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
+from mstmm.scene.tables.hinge_frames import hinge_frames, key_numbers
 
 from ..flexible.records import ModalRecords, in_frame, section_in
 from ..kernels import prebuilt
@@ -23,18 +25,22 @@ from . import alignment, placement
 from .alignment import connection_of
 from .flexible.expansion import Expanded
 from .layout import Group, HingeSlots, Layout
-from .placement import GROUND, KERNEL_OF, Placement, rigid_parameters
+from .placement import GROUND, Placement, rigid_parameters
 
 Known = Mapping[tuple[str, str], Element]
 Texts = tuple[str, ...]
 Numbers = tuple[float, ...]
 
 
+#: The type that a weld runs as which lets go later: it is held until then.
+LETS_GO = "free"
+
+
 def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
-    """Type of the hinge's kernel; a weld that lets go is a held free hinge from the start."""
-    if hinge.type == "fixed" and hinge.name in releases:
-        return "free"
-    return KERNEL_OF.get(hinge.type, hinge.type)
+    """Name of the element whose kernels move a hinge."""
+    if hinge.is_weld and hinge.name in releases:
+        return LETS_GO
+    return hinge.type if hinge.facts is None else hinge.facts.runs_as
 
 
 class Elements:
@@ -54,9 +60,7 @@ class Elements:
         return found
 
 
-def layout_of(
-    expanded: Expanded, releases: Mapping[str, int], elements: Elements, ffi: Any
-) -> Layout:
+def layout_of(expanded: Expanded, releases: Mapping[str, int], elements: Elements) -> Layout:
     """Places of all hinges in q and u: the scene's hinges, those of its chains, then the modes."""
     scene = expanded.scene
     groups: list[Group] = []
@@ -67,7 +71,7 @@ def layout_of(
     for first, count, pattern in zip(starts, counts, patterns, strict=True):
         slots, nq, nu = [], 0, 0
         for hinge in scene.hinges[first : first + pattern]:
-            slots.append(_slots(hinge, releases, elements, ffi, q + nq, u + nu))
+            slots.append(_slots(hinge, releases, elements, q + nq, u + nu))
             nq, nu = nq + slots[-1].nq, nu + slots[-1].nu
         groups.append(Group(first, count, tuple(slots), nq, nu))
         repeats, rest = divmod(count, pattern)
@@ -79,32 +83,28 @@ def layout_of(
         units = tuple("rad" if mode.startswith("twist") else "m" for mode in body.modes)
         rates = tuple(f"{unit}/s" for unit in units)
         speeds = tuple(f"{mode}_rate" for mode in body.modes)
-        modal[name] = HingeSlots(name, "modes", q, u, body.modes, units, speeds, rates, None)
+        modal[name] = HingeSlots(name, "modes", q, u, body.modes, units, speeds, rates, None, True)
         q, u = q + n, u + n
     internal = range(len(expanded.described.hinge), len(scene.hinge))
     return Layout(scene, tuple(groups), q, u, modal, internal)
 
 
 def _slots(
-    hinge: Hinge, releases: Mapping[str, int], elements: Elements, ffi: Any, q: int, u: int
+    hinge: Hinge, releases: Mapping[str, int], elements: Elements, q: int, u: int
 ) -> HingeSlots:
-    kernel = elements.get("hinge", kernel_type(hinge, releases), hinge.name)
-    held = hinge.type == "fixed" and kernel.nu
-    kind = HINGE_TYPES.get("free" if held else hinge.type)
-    names = _names(ffi, kernel.descriptor)
-    return HingeSlots(hinge.name, hinge.type, q, u, *names, kind.quaternion if kind else None)
-
-
-def _names(ffi: Any, descriptor: Any) -> tuple[Texts, Texts, Texts, Texts]:
-    """(q names, q units, u names, u units) of a descriptor."""
-    d = descriptor
-
-    def read(array: Any, count: int) -> Texts:
-        return tuple(prebuilt.text(ffi, array[i]) for i in range(count))
-
-    return (
-        read(d.q_names, d.nq), read(d.q_units, d.nq), read(d.u_names, d.nu), read(d.u_units, d.nu)
+    running = kernel_type(hinge, releases)
+    elements.get("hinge", running, hinge.name)
+    facts = builtin_hinges()[LETS_GO] if hinge.is_weld and running == LETS_GO else hinge.facts
+    assert facts is not None  # or the element would not be known
+    return HingeSlots(
+        hinge.name, hinge.type, q, u, *_texts(facts.coordinates), *_texts(facts.speeds),
+        facts.quaternion, facts.straight,
     )  # fmt: skip
+
+
+def _texts(entries: Sequence[Param]) -> tuple[Texts, Texts]:
+    """Names and units."""
+    return tuple(entry.name for entry in entries), tuple(entry.unit for entry in entries)
 
 
 class BodyRecords:
@@ -212,14 +212,14 @@ class BodyRecords:
         body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
         slots = self.layout.slots(run.hinge + k)
         kernel = self.elements.get("hinge", kernel_type(hinge, self.releases), hinge.name)
-        inboard, outboard, numbers = placement.alignment(hinge)
+        inboard, outboard = hinge_frames(hinge)
         own = placement.place(body, run.outboard_end, outboard)
         flexible = self.expanded.is_node(body.name)
         child = self._child(run, k) if self.align and not flexible else None
         place = alignment.aligned(own, body, hinge, child)
         self._placements.setdefault(run.body, []).append(place)
         record.nq, record.nu = slots.nq, slots.nu
-        record.hinge_p = self.reals(self._hinge_parameters(hinge, kernel, numbers))
+        record.hinge_p = self.reals(self._hinge_parameters(hinge))
         self._hinge_functions(record, kernel)
         rigid = self._body_functions(record, body, place)
         self._imposed(record, hinge, slots)
@@ -276,8 +276,8 @@ class BodyRecords:
         record.connection = self.reals(numbers if link is None else connection_of(link))
         if link is None:
             return
-        kernel = prebuilt.elements()["sweep", f"link_{hinge.type}"]
-        lead = placement.alignment(hinge)[2] or (0.0,)  # every link has room for it
+        kernel = prebuilt.elements()["sweep", f"link_{kernel_type(hinge, self.releases)}"]
+        lead = tuple(key_numbers(hinge).values()) or (0.0,)  # every link has room for it
         record.link = self.reals((*link, *rigid, *lead))
         if rigid and not record.generic:
             for name, function in kernel.functions.items():
@@ -315,12 +315,14 @@ class BodyRecords:
         self.kept.append(array)
         return array
 
-    def _hinge_parameters(
-        self, hinge: Hinge, kernel: Element, builtin: tuple[float, ...]
-    ) -> tuple[float, ...]:
-        if hinge.type in HINGE_TYPES:
-            return builtin
-        return user_parameters(kernel, hinge.parameters, f'hinge "{hinge.name}"')
+    def _hinge_parameters(self, hinge: Hinge) -> tuple[float, ...]:
+        """Numbers of the hinge's kernel: of keys of the scene, and given by name."""
+        if hinge.facts is None or hinge.is_weld:
+            return ()
+        own = hinge.facts.own_parameters()
+        given = declared_numbers(own, hinge.parameters, f'hinge "{hinge.name}"')
+        known = {**dict(zip((p.name for p in own), given, strict=True)), **key_numbers(hinge)}
+        return tuple(known[p.name] for p in hinge.facts.parameters)
 
     def _hinge_functions(self, record: Any, kernel: Element) -> None:
         for name in ("hinge", "forward", "condense", "recover"):
@@ -348,7 +350,7 @@ class BodyRecords:
         return (*numbers, *turn[0], *turn[1], *turn[2], *place.origin)
 
     def _imposed(self, record: Any, hinge: Hinge, slots: HingeSlots) -> None:
-        held = hinge.type == "fixed" and slots.nu > 0
+        held = hinge.is_weld and slots.nu > 0
         if held:
             mask, rotor = [1] * slots.nu, [0.0] * slots.nu
         else:
@@ -368,12 +370,19 @@ class BodyRecords:
 
 
 def user_parameters(element: Element, given: Mapping[str, float], where: str) -> tuple[float, ...]:
-    """Numbers of a user's element in its order, defaults filled in.
+    """Numbers of a user's element in its order, defaults filled in; errors as below."""
+    return declared_numbers(element.declared, given, where)
+
+
+def declared_numbers(
+    declared: Sequence[Param], given: Mapping[str, float], where: str
+) -> tuple[float, ...]:
+    """Numbers of declared parameters in their order, defaults filled in.
 
     Raises SceneError naming the scene's element (`where`) for what is missing or out of bounds.
     """
     numbers = []
-    for p in element.declared:
+    for p in declared:
         value = given.get(p.name, p.default)
         problem = ""
         if value is None:

@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.expression.expression import Expression, number
+from mstmm.ir.facts import builtin_hinges
 from mstmm.scene import Hinge, LawEntry
 from mstmm.scene.checks.topology import Run
 from mstmm.scene.tables.chain import Chain
+from mstmm.scene.tables.hinge_frames import twist_axes
 
 from ..kernels import prebuilt
 from ..kernels.records import Records
 from .layout import HingeSlots
-from .placement import law_axes
 from .values import Values
 
 if TYPE_CHECKING:
@@ -79,9 +80,9 @@ class _Laws:
         """Records of the hinge of member k."""
         number = run.hinge + k
         hinge, slots = self.packed.scene.hinges[number], self.packed.layout.slots(number)
-        if slots.nu == 0 or hinge.type == "fixed":
+        if slots.nu == 0 or hinge.is_weld:
             return []
-        if slots.quaternion is None or hinge.builtin is None:
+        if slots.quaternion is None or not _is_known(hinge):
             return _coordinates(self.packed, hinge, slots)
         return _rotational(self.packed, hinge, slots)
 
@@ -196,6 +197,11 @@ def _full(entry: LawEntry) -> list[float]:
     ]  # fmt: skip
 
 
+def _is_known(hinge: Hinge) -> bool:
+    """Whether the law's kernels know where its rotation stands in q and u."""
+    return hinge.facts is not None and hinge.facts.runs_as in builtin_hinges()
+
+
 def _rotational(packed: Packed, hinge: Hinge, slots: HingeSlots) -> list[Record]:
     """Law of a hinge with a quaternion: springs from a potential, dampers, efforts; friction."""
     functions = prebuilt.element("sweep", "laws").functions
@@ -206,7 +212,7 @@ def _rotational(packed: Packed, hinge: Hinge, slots: HingeSlots) -> list[Record]
         p = [getattr(e, key) for key in ("stiffness", "rest", "damping") for e in translations]
         p += [e.stiffness for e in rotations] + [0.0] + [e.damping for e in rotations]
         record = _record(packed, p, [e.effort for e in entries])
-        axes = packed.ffi.new("real[]", [x for row in law_axes(hinge) for x in row])
+        axes = packed.ffi.new("real[]", [x for row in twist_axes(hinge) for x in row])
         packed.kept.append(axes)
         record |= {"coordinate": 0, "speed": 0, "n": slots.nu, "kind": 1}
         record["axes"] = axes

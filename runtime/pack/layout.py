@@ -40,6 +40,7 @@ class HingeSlots:
     u_names: tuple[str, ...]
     u_units: tuple[str, ...]
     quaternion: int | None  # first quaternion entry within the hinge
+    straight: bool  # the speeds are the rates of the coordinates
 
     @property
     def nq(self) -> int:
@@ -140,7 +141,7 @@ class Layout:
         return HingeSlots(
             self._numbers.name(hinge), one.type, one.q + repeats * group.nq,
             one.u + repeats * group.nu, one.q_names, one.q_units, one.u_names, one.u_units,
-            one.quaternion,
+            one.quaternion, one.straight,
         )  # fmt: skip
 
     @cached_property

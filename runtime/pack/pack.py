@@ -83,7 +83,7 @@ class _Packing:
         self.kept: list[Any] = []
         self.topology = build(self.scene)
         self.releases = {name: i for i, name in enumerate(releasable(scene))}
-        self.layout = layout_of(expanded, self.releases, self.elements, self.ffi)
+        self.layout = layout_of(expanded, self.releases, self.elements)
         self.values = values.Values(self.layout)
         self.slots = 0
 

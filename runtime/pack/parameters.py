@@ -15,6 +15,7 @@ from typing import Any
 from mstmm.arrays import by_name, real
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
+from mstmm.scene.checks.types import inherit
 
 TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
@@ -74,7 +75,9 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
-    return Scene.from_data(data)
+    found = Scene.from_data(data)
+    inherit(found, scene)
+    return found
 
 
 def resolved(scene: Scene, names: Sequence[str]) -> list[str]:

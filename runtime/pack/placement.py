@@ -10,24 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mstmm.numbers.dual import atan2
 from mstmm.numbers.rotations import (
     IDENTITY,
     Matrix,
     Vector,
     apply,
-    cross,
     dot,
-    norm,
-    perpendicular,
     product,
-    reject,
     transpose,
 )
 from mstmm.scene import Body, Hinge
-
-#: Internal hinge kernel of a type where the names differ.
-KERNEL_OF = {"elastic": "free"}
 
 
 @dataclass(frozen=True)
@@ -54,40 +46,6 @@ class Placement:
 
 
 GROUND = Placement(IDENTITY, (0.0, 0.0, 0.0))
-
-
-def _frame(z: Vector, x: Vector) -> Matrix:
-    """Rotation with columns x, z x x, z."""
-    y = cross(z, x)
-    return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
-
-
-def _about(axis: Vector, in_plane: Vector | None) -> Matrix:
-    if in_plane is not None:
-        return _frame(axis, reject(in_plane, axis))
-    return IDENTITY if axis == (0.0, 0.0, 1.0) else _frame(axis, perpendicular(axis))
-
-
-def alignment(hinge: Hinge) -> tuple[Matrix, Matrix, tuple[float, ...]]:
-    """(inboard, outboard) internal hinge axes in the hinge's user axes, and the parameters that
-    the built-in kernel takes."""
-    axis = hinge.unit_axis
-    if hinge.type == "universal":
-        second = hinge.unit_axis2
-        assert second is not None
-        normal = cross(axis, second)
-        size = norm(normal)
-        x = (normal[0] / size, normal[1] / size, normal[2] / size)
-        return _frame(axis, x), _frame(second, x), (atan2(size, dot(axis, second)),)
-    if hinge.type in ("ball", "free", "elastic", "gimbal", "fixed"):
-        return IDENTITY, IDENTITY, ()
-    aligned = _about(axis, hinge.unit_axis2 if hinge.type == "planar" else None)
-    return aligned, aligned, (hinge.lead,) if hinge.type == "screw" and hinge.lead else ()
-
-
-def law_axes(hinge: Hinge) -> Matrix:
-    """Axes in which a rotation is split: twist about z, the hinge's axis; in its user axes."""
-    return _about(hinge.unit_axis, None)
 
 
 def place(body: Body, end: str, outboard: Matrix) -> Placement:

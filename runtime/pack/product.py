@@ -12,10 +12,22 @@ from typing import TYPE_CHECKING
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
+    from mstmm.scene import Hinge
+
     from .packed import Packed
 
-#: Hinge type -> kind of the C engine; a hinge and its successor must be of one kind.
-_KINDS = {"pin": "PIN", "ball": "BALL", "elastic": "ACCELERATION", "free": "ACCELERATION"}
+#: Kinds of the C engine for which there are classical matrices; a hinge and its successor must be
+#: of one kind.
+PIN, BALL, ACCELERATION = "PIN", "BALL", "ACCELERATION"
+
+
+def _kind(hinge: Hinge) -> str | None:
+    facts = hinge.facts
+    if facts is None or not facts.steady or (facts.slides and not facts.free_body):
+        return None
+    if facts.free_body:
+        return ACCELERATION
+    return PIN if facts.axial else BALL if len(facts.turns) == 3 else None
 
 
 def attach(packed: Packed, accuracy: float) -> None:
@@ -23,7 +35,7 @@ def attach(packed: Packed, accuracy: float) -> None:
     scene, lib, ffi = packed.scene, packed.lib, packed.ffi
     _refuse(packed)
     record = ffi.new("mstmm_product *")
-    record.kind = getattr(lib, f"MSTMM_PRODUCT_{_KINDS[scene.hinges[0].type]}")
+    record.kind = getattr(lib, f"MSTMM_PRODUCT_{_kind(scene.hinges[0])}")
     record.accuracy = accuracy
     # Its numbers stand between the blocks and what lies behind them: one workspace per thread.
     record.place = packed.model.scratch
@@ -41,16 +53,17 @@ def _refuse(packed: Packed) -> None:
         raise SceneError(f'"{name}" is flexible; the product runs rigid chains only; {way_out}')
     if not packed.topology.is_chain:
         raise SceneError(f"the product of transfer matrices needs an unbranched chain; {way_out}")
-    types = [scene.hinges[link.hinge].type for link in packed.topology.links]
-    for hinge, kind in zip(packed.topology.links, types, strict=True):
-        name = scene.hinges[hinge.hinge].name
-        if kind not in _KINDS:
+    hinges = [scene.hinges[link.hinge] for link in packed.topology.links]
+    for hinge in hinges:
+        if _kind(hinge) is None:
             raise SceneError(
-                f'hinge "{name}": there is no classical matrix for the type {kind}; {way_out}'
+                f'hinge "{hinge.name}": there is no classical matrix for the type {hinge.type}; '
+                f"{way_out}"
             )
-        if _KINDS[kind] != _KINDS[types[0]]:
+        if _kind(hinge) != _kind(hinges[0]):
             raise SceneError(
-                f'hinge "{name}": type {kind} behind type {types[0]} has no classical matrix: '
+                f'hinge "{hinge.name}": type {hinge.type} behind type {hinges[0].type} has no '
+                "classical matrix: "
                 f"its condition does not determine the free accelerations before it; {way_out}"
             )
     for body in scene.bodies:

@@ -124,7 +124,7 @@ def _element(element: BaseModel, parts: Sequence[str | int], change: Change) -> 
     if isinstance(element, Hinge) and parts[0] == "parameters":
         _refuse_in_expression(element, str(parts[1]))
     changed = _replaced(element, parts, change)
-    if isinstance(changed, Hinge) and changed.type == "planar" and parts[0] == "normal":
+    if isinstance(changed, Hinge) and parts[0] == "normal":
         return changed.model_copy(update={"axis": changed.normal})
     return changed
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.ir.facts import start_of
 from mstmm.scene import Hinge, Scene
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from .layout import HingeSlots, Layout
 
@@ -46,10 +46,7 @@ def start_values(
 def _values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
     """q and u of one hinge."""
     q, u = np.zeros(slots.nq), np.zeros(slots.nu)
-    held = slots.quaternion is not None and hinge.type == "fixed"
-    kind = HINGE_TYPES.get("free" if held else hinge.type)
-    if kind is not None and slots.nq:
-        q[:] = kind.start
+    q[:] = start_of(slots.nq, slots.quaternion)
     if hinge.initial is not None and hinge.initial.q:
         q[:] = hinge.initial.q
     if hinge.initial is not None and hinge.initial.u:

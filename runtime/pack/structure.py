@@ -21,7 +21,6 @@ from mstmm.ir import (
     Element as ArrayEntry,
 )
 from mstmm.ir.structure import (
-    ANGLE,
     BodyStructure,
     Entries,
     Entry,
@@ -33,6 +32,7 @@ from mstmm.ir.structure import (
     ModalStructure,
     SectionStructure,
     Structure,
+    angle_of,
 )
 
 from ..kernels import prebuilt
@@ -235,7 +235,7 @@ def _link(reader: _Reader, record: Any, hinge: Key) -> Entries:
     if record.link == reader.ffi.NULL:
         return ()
     cosine, sine, shift, angle, height = reader.unpack(record.link, 5)
-    if hinge[1] not in ANGLE and angle != 0.0:
+    if angle_of(hinge) is None and angle != 0.0:
         return ()
     return (*reader.entries((cosine, sine), axes=True), *reader.entries((shift, angle, height)))
 

@@ -135,7 +135,7 @@ def _pivot(result: Record, reach: float) -> tuple[Array, str]:
     The point of the only hinge on the ground, where it stays; else the origin.
     """
     roots = _roots(result.model.scene)
-    if len(roots) == 1 and roots[0].type not in _FREE:
+    if len(roots) == 1 and not _carries_nothing(roots[0]):
         places = result.position(roots[0].outboard)
         place, size = places[0], reach + _largest(places[0])
         if np.isfinite(place).all() and _largest(places - place) <= _ZERO * size:
@@ -143,8 +143,9 @@ def _pivot(result: Record, reach: float) -> tuple[Array, str]:
     return np.zeros(3), ""
 
 
-#: Types of hinges that carry nothing where their laws do not act.
-_FREE = ("free", "elastic")
+def _carries_nothing(hinge: Hinge) -> bool:
+    """Whether nothing passes a hinge where its law does not act."""
+    return hinge.facts is not None and hinge.facts.free_body
 
 
 def _support(
@@ -157,7 +158,7 @@ def _support(
     """
     scene = result.model.scene
     roots = _roots(scene)
-    if all(hinge.type in _FREE for hinge in roots):
+    if all(map(_carries_nothing, roots)):
         return [True] * 3, [True] * 3
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
     largest = result._observed.largest_loads()

@@ -24,11 +24,11 @@ _MOST = 200
 
 
 def stiffest(result: Record) -> Give | None:
-    """Of the springs between ends and the elastic hinges; None where there is none, where nothing
-    was sampled, and for scenes of very many."""
+    """Of the springs between ends and of hinges with all motions free; None where there is none,
+    where nothing was sampled, and for scenes of very many."""
     scene = result.model.scene
     springs = [s for s in scene.spring if s.type == "spring" and s.law.stiffness > 0]
-    mounts = [h for h in scene.hinge if h.type == "elastic"]
+    mounts = [h for h in scene.hinge if h.facts is not None and h.facts.free_body]
     if not len(result.t) or not 0 < len(springs) + len(mounts) <= _MOST:
         return None
     stiff = max(springs, key=lambda s: s.law.stiffness, default=None)

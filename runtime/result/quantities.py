@@ -5,7 +5,7 @@ Every name gives values over time with their unit and one label per column.  Axe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.ir.facts import effort_unit
 from mstmm.scene.rules.messages import near
-from mstmm.scene.tables.hinge_types import effort_unit
 
 from ..pack.layout import HingeSlots
 from .flexible.names import add_body
@@ -78,10 +78,8 @@ class Quantities:
     Names are made per owner, a hinge, a body, an end or the scene (""), when they are asked for.
     """
 
-    def __init__(
-        self, observed: Observed, builtin: Collection[str], flexible: FlexibleResults
-    ) -> None:
-        self.observed, self.run, self._builtin = observed, observed.run, builtin
+    def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
+        self.observed, self.run = observed, observed.run
         self._flexible = flexible
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
@@ -229,7 +227,6 @@ class Quantities:
         units = [effort_unit(unit) for unit in hinge.u_units]
         rate_units = [rate_unit(unit) for unit in hinge.u_units]
         accelerations = [acceleration_name(name) for name in hinge.u_names]
-        simple = hinge.quaternion is None and hinge.type in self._builtin
 
         def udot() -> Array:
             return self.observed.columns("udot", (u,))
@@ -239,7 +236,7 @@ class Quantities:
 
         group = _Group(table, hinge.name)
         group.add("q", "coordinate", hinge.q_names, hinge.q_units, lambda: self.run.q[:, q],
-                  speeds if simple else None)  # fmt: skip
+                  speeds if hinge.straight else None)  # fmt: skip
         group.add("u", "speed", hinge.u_names, hinge.u_units, speeds, udot)
         group.add("udot", "acceleration", accelerations, rate_units, udot)
         group.add("effort", "effort", efforts, units, lambda: self.effort(hinge.name))

@@ -9,7 +9,6 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene.checks.flexible import short_beams
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ..engine.compiled import Compiled
 from ..integrate.loop import Statistics
@@ -64,7 +63,7 @@ class Record(FlexibleResults, ABC):
         self.statistics: Statistics | None = run.statistics
         self.settings: Settings = run.settings
         self._observed = Observed(model, run)
-        self._quantities = Quantities(self._observed, HINGE_TYPES, self)
+        self._quantities = Quantities(self._observed, self)
 
     @property
     def success(self) -> bool:

@@ -10,13 +10,21 @@ from xml.etree import ElementTree
 import pytest
 
 from cli.commands import Command
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
+from mstmm.ir.facts import builtin_hinges
 
 
 def test_list_has_everything(mstmm: Command) -> None:
     done = mstmm("list")
     assert done.code == 0
-    for name in (*HINGE_TYPES, "rigid", "spring", "classical_ball", "rk4", "dop853", "friction"):
+    for name in (
+        *builtin_hinges(),
+        "rigid",
+        "spring",
+        "classical_ball",
+        "rk4",
+        "dop853",
+        "friction",
+    ):
         assert re.search(rf"\b{name}\b", done.out), name
     assert max(map(len, done.out.splitlines())) <= 80
 
@@ -26,7 +34,7 @@ def test_list_as_json_has_coordinates_with_units(mstmm: Command) -> None:
     assert set(data) == {"hinges", "methods"}
     pin = next(hinge for hinge in data["hinges"] if hinge["name"] == "pin")
     assert pin["coordinates"] == ["angle [rad]"] and pin["speeds"] == ["angle_rate [rad/s]"]
-    assert [hinge["name"] for hinge in data["hinges"]] == list(HINGE_TYPES)
+    assert [hinge["name"] for hinge in data["hinges"]] == list(builtin_hinges())
 
 
 def test_list_of_something_unknown(mstmm: Command) -> None:

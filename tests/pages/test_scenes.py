@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import mstmm
+from mstmm.ir.facts import builtin_hinges
 from mstmm.scene import (
     Arrays,
     Beam,
@@ -32,7 +33,6 @@ from mstmm.scene import (
     load_scene,
 )
 from mstmm.scene.rules.values import Table
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 PAGES = Path(__file__).parents[2] / "docs" / "use"
 BLOCKS = [
@@ -79,7 +79,7 @@ def test_every_key_is_described(table: type[Table]) -> None:
 
 
 def test_every_hinge_type_is_described() -> None:
-    assert {name for name in HINGE_TYPES if f"`{name}`" not in FORMAT} == set()
+    assert {name for name in builtin_hinges() if f"`{name}`" not in FORMAT} == set()
 
 
 def test_first_scene_runs_as_written(

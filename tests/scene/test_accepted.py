@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from reference.random_scenes import random_scene
 
+from mstmm.ir.facts import builtin_hinges, effort_unit
 from mstmm.ir.stored import element_from_json
 from mstmm.numbers.rotations import norm
 from mstmm.scene import Hinge, Scene, load_scene
-from mstmm.scene.tables.hinge_types import HINGE_TYPES, effort_unit
 from mstmm.scene.tables.law import SpringLaw
 from scene.scenes import arm, body, changed, hinge, one
 
@@ -32,10 +32,10 @@ def the_hinge(**changes: Any) -> Hinge:
 NEEDED: dict[str, dict[str, Any]] = {"screw": {"lead": 0.1}, "universal": {"axis2": [0, 1, 0]}}
 
 
-@pytest.mark.parametrize("kind", HINGE_TYPES)
+@pytest.mark.parametrize("kind", builtin_hinges())
 def test_every_type_gets_start_values_and_a_law_per_speed(kind: str) -> None:
     joint = the_hinge(type=kind, **NEEDED.get(kind, {}))
-    table = HINGE_TYPES[kind]
+    table = builtin_hinges()[kind]
     assert joint.builtin is table
     assert joint.initial is not None
     assert joint.initial.q == table.start
@@ -44,12 +44,12 @@ def test_every_type_gets_start_values_and_a_law_per_speed(kind: str) -> None:
         assert len(values) == len(table.speeds)
 
 
-@pytest.mark.parametrize("kind", [k for k in HINGE_TYPES if k != "elastic"])
+@pytest.mark.parametrize("kind", [k for k in builtin_hinges() if k != "elastic"])
 def test_coordinates_are_those_of_the_generated_element(kind: str) -> None:
     spec = element_from_json((ROOT / "generated" / f"hinge_{kind}.json").read_text())
     for mine, theirs in (
-        (HINGE_TYPES[kind].coordinates, spec.coordinates),
-        (HINGE_TYPES[kind].speeds, spec.speeds),
+        (builtin_hinges()[kind].coordinates, spec.coordinates),
+        (builtin_hinges()[kind].speeds, spec.speeds),
     ):
         assert [(c.name, c.unit) for c in mine] == [(c.name, c.unit) for c in theirs]
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ..tables.hinge_types import HINGE_TYPES
-
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
     from ..tables.hinge import HingeTable
@@ -36,7 +34,7 @@ def _of_ends(owner: str, ends: Mapping[str, Any]) -> Iterator[str]:
 
 def _of_hinge(name: str, hinge: HingeTable) -> Iterator[str]:
     yield from _of_angles(f"{name}: orientation", hinge.orientation)
-    kind = HINGE_TYPES.get(hinge.type)
+    kind = hinge.facts
     if kind is None or kind.quaternion is not None:
         return
     start = () if hinge.initial is None else hinge.initial.q or ()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...numbers.rotations import Vector, apply, dot, norm, unit
 from ..rules.values import Location, split
+from ..tables.hinge_frames import start_motion
 from .welded import lines as lines_of
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def spins(scene: SceneTables) -> Iterator[Problem]:
         if beam.name in carriers or rotor:
             continue
         free = _share(beam, hinge, _ALONG, hinge.name in released) > 1 - 1e-9
-        if free and hinge.type != "screw":
+        slid = hinge.facts is not None and set(hinge.facts.turns) & set(hinge.facts.slides)
+        if free and not slid:  # what slides as it turns is resisted by the mass
             yield (
                 ("beam", i, "polar_inertia_per_length"),
                 f'missing; hinge "{hinge.name}" lets the beam spin about its axis and nothing '
@@ -97,24 +99,19 @@ def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
 
 
 def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
-    """Unit axes, in the axes of the outboard end at q = 0, about which a hinge of a built-in type
-    turns and is not driven, or, with `released`, turns once it is let go; none for a user's type.
-    """
-    if released and hinge.type == "fixed":
+    """Unit axes, in the axes of the outboard end at q = 0, about which a hinge turns and is not
+    driven, or, with `released`, turns once it is let go; none for a type that is not known."""
+    if released and hinge.is_weld:
         return _AXES
-    axis, axis2 = hinge.unit_axis, hinge.unit_axis2
-    turns: dict[str, dict[int, Vector]] = {
-        "pin": {0: axis}, "screw": {0: axis}, "cylindrical": {1: axis}, "planar": {2: axis},
-        "universal": {0: axis, 1: axis2 or axis}, "gimbal": dict(enumerate(_AXES)),
-        "ball": dict(enumerate(_AXES)), "free": dict(enumerate(_AXES)),
-        "elastic": dict(enumerate(_AXES)),
-    }  # fmt: skip
     drive = () if released else hinge.drive or ()
-    return tuple(
-        direction
-        for k, direction in turns.get(hinge.type, {}).items()
-        if k >= len(drive) or drive[k] is None
-    )
+    turned = [rotation for _, rotation in start_motion(hinge)]
+    free = (a for k, a in enumerate(turned) if any(a) and (k >= len(drive) or drive[k] is None))
+    return tuple(_unit(axis) for axis in free)
+
+
+def _unit(axis: Vector) -> Vector:
+    x, y, z = axis if abs(norm(axis) - 1) <= 1e-15 else unit(axis)
+    return (x, y, z)
 
 
 def _share(beam: Beam, hinge: Hinge, direction: Vector, released: bool = False) -> float:
@@ -248,7 +245,7 @@ def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[str]:
 
 def _carries_moment(beam: Beam, hinge: Hinge, at: str, outboard: bool) -> bool:
     """Does a hinge hold the section against turning in a plane in which the beam bends?"""
-    if hinge.builtin is None:
+    if hinge.facts is None:
         return False
     turn = beam.ends[at].rotation
     back = (lambda v: v) if outboard else (lambda v: apply(hinge.rotation, v))

@@ -100,7 +100,7 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
         place: Location = ("event", i, "hinge")
         if event.hinge not in hinges:
             yield place, f'there is no hinge "{event.hinge}"{near(event.hinge, hinges)}'
-        elif hinges[event.hinge].type != "fixed" and hinges[event.hinge].drive is None:
+        elif not hinges[event.hinge].is_weld and hinges[event.hinge].drive is None:
             yield place, f'"{event.hinge}" is neither driven nor fixed, so it cannot be released'
 
 

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ...expression.expression import Expression
+from ...ir.facts import builtin_hinges, effort_unit
 from ...ir.spec import ElementSpec
 from ..rules.messages import Problem, near
-from ..rules.values import Location
-from ..tables.hinge_types import HINGE_TYPES, effort_unit
+from ..rules.values import Location, Refused
+from ..tables.hinge_rules import misplaced_keys, settled_as
 from .names import index_problem
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 #: Table of the scene -> (kind of the definition, built-in types).
 _KINDS = {
     "body": ("body", ("rigid",)),
-    "hinge": ("hinge", tuple(HINGE_TYPES)),
+    "hinge": ("hinge", tuple(builtin_hinges())),
     "spring": ("force", ("spring",)),
 }
 
@@ -60,6 +61,27 @@ def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -
     return found
 
 
+def learn(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
+    """Tell every hinge of a user's type what its definition says of it, and settle it."""
+    found: list[Problem] = []
+    for kind, place, element in tables(scene):
+        spec = known.get((kind, element.type))
+        if spec is not None and spec.facts is not None:
+            vars(element)["facts"] = spec.facts
+            try:
+                vars(element).update(settled_as(element, spec.facts))
+            except Refused as refused:
+                found += [((*place, *at), text) for at, text in refused.problems]
+    return found
+
+
+def inherit(scene: SceneTables, other: SceneTables) -> None:
+    """Tell hinges of users' types what those in the same scene with other numbers know."""
+    for (_, _, mine), (_, _, known) in zip(tables(scene), tables(other), strict=True):
+        if getattr(known, "builtin", known) is None and known.facts is not None:
+            vars(mine)["facts"] = known.facts
+
+
 def problems_with(scene: SceneTables, spec: ElementSpec) -> list[Problem]:
     """What does not fit in the elements of this one type."""
     return [
@@ -75,6 +97,8 @@ def _element(
 ) -> Iterator[Problem]:
     yield from _parameters(place, element.parameters, spec)
     if spec.kind == "hinge":
+        for at, text in misplaced_keys(element, spec.facts):
+            yield (*place, *at), text
         yield from _counts(place, element, spec)
         yield from _indices(scene, element, spec)
 
@@ -82,7 +106,8 @@ def _element(
 def _parameters(
     place: Location, given: Mapping[str, float], spec: ElementSpec
 ) -> Iterator[Problem]:
-    known = {p.name: p for p in spec.parameters}
+    own = spec.parameters if spec.facts is None else spec.facts.own_parameters()
+    known = {p.name: p for p in own}
     for name, value in given.items():
         at = (*place, "parameters", name)
         parameter = known.get(name)
@@ -92,7 +117,7 @@ def _parameters(
             yield at, f"expected {parameter.minimum:g} {parameter.unit} or more, found {value:g}"
         elif parameter.maximum is not None and value > parameter.maximum:
             yield at, f"expected {parameter.maximum:g} {parameter.unit} or less, found {value:g}"
-    for parameter in spec.parameters:
+    for parameter in own:
         if parameter.default is None and parameter.name not in given:
             unit = f" in {parameter.unit}" if parameter.unit else ""
             meaning = f" ({parameter.meaning})" if parameter.meaning else ""

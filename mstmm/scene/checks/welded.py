@@ -42,7 +42,7 @@ def lines(scene: SceneTables) -> dict[str, Line]:
 
     released = {event.hinge for event in scene.event if event.hinge is not None}
     for hinge in scene.hinge:
-        if hinge.type == "fixed" and not hinge.lets_go and hinge.name not in released:
+        if hinge.is_weld and not hinge.lets_go and hinge.name not in released:
             pair = _in_line(hinge, beams)
             if pair is not None:
                 before[first(pair[1])] = first(pair[0])

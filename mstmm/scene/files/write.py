@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ...ir.facts import builtin_hinges
 from ..rules.messages import TABLES
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
-
-#: Keys that say the same as another key of the same hinge.
-_TWICE = {"planar": "axis"}
 
 
 def to_toml(scene: SceneTables) -> str:
@@ -36,7 +34,8 @@ def _is_written(table: str, element: dict[str, Any], key: str, value: Any) -> bo
     """Leave out what TOML cannot say (nothing) and what a built-in type does not take."""
     if value is None or value == {}:
         return False
-    return not (table == "hinge" and key == _TWICE.get(element["type"]))
+    facts = builtin_hinges().get(element["type"]) if table == "hinge" else None
+    return not (key == "axis" and facts is not None and facts.frame == "plane")  # it is the normal
 
 
 def _value(value: Any) -> str:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated
 
 from pydantic import Field
 
 from ...expression.expression import Expression
+from ...ir.facts import HingeFacts, builtin_hinges
 from ...numbers.rotations import Matrix, Vector, from_orientation, reject, unit
 from ..rules import text as texts
 from ..rules import values as rules
 from ..rules.values import Location, Numbers, Orientation, Table
-from .hinge_types import HINGE_TYPES, HingeType
 from .law import Law
 
 
@@ -25,7 +26,7 @@ class Initial(Table):
 class HingeKeys(Table):
     """The keys of a hinge, as they are written and as `HingeTable` leaves them."""
 
-    type: Annotated[str, texts.name("a hinge type", ", ".join(HINGE_TYPES) + " or your own")]
+    type: Annotated[str, texts.name("a hinge type", ", ".join(builtin_hinges()) + " or your own")]
     orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
     axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
     axis2: Annotated[Vector | None, rules.direction()] = None
@@ -42,9 +43,20 @@ class HingeKeys(Table):
     parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
 
     @property
-    def builtin(self) -> HingeType | None:
-        """The built-in type, None for a user's type."""
-        return HINGE_TYPES.get(self.type)
+    def builtin(self) -> HingeFacts | None:
+        """Facts of the built-in type, None for a user's type."""
+        return builtin_hinges().get(self.type)
+
+    @cached_property
+    def facts(self) -> HingeFacts | None:
+        """What the type leaves free; of a user's type None until its definition is known
+        (`Scene.check_types`)."""
+        return self.builtin
+
+    @property
+    def is_weld(self) -> bool:
+        """Nothing moves, by its type."""
+        return self.facts is not None and self.facts.welds
 
     @property
     def rotation(self) -> Matrix:
@@ -62,7 +74,7 @@ class HingeKeys(Table):
         """The second axis with length 1; planar: made perpendicular to the normal."""
         if self.axis2 is None:
             return None
-        if self.type == "planar":
+        if self.facts is not None and self.facts.frame == "plane":
             return reject(self.axis2, self.axis)
         x, y, z = unit(self.axis2)
         return (x, y, z)

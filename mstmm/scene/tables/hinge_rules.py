@@ -9,10 +9,10 @@ from typing import Any
 from ...errors import ExpressionError
 from ...expression.drive import jump, motion_at
 from ...expression.expression import Expression
+from ...ir.facts import HingeFacts, effort_unit
 from ...numbers.rotations import cross, norm, perpendicular, unit
 from ..rules.values import Location, Refused, counted, found, quaternion
 from .hinge_keys import HingeKeys, Initial
-from .hinge_types import HINGE_TYPES, HingeType, effort_unit
 from .law import Law, LawEntry
 
 _Z = (0.0, 0.0, 1.0)
@@ -22,25 +22,40 @@ _AGREES = 1e-9
 
 
 def settled(hinge: HingeKeys) -> dict[str, Any]:
-    """Fields with their defaults filled in; Refused names everything that does not fit."""
+    """Fields with their defaults filled in; Refused names everything that does not fit.
+
+    Of a user's type nothing is known here: it is settled when its definition is (`settled_as`).
+    """
     problems = hinge.misplaced()
     changes: dict[str, Any] = {}
-    kind = hinge.builtin
-    if kind is None:
-        problems += _user_type(hinge)
-        if problems:
-            raise Refused(*problems)
-        return changes
-    changes |= _axes(hinge, kind, problems)
+    if hinge.builtin is not None:
+        if hinge.parameters:
+            problems.append((
+                ("parameters",),
+                f"a {hinge.type} hinge has no parameters; name them in the type of your own hinge",
+            ))  # fmt: skip
+        changes = _settled(hinge, hinge.builtin, problems)
+    if problems:
+        raise Refused(*problems)
+    return changes
+
+
+def settled_as(hinge: HingeKeys, facts: HingeFacts) -> dict[str, Any]:
+    """`settled`, of a hinge of a user's type with these facts."""
+    problems: list[tuple[Location, str]] = []
+    changes = _settled(hinge, facts, problems)
+    if problems:
+        raise Refused(*problems)
+    return changes
+
+
+def _settled(
+    hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]
+) -> dict[str, Any]:
+    changes = _axes(hinge, kind, problems)
     changes["law"] = _law(hinge, kind, problems)
     drive = _drive(hinge, kind, problems)
     changes["drive"] = drive
-    if hinge.parameters:
-        problems.append((
-            ("parameters",),
-            f'a {kind.name} hinge has no parameters; '
-            "name them in the type of your own hinge",
-        ))  # fmt: skip
     if hinge.lets_go and drive is None and kind.coordinates:
         problems.append((
             ("release",),
@@ -48,44 +63,44 @@ def settled(hinge: HingeKeys) -> dict[str, Any]:
         ))  # fmt: skip
     if not problems:
         changes["initial"] = _initial(hinge, kind, drive, problems)
-    if problems:
-        raise Refused(*problems)
     return changes
 
 
-def _user_type(hinge: HingeKeys) -> list[tuple[Location, str]]:
-    """A user's type takes parameters instead of the keys of the built-in types."""
-    return [
-        ((key,), f'only built-in types take {key}; give "{hinge.type}" its numbers as parameters')
-        for key in ("axis2", "normal", "lead")
-        if getattr(hinge, key) is not None
-    ]
+def misplaced_keys(hinge: HingeKeys, facts: HingeFacts | None) -> list[tuple[Location, str]]:
+    """Keys of a hinge of a user's type that its definition does not read, or misses."""
+    problems: list[tuple[Location, str]] = []
+    if facts is not None:
+        _axes(hinge, facts, problems)
+        return problems
+    given = [key for key in ("axis2", "normal", "lead") if getattr(hinge, key) is not None]
+    return [((key,), f"{a_hinge(hinge.type)} has no {key}; leave it out") for key in given]
 
 
 def _axes(
-    hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]
+    hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]
 ) -> dict[str, Any]:
     """axis, axis2, normal and lead, each where the type has it."""
     for key in ("axis2", "lead"):
         if key not in kind.keys and getattr(hinge, key) is not None:
             problems.append(((key,), f"{a_hinge(kind.name)} has no {key}; leave it out"))
-    if hinge.normal is not None and kind.name != "planar":
+    if hinge.normal is not None and kind.frame != "plane":
         problems.append((("normal",), f"{a_hinge(kind.name)} has no normal; write axis"))
     if "axis" not in kind.keys and hinge.axis != _Z:
-        way_out = "turn it by orientation" if kind.name == "gimbal" else "leave it out"
-        problems.append((("axis",), f"a {kind.name} hinge has no axis; {way_out}"))
-    if kind.name == "screw" and (hinge.lead is None or hinge.lead == 0):
+        way_out = "leave it out" if kind.welds else "turn it by orientation"
+        problems.append((("axis",), f"{a_hinge(kind.name)} has no axis; {way_out}"))
+    if "lead" in kind.keys and (hinge.lead is None or hinge.lead == 0):
         problems.append((
             ("lead",),
-            "a screw needs its lead in m per turn, not 0; write for example lead = 0.01"
+            f"a {kind.name} needs its lead in m per turn, not 0; write for example lead = 0.01"
             + ("" if hinge.lead is None else ', or type = "pin"'),
         ))  # fmt: skip
-    if kind.name == "planar":
+    if kind.frame == "plane":
         return _planar_axes(hinge, problems)
-    if kind.name == "universal":
+    if kind.frame == "crossing":
         if hinge.axis2 is None:
             problems.append((
-                ("axis2",), "a universal hinge needs its second axis; write for example [0, 1, 0]"
+                ("axis2",),
+                f"{a_hinge(kind.name)} needs its second axis; write for example [0, 1, 0]",
             ))  # fmt: skip
         else:
             _not_collinear("axis2", hinge.axis2, "axis", hinge.axis, problems)
@@ -119,7 +134,7 @@ def _not_collinear(
 # --- law ------------------------------------------------------------------------------------------
 
 
-def _law(hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]) -> Law:
+def _law(hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]) -> Law:
     """The law with one entry per speed."""
     law, count = hinge.law, len(kind.speeds)
     neutral = _neutral(type(law))
@@ -163,11 +178,11 @@ def entries_of(type_name: str, coordinates: tuple[Any, ...]) -> str:
     return f"{counted(len(coordinates))} for {a_hinge(type_name)}" + (f": {names}" if names else "")
 
 
-def _units_differ(kind: HingeType) -> bool:
+def _units_differ(kind: HingeFacts) -> bool:
     return len({s.unit for s in kind.speeds}) > 1
 
 
-def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, str]]:
+def _rotation_law(kind: HingeFacts, law: dict[str, Any]) -> list[tuple[Location, str]]:
     """A rotation stored as a quaternion has no angle to rest at or to stop."""
     problems: list[tuple[Location, str]] = []
     if any(law["rest"][-3:]):
@@ -188,13 +203,13 @@ def _rotation_law(kind: HingeType, law: dict[str, Any]) -> list[tuple[Location, 
 
 
 def _drive(
-    hinge: HingeKeys, kind: HingeType, problems: list[tuple[Location, str]]
+    hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]
 ) -> tuple[Expression | None, ...] | None:
     drive = hinge.drive
     if drive is None or (drive and all(entry is None for entry in drive)):
         return None
     if kind.quaternion is not None:
-        instead = "gimbal or universal" if kind.name == "ball" else "gimbal, planar or prismatic"
+        instead = "gimbal, planar or prismatic" if kind.slides else "gimbal or universal"
         problems.append((
             ("drive",), f"{a_hinge(kind.name)} cannot be driven; use {instead} hinges"
         ))  # fmt: skip
@@ -237,7 +252,7 @@ def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
 
 def _initial(
     hinge: HingeKeys,
-    kind: HingeType,
+    kind: HingeFacts,
     drive: tuple[Expression | None, ...] | None,
     problems: list[tuple[Location, str]],
 ) -> Initial | None:
@@ -267,7 +282,7 @@ def _initial(
 
 
 def _start_values(
-    kind: HingeType,
+    kind: HingeFacts,
     key: str,
     given: tuple[float, ...] | None,
     default: tuple[float, ...],
@@ -291,11 +306,3 @@ def _start_values(
                 'or "free" in the drive',
             ))  # fmt: skip
     return given
-
-
-def near_type(name: str, known: set[str]) -> str | None:
-    """The known hinge type nearest to `name`."""
-    import difflib
-
-    close = difflib.get_close_matches(name.lower(), sorted(known | set(HINGE_TYPES)), 1, 0.6)
-    return close[0] if close else None

@@ -146,14 +146,17 @@ class Hinges(Members[Hinge]):
     behind = f".{HINGE}"
 
     def _make(self, chain: Chain, k: int) -> Hinge:
-        table = vars(chain.hinge_of(k))
+        pattern = chain.hinge_of(k)
+        table = vars(pattern)
         if k == 0 and chain.orientation is not None:
             table = {**table, "orientation": chain.orientation}
-        return Hinge.model_construct(
+        made = Hinge.model_construct(
             name=f"{chain.name}[{k}]{self.behind}", inboard=chain.inboard_of(k),
             outboard=f"{chain.name}[{k}]", position=chain.position if k == 0 else (0.0, 0.0, 0.0),
             **table,
         )  # fmt: skip
+        vars(made)["facts"] = pattern.facts
+        return made
 
 
 class ByName(Mapping[str, T]):

@@ -112,7 +112,7 @@ def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
         at,
         x,
         free,
-        hinge.type in ("free", "planar", "elastic"),
+        hinge.facts is not None and hinge.facts.goes_anywhere,
         heavy_rotor=free if rotors else frozenset(),
         sprung=free if stiff or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
         ends=ends,
@@ -140,10 +140,16 @@ def _resisted(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
     """(springs, rotors) that matter beside the beam's own stiffness and inertia."""
     bending = _softest(data) / data.length
     inertia = data.mass * data.length**2 / 3
-    law = hinge.law
-    rotary = slice(3, None) if hinge.type in ("free", "elastic") else slice(None)
-    stiffness = max(law.stiffness[rotary], default=0.0)
-    return stiffness > HEAVY * bending, max(law.inertia[rotary], default=0.0) > HEAVY * inertia
+    stiffness, rotors = (_about_axes(hinge, key) for key in ("stiffness", "inertia"))
+    return stiffness > HEAVY * bending, rotors > HEAVY * inertia
+
+
+def _about_axes(hinge: Hinge, key: str) -> float:
+    """The largest entry of a hinge's law among those of speeds that turn."""
+    values = getattr(hinge.law, key)
+    if len(values) > 1 and hinge.facts is not None:
+        values = [values[k] for k in hinge.facts.turns]
+    return float(max(values, default=0.0))
 
 
 # --- what acts at the other sections --------------------------------------------------------------

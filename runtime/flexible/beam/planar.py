@@ -13,6 +13,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene.rules.values import GROUND, split
+from mstmm.scene.tables.hinge_frames import hinge_frames, start_motion
 
 if TYPE_CHECKING:
     from mstmm.expression.expression import Expression
@@ -130,13 +131,15 @@ class Planar:
         return abs(where - height) <= _ROUNDING * max(1.0, abs(height))
 
     def _hinge_stays(self, hinge: Hinge, n: Array) -> bool:
-        outer, _, end = self._end(hinge.outboard)
-        along = abs(float(self._turn[outer] @ end @ np.array(hinge.unit_axis) @ n))
-        if hinge.type == "fixed":
-            return True
-        if hinge.type in ("pin", "planar"):
-            return along >= 1 - _ROUNDING
-        return hinge.type == "prismatic" and along <= _ROUNDING
+        facts, (outer, _, end) = hinge.facts, self._end(hinge.outboard)
+        if facts is None:
+            return False
+        turn = self._turn[outer] @ end
+        if facts.steady:
+            motions = start_motion(hinge)
+            return all(_stays(turn @ np.array(t), turn @ np.array(r), n) for t, r in motions)
+        z = turn @ np.array(hinge_frames(hinge)[1])[:, 2]
+        return facts.keeps_z and abs(float(z @ n)) >= 1 - _ROUNDING
 
     def _load_stays(self, load: Load, n: Array, height: float) -> bool:
         name, _, end = self._end(load.on)
@@ -153,6 +156,15 @@ class Planar:
             and all(_nothing(push, own) for push in pushes if push)
             and _only(load.moment, own)
         )
+
+
+def _stays(translation: Array, rotation: Array, n: Array) -> bool:
+    """A motion in the plane: it slides at right angles to n and turns about n."""
+    about = float(np.linalg.norm(rotation))
+    return (
+        abs(float(translation @ n)) <= _ROUNDING * max(float(np.linalg.norm(translation)), 1e-300)
+        and abs(float(rotation @ n)) >= (1 - _ROUNDING) * about
+    )
 
 
 def _nothing(push: tuple[Expression, ...], n: Array) -> bool:

@@ -205,7 +205,7 @@ def _frame(elastic: Elastic, holder: Hinge | None, held: str) -> tuple[str, str]
 
 def turns_with(hinge: Hinge) -> bool:
     """True if the hinge prescribes every rotation of its outboard side for all time."""
-    if hinge.type in ("fixed", "prismatic"):
+    if hinge.facts is not None and not hinge.facts.turns:
         return not hinge.lets_go
     driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
     return driven and not hinge.lets_go

@@ -16,6 +16,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene import split
+from mstmm.scene.tables.hinge_frames import start_motion
 
 from .response import Response, rigidity, split_node
 
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
     from ...engine.compiled import Compiled
     from ...flexible.modal_port import ModalPort
     from ..observed import Observed
-
-
-#: Hinges whose outboard side may turn about their axis alone, about any axis, and may go anywhere.
-_ABOUT_AXIS = ("pin", "screw", "cylindrical", "planar")
-_ABOUT_ALL = ("ball", "universal", "gimbal", "free", "elastic")
-_ANYWHERE = ("free", "elastic")
 
 
 @dataclass(frozen=True)
@@ -136,7 +131,7 @@ class Superposition:
         end = self.known.held[name]
         port, hinge = self.known.one_way[name].ports[end], self._holder(name)
         shift, turn = port.phi, port.theta
-        if hinge is None or hinge.type in _ANYWHERE:
+        if hinge is None or (hinge.facts is not None and hinge.facts.free_body):
             shift = np.zeros_like(shift)
         turn = _not_free(hinge, np.asarray(port.rotation)) @ turn
         return self._section(name, _with(port, shift, turn))
@@ -153,12 +148,15 @@ def _with(port: ModalPort, phi: Array, theta: Array) -> ModalPort:
 
 def _not_free(hinge: Hinge | None, rotation: Array) -> Array:
     """(3, 3) projection of rotations, body axes, on those that a hinge holds."""
-    driven = hinge is not None and hinge.drive is not None and None not in hinge.drive
-    if hinge is not None and (driven or hinge.type in ("fixed", "prismatic")):
-        return np.eye(3)
-    if hinge is None or hinge.type not in _ABOUT_AXIS:
+    if hinge is None or hinge.facts is None:
         return np.zeros((3, 3))
-    axis = rotation @ np.array(hinge.unit_axis)
+    facts, driven = hinge.facts, hinge.drive is not None and None not in hinge.drive
+    if driven or not facts.turns:
+        return np.eye(3)
+    if len(facts.turns) > 1 or "q" in facts.varies[facts.turns[0]][3:]:
+        return np.zeros((3, 3))
+    axis = rotation @ np.array(start_motion(hinge)[facts.turns[0]][1])
+    axis /= np.linalg.norm(axis)
     return np.eye(3) - np.outer(axis, axis)
 
 

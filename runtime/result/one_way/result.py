@@ -10,7 +10,6 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
-from mstmm.scene.tables.hinge_types import HINGE_TYPES
 
 from ...engine.compiled import Compiled
 from ...pack.flexible.rigidified import with_level
@@ -74,7 +73,7 @@ class OneWayResult(Result):
     ) -> None:
         super().__init__(model, run, error, step)
         self._observed = _Superposed(self, self._observed)
-        self._quantities = Quantities(self._observed, HINGE_TYPES, self)
+        self._quantities = Quantities(self._observed, self)
 
     @cached_property
     def rigid(self) -> Result:

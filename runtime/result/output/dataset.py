@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mstmm.extras import missing
-from mstmm.scene.tables.hinge_types import effort_unit
+from mstmm.ir.facts import effort_unit
 
 from ..flexible import dataset as flexible
 from ..quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit

@@ -1,0 +1,295 @@
+"""HingeFacts: what a hinge leaves free, read once from its motion subspace H and its rates.
+
+Nobody asks for the name of a hinge to learn how it moves: frames of beams, warnings, links and
+results ask these facts, which a built-in hinge and one of the user's have alike.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from .kernel import KernelIR, from_json, to_json
+from .param import Param
+from .replay import evaluate_floats
+from .statements import Assign, Constant, Element, Operand, Store, Temporary
+
+Vector = tuple[float, float, float]
+
+#: How the frame of a hinge lies in the axes of the ends it joins, and which keys of the scene say
+#: so: as the ends lie; z along `axis`; z along `axis` inboard and along `axis2` outboard, x normal
+#: to both; z along the normal `axis` and x along `axis2`.
+FRAMES = ("own", "axis", "crossing", "plane")
+
+#: Largest rotation or translation, per unit of a speed, that is none.
+_NONE = 1e-9
+
+
+@dataclass(frozen=True)
+class HingeFacts:
+    """What is known of one type of hinge; vectors and columns of H in its outboard axes.
+
+    Attributes:
+        allows: what it allows, in a few words.
+        coordinates, speeds: names and SI units of the entries of q and u.
+        parameters: numbers of its kernel, in order; those named in `keys` are keys of the scene.
+        frame: one of FRAMES.  keys: keys of a hinge, besides the common ones, that it reads.
+        runs_as: the element whose kernels move it, its own name but where two share them.
+        quaternion: place in q of the first entry (w) of a unit quaternion, None without one.
+        straight: the speeds are the rates of the coordinates.
+        varies: per speed, six letters for the rows v, w of H: "0" zero and "1" one in every
+            position, "p" a number of the parameters alone, "q" any other.
+        start_motion: kernel p -> H (6 nu) at the start values of the coordinates.
+    """
+
+    name: str
+    allows: str
+    coordinates: tuple[Param, ...]
+    speeds: tuple[Param, ...]
+    parameters: tuple[Param, ...]
+    frame: str
+    keys: tuple[str, ...]
+    runs_as: str
+    quaternion: int | None
+    straight: bool
+    varies: tuple[str, ...]
+    start_motion: KernelIR
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """The default q: zero, with the quaternion of no rotation."""
+        return start_of(len(self.coordinates), self.quaternion)
+
+    @property
+    def welds(self) -> bool:
+        """Nothing moves."""
+        return not self.speeds
+
+    @property
+    def turns(self) -> tuple[int, ...]:
+        """Speeds that turn the outboard body."""
+        return tuple(k for k, rows in enumerate(self.varies) if rows[3:] != "000")
+
+    @property
+    def slides(self) -> tuple[int, ...]:
+        """Speeds that move the hinge point."""
+        return tuple(k for k, rows in enumerate(self.varies) if rows[:3] != "000")
+
+    @property
+    def free_body(self) -> bool:
+        """All six motions are free."""
+        return len(self.speeds) == 6
+
+    @property
+    def steady(self) -> bool:
+        """The motions are the same in every position, seen from the outboard body."""
+        return not any("q" in rows for rows in self.varies)
+
+    @property
+    def goes_anywhere(self) -> bool:
+        """The hinge point is not held on a line: two translations or more are free."""
+        return len(self.slides) > 1
+
+    @property
+    def axial(self) -> bool:
+        """It moves about and along z alone, the same way in every position."""
+        along = all(rows[:2] == "00" and rows[3:5] == "00" for rows in self.varies)
+        return bool(self.speeds) and along and self.steady
+
+    @property
+    def keeps_z(self) -> bool:
+        """Everything stays in planes normal to z, about which alone it turns."""
+        return all(rows[2:5] == "000" for rows in self.varies)
+
+    def own_parameters(self) -> tuple[Param, ...]:
+        """Numbers that the table `parameters` of a scene's hinge gives."""
+        from_frame = 1 if self.frame == "crossing" else 0
+        return tuple(p for p in self.parameters[from_frame:] if p.name not in self.keys)
+
+    def at_start(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
+        """(translation, rotation) per unit of each speed at the start values; `p` as the kernel
+        takes them."""
+        nu = len(self.speeds)
+        if any("p" in rows for rows in self.varies) and len(p) != len(self.parameters):
+            raise ValueError(f"{self.name}: expected {len(self.parameters)} parameters")
+        given = {"p": list(p) or [0.0] * len(self.parameters)}
+        h = evaluate_floats(self.start_motion, given)["H"] if nu else []
+        columns = [[h[row * nu + k] for row in range(6)] for k in range(nu)]
+        return [((a, b, c), (d, e, f)) for a, b, c, d, e, f in columns]
+
+
+def start_of(count: int, quaternion: int | None) -> tuple[float, ...]:
+    """Zeros, with the quaternion of no rotation."""
+    return tuple(1.0 if i == quaternion else 0.0 for i in range(count))
+
+
+def effort_unit(speed_unit: str) -> str:
+    """Unit of the effort that does work on a speed: N for m/s, N*m for rad/s."""
+    return {"m/s": "N", "rad/s": "N*m", "1/s": "J"}.get(speed_unit, f"W/({speed_unit or '1'})")
+
+
+# --- from the kernel ------------------------------------------------------------------------------
+
+
+def facts_of(
+    hinge: KernelIR,
+    name: str,
+    coordinates: tuple[Param, ...],
+    speeds: tuple[Param, ...],
+    parameters: tuple[Param, ...],
+    frame: str = "axis",
+    keys: tuple[str, ...] = ("axis",),
+    allows: str = "",
+) -> HingeFacts:
+    """Facts of a hinge from its kernel "hinge": H, R and qdot over p, q and u."""
+    nu, values = len(speeds), _stored(hinge)
+    depends = _Dependence(hinge)
+    quaternion = _quaternion(hinge, len(coordinates), nu)
+    varies = tuple(
+        "".join(depends.letter(values["H", row * nu + k]) for row in range(6)) for k in range(nu)
+    )
+    straight = len(coordinates) == nu and all(
+        values["qdot", k] == Element("u", (k,)) for k in range(nu)
+    )
+    start = start_of(len(coordinates), quaternion)
+    return HingeFacts(
+        name, allows, coordinates, speeds, parameters, frame, keys, name, quaternion, straight,
+        varies, _at(hinge, start),
+    )  # fmt: skip
+
+
+def same_motion(one: KernelIR, other: KernelIR) -> bool:
+    """Whether two hinges have one and the same kernel, whatever they are called."""
+
+    def bare(kernel: KernelIR) -> tuple[Any, ...]:
+        ports = [(p.name, p.shape) for p in (*kernel.inputs, *kernel.outputs)]
+        return (*ports, kernel.statements)
+
+    return bare(one) == bare(other)
+
+
+def _stored(kernel: KernelIR) -> dict[tuple[str, int], Operand]:
+    """(output, place) -> what is stored there."""
+    ports = {port.name: port for port in kernel.outputs}
+    return {
+        (s.port, ports[s.port].offset(s.index)): s.value
+        for s in kernel.statements
+        if isinstance(s, Store)
+    }
+
+
+class _Dependence:
+    """What the values of a kernel depend on."""
+
+    def __init__(self, kernel: KernelIR) -> None:
+        self._of: dict[int, str] = {}
+        for statement in kernel.statements:
+            if isinstance(statement, Assign):
+                letters = {self._reads(argument) for argument in statement.args}
+                self._of[statement.number] = max(letters, default="")
+
+    def _reads(self, operand: Operand) -> str:
+        """ "" a constant, "p" parameters alone, "q" coordinates (or speeds) too."""
+        if isinstance(operand, Temporary):
+            return self._of[operand.number]
+        if isinstance(operand, Element):
+            return "p" if operand.port == "p" else "q"
+        return ""
+
+    def letter(self, operand: Operand) -> str:
+        """One of the letters of `HingeFacts.varies`."""
+        if isinstance(operand, Constant) and operand.text in "01":
+            return operand.text
+        return self._reads(operand) or "p"
+
+
+def _at(kernel: KernelIR, start: Sequence[float]) -> KernelIR:
+    """The kernel p -> H at these coordinates, at rest."""
+
+    def fixed(operand: Operand) -> Operand:
+        if isinstance(operand, Element) and operand.port in "qu":
+            value = start[operand.index[0]] if operand.port == "q" else 0.0  # type: ignore[index]
+            return Constant(str(int(value)))
+        return operand
+
+    port = next(port for port in kernel.outputs if port.name == "H")
+    kept: list[Assign | Store] = []
+    needed: set[int] = set()
+    for statement in reversed(kernel.statements):
+        if isinstance(statement, Store) and statement.port == "H":
+            kept.append(replace(statement, value=fixed(statement.value)))
+            needed |= _numbers([statement.value])
+        elif isinstance(statement, Assign) and statement.number in needed:
+            kept.append(replace(statement, args=tuple(map(fixed, statement.args))))
+            needed |= _numbers(statement.args)
+    p = next(port for port in kernel.inputs if port.name == "p")
+    return KernelIR("start_motion", (p,), (port,), tuple(reversed(kept)))
+
+
+def _numbers(operands: Sequence[Operand]) -> set[int]:
+    return {operand.number for operand in operands if isinstance(operand, Temporary)}
+
+
+def _quaternion(hinge: KernelIR, nq: int, nu: int) -> int | None:
+    """Place of the four coordinates whose length does not matter to the rotation, if there are."""
+    if nq != nu + 1:
+        return None
+    sizes = {port.name: port.length() for port in hinge.inputs}
+    q = [0.3 + 0.17 * k for k in range(nq)]
+    rest = {"p": [0.7 + 0.1 * k for k in range(sizes["p"])], "u": [0.0] * sizes["u"]}
+
+    def rotation(q: Sequence[float]) -> list[float]:
+        return evaluate_floats(hinge, {"q": q, **rest})["R"]
+
+    for first in range(nq - 3):
+        longer = [2 * x if first <= k < first + 4 else x for k, x in enumerate(q)]
+        turned = [x + 0.1 if k == first else x for k, x in enumerate(q)]
+        same = _apart(rotation(q), rotation(longer)) <= _NONE
+        if same and _apart(rotation(q), rotation(turned)) > _NONE:
+            return first
+    return None
+
+
+def _apart(one: Sequence[float], other: Sequence[float]) -> float:
+    return max(abs(a - b) for a, b in zip(one, other, strict=True))
+
+
+# --- stored form ----------------------------------------------------------------------------------
+
+
+def facts_to_data(facts: HingeFacts) -> dict[str, Any]:
+    """Plain lists, numbers and texts; `facts_from_data` is the inverse."""
+    groups = {
+        key: [list(astuple(p)) for p in getattr(facts, key)]
+        for key in ("coordinates", "speeds", "parameters")
+    }
+    return {
+        "name": facts.name, "allows": facts.allows, **groups, "frame": facts.frame,
+        "keys": list(facts.keys), "runs_as": facts.runs_as, "quaternion": facts.quaternion,
+        "straight": facts.straight, "varies": list(facts.varies),
+        "start_motion": json.loads(to_json(facts.start_motion)),
+    }  # fmt: skip
+
+
+def facts_from_data(data: dict[str, Any]) -> HingeFacts:
+    """The facts again."""
+    groups: dict[str, Any] = {
+        key: tuple(Param(*entry) for entry in data[key])
+        for key in ("coordinates", "speeds", "parameters")
+    }
+    rest = {key: data[key] for key in ("name", "allows", "frame", "runs_as", "quaternion")}
+    return HingeFacts(
+        **rest, **groups, keys=tuple(data["keys"]), straight=data["straight"],
+        varies=tuple(data["varies"]), start_motion=from_json(json.dumps(data["start_motion"])),
+    )  # fmt: skip
+
+
+@cache
+def builtin_hinges() -> dict[str, HingeFacts]:
+    """Facts of the built-in hinges by name, in the order in which they are listed to users."""
+    text = files("mstmm.generated").joinpath("hinges.json").read_text(encoding="utf-8")
+    return {data["name"]: facts_from_data(data) for data in json.loads(text)}
