@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError, NumericalFailure, SceneError
 
 from .extras import need_for, result_ending
@@ -74,17 +75,17 @@ def simulate(
     ] = 10.0,
     method: Annotated[
         str, typer.Option("--method", metavar="NAME", help="dop853, dopri5, rk4, or scipy-NAME.")
-    ] = "dop853",
+    ] = METHOD,
     step: Annotated[
         float | None,
         typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s (rk4 needs one)."),
     ] = None,
     rtol: Annotated[
         float, typer.Option("--rtol", metavar="X", parser=positive, help="Relative tolerance.")
-    ] = 1e-9,
+    ] = RTOL,
     atol: Annotated[
         float, typer.Option("--atol", metavar="X", parser=not_negative, help="Absolute tolerance.")
-    ] = 1e-12,
+    ] = ATOL,
     max_step: Annotated[
         float | None,
         typer.Option("--max-step", metavar="S", parser=positive, help="Longest step of a method "

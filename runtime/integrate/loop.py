@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 
+from .settings import Settings
 from .steppers import Tableau
 from .tableau_in_c import c_tableau
 
@@ -129,18 +130,14 @@ class Run:
         ffi, lib: a cffi pair that knows the declarations of `engine_integrate.h`.
         system: `mstmm_system *`, filled; kept alive by the run.
         tableau: the method, see `mstmm.runtime.integrate.steppers`.
-        t_start, t_end: seconds, t_end >= t_start.
+        settings: how the run is made; its method is `tableau`.
         y0: (n_state,).
-        rtol: relative tolerance.
-        atol: absolute tolerance, one number or (n_error,), above zero.
-        step: fixed step in seconds; None for adaptive steps.
-        output_times: strictly increasing times of samples; None for every accepted step.
+        atol: absolute tolerance of every component, (n_error,), above zero; that of the settings
+            unless given.
         breaks: strictly increasing times at which the right-hand side is not smooth.  Steps end
             there; the right-hand side never sees a break itself but the number before or after.
         bounds: (starts, longest): from each start on, the first at or before t_start, no adaptive
             step is longer.
-        first_step, min_step, max_step: seconds, 0 to let the loop choose.
-        max_steps: 0 for as many as it takes, if the end is in sight.
         capacity: rows of the sample buffer, at least 2.
 
     Raises:
@@ -153,20 +150,12 @@ class Run:
         lib: Any,
         system: Any,
         tableau: Tableau,
-        *,
-        t_start: float,
-        t_end: float,
+        settings: Settings,
         y0: ArrayLike,
-        rtol: float = 1e-6,
-        atol: ArrayLike = 1e-9,
-        step: float | None = None,
-        output_times: ArrayLike | None = None,
+        *,
+        atol: ArrayLike | None = None,
         breaks: ArrayLike = (),
         bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
-        first_step: float = 0.0,
-        min_step: float = 0.0,
-        max_step: float = 0.0,
-        max_steps: int = 0,
         capacity: int | None = None,
     ) -> None:
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
@@ -176,15 +165,17 @@ class Run:
         self._run = run = ffi.new("mstmm_run *")
         run.system = system
         run.tableau = c_tableau(ffi, tableau)
-        run.t_start, run.t_end, run.rtol = t_start, t_end, rtol
-        run.fixed_step = 0.0 if step is None else step
-        run.first_step, run.min_step, run.max_step = first_step, min_step, max_step
-        run.max_steps = max_steps
-        if step is not None and not step > 0.0:
-            raise SceneError(f"step = {step!r}: a fixed step is a time above zero, in seconds")
-        tolerances = np.broadcast_to(np.asarray(atol, dtype=np.float64), (system.n_error,))
-        run.atol = self._doubles(tolerances)
-        self._times(run, output_times, breaks)
+        run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
+        run.fixed_step = 0.0 if settings.step is None else settings.step
+        run.first_step, run.min_step = settings.first_step, settings.min_step
+        run.max_step, run.max_steps = settings.max_step, settings.max_steps
+        if settings.step is not None and not settings.step > 0.0:
+            raise SceneError(
+                f"step = {settings.step!r}: a fixed step is a time above zero, in seconds"
+            )
+        given = np.asarray(settings.atol if atol is None else atol, dtype=np.float64)
+        run.atol = self._doubles(np.broadcast_to(given, (system.n_error,)))
+        self._times(run, settings.output_times, breaks)
         starts, longest = (np.asarray(x, dtype=np.float64) for x in bounds)
         run.n_bounds = len(starts)
         run.bound_starts, run.bounds = self._doubles(starts), self._doubles(longest)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import numbers, real, whole
+from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
 #: Absolute tolerances below this are this: squares of errors against them must not overflow.
@@ -17,18 +18,23 @@ _LEAST = 1e-100
 
 @dataclass(frozen=True)
 class Settings:
-    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`."""
+    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`.
+
+    `first_step`, `min_step` and `max_step` (s) are chosen by the loop where they are 0, and
+    `max_steps` is 0 for as many as it takes.
+    """
 
     t_end: float
     t_start: float = 0.0
-    method: str = "dop853"
+    method: str = METHOD
     step: float | None = None
-    rtol: float = 1e-9
-    atol: float = 1e-12
+    rtol: float = RTOL
+    atol: float = ATOL
     output_times: tuple[float, ...] | None = None
     max_step: float = 0.0
     max_steps: int = 0
     first_step: float = 0.0
+    min_step: float = 0.0
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array, batch, one, pair, real
+from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
@@ -163,10 +164,10 @@ class Model(Compiled):
     def simulate(
         self,
         t_end: float,
-        method: str = "dop853",
+        method: str = METHOD,
         step: float | None = None,
-        rtol: float = 1e-9,
-        atol: float = 1e-12,
+        rtol: float = RTOL,
+        atol: float = ATOL,
         output_times: ArrayLike | Sequence[float] | None = None,
         *,
         t_start: float = 0.0,
@@ -220,10 +221,10 @@ class Model(Compiled):
         *,
         t_end: float,
         output_times: ArrayLike | Sequence[float] | None = None,
-        method: str = "dop853",
+        method: str = METHOD,
         step: float | None = None,
-        rtol: float = 1e-9,
-        atol: float = 1e-12,
+        rtol: float = RTOL,
+        atol: float = ATOL,
         t_start: float = 0.0,
         max_step: float = 0.0,
         max_steps: int = 0,

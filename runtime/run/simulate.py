@@ -43,12 +43,9 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     start = system.start(settings.t_start, q, u)
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
-        system.engine.ffi, system.engine.lib, system.system, tableau,
-        t_start=settings.t_start, t_end=settings.t_end,
-        y0=start, rtol=settings.rtol, atol=tolerances(system, settings, start),
-        step=settings.step, output_times=settings.output_times, breaks=known.breaks,
+        system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
+        atol=tolerances(system, settings, start), breaks=known.breaks,
         bounds=(known.starts, known.longest),
-        max_step=settings.max_step, max_steps=settings.max_steps, first_step=settings.first_step,
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 import mstmm.templates
 from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.integrate.steppers import Tableau, get
 from mstmm.runtime.libraries.build_extension import cdef
 
@@ -61,10 +62,13 @@ class Problem:
     at: Any
 
     def run(self, method: str | Tableau, t_end: float, y0: ArrayLike, **options: Any) -> Run:
-        """A run from t_start (0 unless given), not yet advanced."""
+        """A run with these settings, 1e-6 and 1e-9 unless given, not yet advanced."""
         tableau = get(method) if isinstance(method, str) else method
-        options.setdefault("t_start", 0.0)
-        return Run(self.lab.ffi, self.lab.lib, self.system, tableau, t_end=t_end, y0=y0, **options)
+        atol = options.pop("atol", 1e-9)
+        own = {key: options.pop(key) for key in ("breaks", "bounds", "capacity") if key in options}
+        settings = Settings(t_end, **{"rtol": 1e-6, **options})
+        system = (self.lab.ffi, self.lab.lib, self.system)
+        return Run(*system, tableau, settings, y0, atol=atol, **own)
 
     def solved(self, method: str | Tableau, t_end: float, y0: ArrayLike, **options: Any) -> Run:
         """A run that has finished."""
