@@ -23,8 +23,8 @@ def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
     campaign = Campaign(seed=9, limits=Limits(), engine="looped", keep=None)
     campaign.run(first=43, count=40, jobs=2)
     assert not campaign.failures, campaign.table()
-    assert campaign.outcomes[REFUSED] >= 10
-    assert campaign.outcomes[RAN] >= 5
+    refused = campaign.outcomes[REFUSED]
+    assert 10 <= refused <= 30  # the others run, some until patience ends, by how fast they are
 
 
 @pytest.fixture(scope="module")

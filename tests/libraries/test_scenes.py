@@ -57,10 +57,10 @@ def test_fused_code_comes_from_the_compiler_then_from_the_cache(
 Fault = Callable[[Path, Path, pytest.MonkeyPatch], None]
 
 
-def _compiler(script: str) -> Fault:
+def _compiler(script: str, seconds: float = 300.0) -> Fault:
     def fault(folder: Path, own: Path, patch: pytest.MonkeyPatch) -> None:
         patch.setenv("CC", str(false_compiler(own, script)))
-        patch.setenv("MSTMM_COMPILE_TIMEOUT", "0.5")
+        patch.setenv("MSTMM_COMPILE_TIMEOUT", str(seconds))
 
     return fault
 
@@ -92,7 +92,7 @@ FAULTS: dict[str, tuple[str, Fault]] = {
     "no compiler": ("no C compiler", _missing),
     "compiler fails": ("could not compile", _compiler("exit 1")),
     "compiler is killed": ("killed by SIGKILL", _compiler("kill -9 $$")),
-    "compiler hangs": ("did not finish", _compiler("exec sleep 600")),
+    "compiler hangs": ("did not finish", _compiler("exec sleep 600", seconds=0.5)),
     "compiler makes nonsense": (
         "cannot be used",
         _compiler('for last; do :; done\necho text >"$last"'),

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from motions.scene_product import SceneProduct, chain_bodies
 from reference import newton_euler as dense
 from reference.compare import fresh, worst
 from reference.jets import Array
 from reference.tree import read
 from support.rod_scenes import chain, drawn_state
-from support.scene_product import SceneProduct, chain_bodies
 
 import mstmm
 

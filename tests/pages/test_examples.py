@@ -18,7 +18,6 @@ def test_example(script: Path, tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=120,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert run.stdout, "an example says what it measured"
@@ -32,7 +31,6 @@ def test_picture(script: Path, tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=120,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert target.read_bytes().startswith(b"\x89PNG"), "a picture was drawn"

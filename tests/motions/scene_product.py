@@ -17,11 +17,11 @@ from reference import laws
 from reference import newton_euler as dense
 from reference.jets import Array
 from reference.tree import Hinge, Tree, read
+from support.classical_kernels import chain_accelerations, run_precisely, spatial_inputs
+from support.dense_chain import Body
 
 import mstmm.generated
 from mstmm.ir import KernelIR, from_json
-from support.classical_kernels import chain_accelerations, run_precisely, spatial_inputs
-from support.dense_chain import Body
 
 KERNELS = {"pin": "pin_spatial", "ball": "ball", "elastic": "acceleration"}
 
