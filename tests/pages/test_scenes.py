@@ -1,10 +1,9 @@
 """The page on the scene format: its scenes load, and no key of the format is missing from it."""
 
-import re
-import runpy
 from pathlib import Path
 
 import pytest
+from pages.blocks import Follow, page_text, shown
 
 import mstmm
 from mstmm.ir.facts import builtin_hinges
@@ -34,18 +33,12 @@ from mstmm.scene import (
 )
 from mstmm.scene.rules.values import Table
 
-PAGES = Path(__file__).parents[2] / "docs" / "use"
-BLOCKS = [
-    pytest.param(block, id=f"{page.stem}-{i}")
-    for page in sorted(PAGES.glob("*.md"))
-    for i, block in enumerate(
-        re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
-    )
-]
-FORMAT = (PAGES / "scenes.md").read_text("utf-8")
+PAGE = "docs/use/scenes.md"
+BLOCKS = shown(PAGE, "toml")
+FORMAT = page_text(PAGE)
 
 
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
 def test_scene_loads(block: str, tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(block, encoding="utf-8")
@@ -54,7 +47,7 @@ def test_scene_loads(block: str, tmp_path: Path) -> None:
     assert load_scene(path) == scene
 
 
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
 def test_scene_runs(block: str, tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(block, encoding="utf-8")
@@ -82,15 +75,6 @@ def test_every_hinge_type_is_described() -> None:
     assert {name for name in builtin_hinges() if f"`{name}`" not in FORMAT} == set()
 
 
-def test_first_scene_runs_as_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    toml, python = (
-        re.findall(rf"```{language}\n(.*?)```", FORMAT, re.S)[0] for language in ("toml", "python")
-    )
-    (tmp_path / "pendulum.toml").write_text(toml, encoding="utf-8")
-    (tmp_path / "run.py").write_text(python, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path("run.py")
-    energy = float(capsys.readouterr().out.split()[-1])
+def test_first_scene_has_the_energy_it_began_with(played: Follow) -> None:
+    energy = float(played(PAGE).printed.split()[-1])
     assert energy == pytest.approx(9.81 * 0.5 * 0.29552020666134, abs=1e-6)
