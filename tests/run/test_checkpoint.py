@@ -20,7 +20,8 @@ import mstmm
 from mstmm.runtime.integrate.loop import Run
 from mstmm.runtime.run import execution
 
-#: Runs a scene from a file; says where it is, so that the parent can interrupt it half-way.
+#: Runs a scene from a file; says where it is and waits for a line, so that the parent can
+#: interrupt it half-way.
 PROGRAM = """
 import sys
 import numpy as np
@@ -29,7 +30,7 @@ scene, out, mode, t_end = sys.argv[1:]
 model = mstmm.compile(mstmm.load_scene(scene))
 more = {} if mode == "full" else {"checkpoint": out + ".ck.npz", "resume": mode == "resume"}
 if mode == "cut":
-    more["progress"] = lambda t, end: print(t, flush=True)
+    more["progress"] = lambda t, end: (print(t, flush=True), sys.stdin.readline())
 run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, **more)
 print(run.message)
 arrays = {n: getattr(run, n) for n in ("t", "q", "u", "work", "event")}
@@ -63,7 +64,9 @@ def start() -> Iterator[Start]:
 
     def run(*arguments: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-c", PROGRAM, *arguments]
-        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        started.append(
+            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        )
         return started[-1]
 
     yield run
@@ -78,13 +81,14 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
 ) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(remembering().to_toml())
-    t_end = "800"  # some seconds of work, so that Ctrl-C comes in the midst of it
+    t_end = "800"  # more than two slices of work
     full = start(str(scene), str(tmp_path / "full.npz"), "full", t_end)
     cut = start(str(scene), str(tmp_path / "cut.npz"), "cut", t_end)
-    assert cut.stdout is not None
-    for _ in range(2):  # slices of 0.1 s
-        assert cut.stdout.readline()
-    cut.send_signal(signal.SIGINT)
+    assert cut.stdin is not None and cut.stdout is not None
+    assert cut.stdout.readline()  # after a slice of 0.1 s
+    print(file=cut.stdin, flush=True)
+    assert cut.stdout.readline()
+    cut.send_signal(signal.SIGINT)  # it waits
     told = cut.communicate()[0]
     assert cut.returncode == 0 and "interrupted at t = " in told and "success False" in told
     os.replace(tmp_path / "cut.npz.ck.npz", tmp_path / "rest.npz.ck.npz")
