@@ -14,6 +14,7 @@ import mpmath
 import sympy as sp
 
 from mstmm.errors import ElementError
+from mstmm.ir.facts import FRAMES
 from mstmm.ir.spec import Param
 
 from ..catalogue.registry import Element, builtin_elements, kind_of
@@ -126,6 +127,7 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
     where = f"hinge {hinge.name}"
     if len(speeds_of(hinge)) > 6:
         raise ElementError(f"{where}: {len(speeds_of(hinge))} speeds; a hinge has at most six")
+    _check_frame(where, hinge)
     motion = motion_of(hinge)
     _only_known_symbols(where, motion)
     _units_fit(where, motion)
@@ -152,6 +154,33 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
         for what, matrix, derived in given:
             _agrees(where, what, matrix, derived, point)
     return motion
+
+
+#: Keys of a scene's hinge that a definition may read, and those that a frame needs.
+_KEYS = ("axis", "axis2", "lead")
+_NEEDED = {"crossing": ("axis", "axis2"), "plane": ("axis", "axis2")}
+
+
+def _check_frame(where: str, hinge: Hinge) -> None:
+    """`frame` and `keys`: how the hinge lies in a scene."""
+    if hinge.frame not in FRAMES:
+        words = ", ".join(f'"{frame}"' for frame in FRAMES)
+        raise ElementError(f"{where}: frame: expected one of {words}, found {hinge.frame!r:.40}")
+    if not isinstance(hinge.keys, tuple) or not set(hinge.keys) <= set(_KEYS):
+        raise ElementError(
+            f"{where}: keys: expected a tuple of {', '.join(_KEYS)}, found {hinge.keys!r:.60}"
+        )
+    missing = [key for key in _NEEDED.get(hinge.frame, ()) if key not in hinge.keys]
+    if missing:
+        raise ElementError(f'{where}: frame "{hinge.frame}" needs {missing[0]} among the keys')
+    names = [parameter.name for parameter in hinge.parameters]
+    if "lead" in hinge.keys and "lead" not in names:
+        raise ElementError(f"{where}: keys: lead is no parameter of it; declare it")
+    if hinge.frame == "crossing" and not names:
+        raise ElementError(
+            f'{where}: frame "crossing": its first parameter is the angle between the axes in rad; '
+            "declare it"
+        )
 
 
 def _points(motion: HingeMotion) -> Iterable[Numbers]:

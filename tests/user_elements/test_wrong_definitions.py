@@ -74,6 +74,15 @@ def declared(what: str, text: str) -> str:
 
 
 WRONG: dict[str, tuple[str, str]] = {
+    # its place in a scene
+    "frame": (own("frame = 'sideways'"), "frame: expected one of .*found 'sideways'"),
+    "keys": (own("keys = ('axis3',)"), "keys: expected a tuple of axis, axis2, lead, found"),
+    "one axis": (own("frame = 'crossing'"), 'frame "crossing" needs axis2 among the keys'),
+    "no lead": (own("keys = ('axis', 'lead')"), "keys: lead is no parameter of it"),
+    "no angle": (
+        own("frame, keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
+        "first parameter is the angle between the axes",
+    ),
     # motion
     "rank": (hinge("rotation_about(2, 0 * q.a)"), "motion subspace H loses rank"),
     "stretch": (
