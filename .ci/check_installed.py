@@ -19,7 +19,8 @@ for name in setuptools["packages"]:
     mapped = next(m for m in sorted(mapping, reverse=True) if f"{name}.".startswith(f"{m}."))
     real = checkout.joinpath(mapping[mapped], *name.removeprefix(mapped).split(".")[1:])
     for pattern in ("*.py", *setuptools["package-data"].get(name, [])):
-        missing = {path.name for path in real.glob(pattern)} - {p.name for p in folder.iterdir()}
+        wanted = {path.relative_to(real) for path in real.glob(pattern)}
+        missing = {str(path) for path in wanted if not (folder / path).is_file()}
         assert not missing, f"{name} lacks {sorted(missing)}"
 
 kernels = importlib.import_module("mstmm.generated._kernels")

@@ -1,18 +1,19 @@
 #!/usr/bin/env bash
-# The generated C under strict warnings, then under the address and undefined-behaviour sanitizers:
+# The C of all rooms under strict warnings, then under the address and undefined-behaviour sanitizers:
 # every kernel by a small driver, and the engine by the tests that exercise it from Python.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
-strict=(-std=c17 -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Werror)
+strict=(@compile_flags.txt -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Werror)
 sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+sources=(generated/*.c runtime/*/c/*.c)
 
 echo "--- warnings as errors: clang"
-clang "${strict[@]}" -fsyntax-only -Igenerated generated/*.c
+clang "${strict[@]}" -fsyntax-only "${sources[@]}"
 
 echo "--- warnings as errors: gcc; every kernel, sanitized"
-gcc "${strict[@]}" -g -O1 "${sanitize[@]}" -Igenerated generated/*.c .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
+gcc "${strict[@]}" -g -O1 "${sanitize[@]}" "${sources[@]}" .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
 "$scratch/kernels"
 
 echo "--- the engine under its tests, sanitized"

@@ -17,6 +17,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+from mstmm.runtime.libraries.build_extension import FOLDERS, PASTED
+
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
@@ -109,18 +111,34 @@ def test_link_reaches_its_room(room: str) -> None:
     assert (link / "__init__.py").samefile(ROOT / room / "__init__.py")
 
 
-@pytest.mark.parametrize("room", ["templates", "generated"])
-def test_data_files_are_packaged(room: str) -> None:
-    patterns = SETUPTOOLS["package-data"][f"mstmm.{room}"]
-    known = {path for pattern in patterns for path in (ROOT / room).glob(pattern)}
-    built = {"__init__.py", "__pycache__"}
+@pytest.mark.parametrize(
+    "folder", ["templates", "generated", "runtime/engine/c", "runtime/integrate/c"]
+)
+def test_data_files_are_packaged(folder: str) -> None:
+    package = folder.removesuffix("/c")
+    patterns = SETUPTOOLS["package-data"][f"mstmm.{package.replace('/', '.')}"]
+    known = {path for pattern in patterns for path in (ROOT / package).glob(pattern)}
+    built = {"__init__.py", "__pycache__", ".clang-format"}
     forgotten = {
         path
-        for path in (ROOT / room).iterdir()
+        for path in (ROOT / folder).iterdir()
         if path not in known and path.name not in built and path.suffix != ".so"
     }
     assert known
     assert not forgotten
+
+
+def test_every_folder_of_c_is_built() -> None:
+    """The lists of the builder, and of editors and sanitizers, name what there is."""
+    found = {
+        path.parent.relative_to(ROOT)
+        for room in ROOMS
+        for ending in ("*.c", "*.h")
+        for path in (ROOT / room).rglob(ending)
+    }
+    assert {*FOLDERS, PASTED} == found
+    flags = (ROOT / "compile_flags.txt").read_text().split()
+    assert {Path(flag[2:]) for flag in flags if flag.startswith("-I")} == found
 
 
 def test_import_of_the_face_is_light() -> None:

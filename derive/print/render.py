@@ -50,19 +50,15 @@ def elements_header(specs: Sequence[ElementSpec]) -> str:
     return _render("elements.h.jinja", elements=_summaries(specs))
 
 
-def engine_sources(specs: Sequence[ElementSpec] = ()) -> dict[str, str]:
-    """File name -> text of the kernel-free C: every template called engine*.jinja."""
-    folder = Path(mstmm.templates.__path__[0])
-    names = sorted(path.name for path in folder.glob("engine*.jinja"))
-    return {
-        name.removesuffix(".jinja"): _render(name, elements=_summaries(specs)) for name in names
-    }
+def border_headers() -> dict[str, str]:
+    """File name -> text of what the engine's own C knows of tapes and of fused libraries."""
+    return {name: _render(f"{name}.jinja") for name in ("tape.h", "fused.h")}
 
 
 def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
-    """`manifest.json`: ABI number, SHA-256 of all C text, names and hashes of elements and kernels.
+    """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of elements and kernels.
 
-    A module that was compiled from other text is told by it (`runtime/kernels/prebuilt.py`).
+    A module that was compiled from other text is told by it (`build_extension.built_from`).
     """
     text = hashlib.sha256()
     for name in sorted(name for name in files if name.endswith((".c", ".h"))):
@@ -81,24 +77,24 @@ def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
 
 
 def generated_files(
-    specs: Iterable[ElementSpec], *, engine: bool = True, hinges: Sequence[HingeFacts] = ()
+    specs: Iterable[ElementSpec],
+    *,
+    hinges: Sequence[HingeFacts] = (),
 ) -> dict[str, str]:
-    """File name -> text of everything generated, elements sorted by kind and name; `hinges` are
-    the facts of those that a scene may name.
+    """File name -> text of everything generated, elements sorted by kind and name.
 
-    `engine=False` leaves out the kernel-free C (for a user's element compiled on its own).
+    `hinges` are the facts of those that a scene may name.
     ValueError if two elements share kind and name.
     """
     ordered = sorted(specs, key=lambda spec: (spec.kind, spec.name))
-    files = {"mstmm.h": header(), "elements.h": elements_header(ordered)}
+    files = {"mstmm.h": header(), "elements.h": elements_header(ordered), **border_headers()}
     for spec in ordered:
         stem = f"{spec.kind}_{spec.name}"
-        if f"{stem}.c" in files:
+        if f"{stem}.json" in files:
             raise ValueError(f"two elements are called {spec.kind} {spec.name!r}")
         files[f"{stem}.c"] = element_source(spec)
         files[f"{stem}.json"] = element_to_json(spec)
     files["registry.c"] = registry_source(ordered)
-    files |= engine_sources(ordered) if engine else {}
     if hinges:
         files["hinges.json"] = json.dumps([facts_to_data(h) for h in hinges], indent=1) + "\n"
     files["manifest.json"] = manifest(ordered, files)
@@ -109,14 +105,13 @@ def write_generated(
     specs: Iterable[ElementSpec],
     folder: Path | str,
     *,
-    engine: bool = True,
     hinges: Sequence[HingeFacts] = (),
 ) -> list[Path]:
     """Write `generated_files` into `folder` (made if missing); returns the paths, sorted."""
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name, text in generated_files(specs, engine=engine, hinges=hinges).items():
+    for name, text in generated_files(specs, hinges=hinges).items():
         path = target / name
         path.write_text(text, encoding="utf-8", newline="\n")
         paths.append(path)

@@ -3,7 +3,7 @@
 A kernel without run-time size becomes one `const` per value, in an order in which every value
 stands behind its operands.  The same lines are printed in several dialects: plain numbers of any
 real type, and GNU C vectors, whose operations are spelled as functions of the support text
-(templates/fused_*.jinja).  Ports get an underscore behind their names, so that they meet no other
+(templates/fused_*.c).  Ports get an underscore behind their names, so that they meet no other
 name of the text.
 """
 

@@ -1,4 +1,4 @@
-"""A time integration from Python: a thin hold on the C loop of `engine_integrate.c`.
+"""A time integration from Python: a thin hold on the C loop of `c/integrate.c`.
 
 `Run` owns the arrays of a run and translates its numbers into words.  It knows nothing of
 mechanics: the system is a `mstmm_system` that the caller has filled, so that a scene, a test
@@ -127,7 +127,7 @@ class Run:
     """One time integration, advanced in slices.
 
     Args:
-        ffi, lib: a cffi pair that knows the declarations of `engine_integrate.h`.
+        ffi, lib: a cffi pair that knows the declarations of `c/integrate.h`.
         system: `mstmm_system *`, filled; kept alive by the run.
         tableau: the method, see `mstmm.runtime.integrate.steppers`.
         settings: how the run is made; its method is `tableau`.

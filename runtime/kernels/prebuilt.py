@@ -54,7 +54,7 @@ def _refuse_stale(kernels: Any) -> None:
         found = text(kernels.ffi, getattr(kernels.lib, BUILT_FROM))
     except AttributeError:  # before modules told
         found = ""
-    if found != built_from(Path(str(files("mstmm.generated")))):
+    if found != built_from(Path(str(files("mstmm")))):
         raise EnvironmentFailure(
             f"the compiled kernels {kernels.__file__} belong to another version of mstmm; build "
             "them again: pip install -e . in the checkout, or pip install --force-reinstall mstmm "

@@ -1,22 +1,29 @@
-"""Builds `mstmm.generated._kernels` from the committed C; also the one reader of its declarations.
+"""Builds `mstmm.generated._kernels` from the C of several rooms; also reads its declarations.
 
 setup.py executes this file inside pip's build isolation, where mstmm cannot be imported: it uses
 the standard library and cffi alone, and paths relative to the project's root.
 
-What Python may call is written once, in the generated headers, between the markers
-`/* cdef begin */` and `/* cdef end */`: plain declarations, no preprocessor lines but integer
-`#define`s.  A header's own `#include "other.h"` lines decide the order.
+The C is generated (elements and kernels) and written by hand (the engine, the integration).  What
+Python may call is written once, in the headers of both, between the markers `/* cdef begin */` and
+`/* cdef end */`: plain declarations, no preprocessor lines but integer `#define`s.  A header's own
+`#include "other.h"` lines decide the order.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from cffi import FFI
 
 GENERATED = Path("generated")
+
+#: Folders of C that the module is built from, and a folder of which it includes text.
+FOLDERS = (GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"))
+PASTED = Path("templates")
+
 MODULE = "mstmm.generated._kernels"
 
 # -ffp-contract=off: a * b + c is rounded twice on every machine, so results do not depend on
@@ -32,8 +39,16 @@ _BLOCK = re.compile(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", re.DOTALL)
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
 
-def headers(folder: Path) -> list[Path]:
-    """The headers of `folder`, each after those it includes; by name where that leaves a choice."""
+def headers(folders: Sequence[Path]) -> list[Path]:
+    """The headers of `folders`, each after those it includes; by name where that leaves a choice.
+
+    ValueError for a name that stands in two folders, and for headers that include each other.
+    """
+    named: dict[str, Path] = {}
+    for header in (header for folder in folders for header in sorted(folder.glob("*.h"))):
+        if header.name in named:
+            raise ValueError(f"{header} has the name of {named[header.name]}")
+        named[header.name] = header
     ordered: list[Path] = []
 
     def visit(header: Path, including: tuple[Path, ...]) -> None:
@@ -42,11 +57,11 @@ def headers(folder: Path) -> list[Path]:
         if header in ordered:
             return
         for name in _INCLUDE.findall(header.read_text()):
-            visit(folder / name, (*including, header))
+            visit(named[name], (*including, header))
         ordered.append(header)
 
-    for header in sorted(folder.glob("*.h")):
-        visit(header, ())
+    for name in sorted(named):
+        visit(named[name], ())
     return ordered
 
 
@@ -59,28 +74,43 @@ def cdef(header: Path) -> str:
     return "\n".join(block.strip() for block in blocks)
 
 
-def built_from(folder: Path) -> str:
-    """SHA-256 of `folder`'s manifest, which names every text in it by its own; "" without one."""
-    manifest = folder / "manifest.json"
-    return hashlib.sha256(manifest.read_bytes()).hexdigest() if manifest.is_file() else ""
+def built_from(root: Path) -> str:
+    """SHA-256 of the C in the folders below `root`; "" where there is no manifest of the generated.
+
+    The manifest tells the generated text by hashes of its own; the rest is read.
+    """
+    manifest = root / GENERATED / "manifest.json"
+    if not manifest.is_file():
+        return ""
+    found = hashlib.sha256(manifest.read_bytes())
+    for path in written_by_hand(root):
+        found.update(f"{path.name}\n".encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+def written_by_hand(root: Path) -> list[Path]:
+    """The C below `root` that is not generated, folder by folder, by name."""
+    folders = [root / folder for folder in FOLDERS if folder != GENERATED]
+    paths = [path for folder in folders for path in sorted(folder.glob("*.[ch]"))]
+    return [*paths, *sorted((root / PASTED).glob("*.c"))]
 
 
 def ffibuilder() -> FFI:
     """The extension module of the prebuilt kernels; called by setup.py, in the project's root."""
-    sources = sorted(GENERATED.glob("*.c"))
-    if not sources:
+    if not any(GENERATED.glob("*.c")):
         raise FileNotFoundError(f"{GENERATED}/ holds no C source; run `python -m mstmm generate`")
-    found = headers(GENERATED)
+    sources = [source for folder in FOLDERS for source in sorted(folder.glob("*.c"))]
+    found = headers(FOLDERS)
     builder = FFI()
     builder.cdef("\n".join(cdef(header) for header in found))
     builder.cdef(f"static char *const {BUILT_FROM};")
-    identity = f'static char *const {BUILT_FROM} = "{built_from(GENERATED)}";'
+    identity = f'static char *const {BUILT_FROM} = "{built_from(Path())}";'
     builder.set_source(
         MODULE,
         "\n".join([*(f'#include "{header.name}"' for header in found), identity]),
         sources=[source.as_posix() for source in sources],
-        depends=[header.as_posix() for header in found],
-        include_dirs=[GENERATED.as_posix()],
+        depends=[path.as_posix() for path in (*found, *sorted(PASTED.glob("*.c")))],
+        include_dirs=[folder.as_posix() for folder in (*FOLDERS, PASTED)],
         extra_compile_args=[*COMPILE_ARGS, *WARNING_ARGS],
         libraries=["m"],
         py_limited_api=True,

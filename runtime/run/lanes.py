@@ -1,4 +1,4 @@
-"""Trajectories in the lanes of vectors, on threads: a thin hold on `engine_lanes.c`."""
+"""Trajectories in the lanes of vectors, on threads: a thin hold on `integrate/c/lanes.c`."""
 
 from __future__ import annotations
 

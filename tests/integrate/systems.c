@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "engine_integrate.h"
+#include "integrate.h"
 
 typedef struct parameters {
   double p[8];

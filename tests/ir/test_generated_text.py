@@ -55,7 +55,7 @@ def test_two_processes_with_other_hash_seeds_write_the_same_bytes() -> None:
         for seed in ("1", "2")
     ]
     assert outputs[0] == outputs[1]
-    assert "hinge_a.c" in outputs[0] and "engine_tape.c" in outputs[0]
+    assert "hinge_a.c" in outputs[0] and "tape.h" in outputs[0]
 
 
 def test_the_order_of_the_specs_does_not_matter() -> None:
@@ -74,7 +74,7 @@ def test_files_written_are_the_files_generated(tmp_path: Path) -> None:
     assert texts == generated_files([SPEC])
     assert set(texts) >= {
         "mstmm.h", "elements.h", "registry.c", "manifest.json", "hinge_drawn.c",
-        "hinge_drawn.json", "engine_tape.c", "engine_tape.h",
+        "hinge_drawn.json", "tape.h", "fused.h",
     }  # fmt: skip
     manifest = json.loads(texts["manifest.json"])
     assert manifest["abi"] == abi.ABI

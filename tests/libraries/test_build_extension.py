@@ -1,4 +1,4 @@
-"""How the declarations for Python are read out of the generated headers."""
+"""How the declarations for Python are read out of the headers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ import pytest
 
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.kernels import prebuilt
-from mstmm.runtime.libraries.build_extension import built_from, cdef, headers
+from mstmm.runtime.libraries.build_extension import (
+    FOLDERS,
+    GENERATED,
+    PASTED,
+    built_from,
+    cdef,
+    headers,
+    written_by_hand,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 INNER = """\
@@ -41,32 +49,60 @@ SOURCE = """\
 const real half = 0.5;
 int twice(const real *restrict x, real *restrict y) { y[0] = 2 * x[0]; return 7; }
 """
+BY_HAND = """\
+#include "a_outer.h"
+#include "four_times.h"
+int four_times(const real *restrict x, real *restrict y) {
+    real two;
+    twice(x, &two);
+    return twice(&two, y);
+}
+"""
+BY_HAND_HEADER = """\
+#include "z_inner.h"
+/* cdef begin */
+int four_times(const real *restrict x, real *restrict y);
+/* cdef end */
+"""
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A project with the builder, one C file and two headers, the later one needing the earlier."""
+    """A project with the builder, a generated C file with two headers, and one written by hand."""
     (tmp_path / "generated").mkdir()
     (tmp_path / "mstmm").mkdir()
     (tmp_path / "generated" / "z_inner.h").write_text(INNER)
     (tmp_path / "generated" / "a_outer.h").write_text(OUTER)
     (tmp_path / "generated" / "twice.c").write_text(SOURCE)
+    room = tmp_path / "runtime" / "engine" / "c"
+    room.mkdir(parents=True)
+    (room / "four_times.c").write_text(BY_HAND)
+    (room / "four_times.h").write_text(BY_HAND_HEADER)
     builder = Path("runtime", "libraries", "build_extension.py")
-    (tmp_path / builder.parent).mkdir(parents=True)
+    (tmp_path / builder.parent).mkdir()
     shutil.copy(ROOT / builder, tmp_path / builder)
     shutil.copy(ROOT / "setup.py", tmp_path)
     return tmp_path
 
 
 def test_headers_come_after_what_they_include(project: Path) -> None:
-    assert [header.name for header in headers(project / "generated")] == ["z_inner.h", "a_outer.h"]
+    found = headers([project / "generated", project / "runtime" / "engine" / "c"])
+    assert [header.name for header in found] == ["z_inner.h", "a_outer.h", "four_times.h"]
+
+
+def test_headers_of_one_name_are_refused(tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.h").touch()
+    with pytest.raises(ValueError, match=r"other/a\.h has the name of .*one/a\.h"):
+        headers([tmp_path / "one", tmp_path / "other"])
 
 
 def test_headers_that_include_each_other_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.h").write_text('#include "b.h"\n')
     (tmp_path / "b.h").write_text('#include "a.h"\n')
     with pytest.raises(ValueError, match=r"a\.h includes itself by way of .*b\.h"):
-        headers(tmp_path)
+        headers([tmp_path])
 
 
 def test_all_blocks_are_read_and_nothing_else(project: Path) -> None:
@@ -103,6 +139,7 @@ def test_extension_is_built_for_every_python(project: Path) -> None:
         "from mstmm.generated._kernels import ffi, lib\n"
         "y = ffi.new('double[1]')\n"
         "assert lib.twice([1.5], y) == 7 and y[0] == 3.0 and lib.half == 0.5\n"
+        "assert lib.four_times([1.5], y) == 7 and y[0] == 6.0\n"
         "assert not hasattr(lib, 'HIDDEN')\n"
     )
     subprocess.run([sys.executable, "-c", script], cwd=project, check=True)
@@ -129,11 +166,33 @@ def test_a_module_from_other_text_is_refused(monkeypatch: pytest.MonkeyPatch) ->
         prebuilt.module.__wrapped__()
 
 
-def test_the_manifest_tells_every_text_that_is_compiled(tmp_path: Path) -> None:
+def test_the_manifest_tells_every_generated_text(tmp_path: Path) -> None:
     texts = [path for ending in ("*.c", "*.h") for path in (ROOT / "generated").glob(ending)]
     digest = hashlib.sha256()
     for path in sorted(texts, key=lambda path: path.name):
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
-    manifest = ROOT / "generated" / "manifest.json"
-    assert json.loads(manifest.read_text())["sources"] == digest.hexdigest()
-    assert built_from(manifest.parent) != built_from(tmp_path) == ""
+    manifest = json.loads((ROOT / "generated" / "manifest.json").read_text())
+    assert manifest["sources"] == digest.hexdigest()
+    assert built_from(tmp_path) == ""
+
+
+def test_a_change_of_any_text_is_noticed(project: Path) -> None:
+    manifest = project / "generated" / "manifest.json"
+    manifest.write_text("{}")
+    (project / "templates").mkdir()
+    (project / "templates" / "fused_text.c").touch()
+    found = {built_from(project)}
+    by_hand = written_by_hand(project)
+    assert {path.name for path in by_hand} == {"four_times.c", "four_times.h", "fused_text.c"}
+    for number, path in enumerate((manifest, *by_hand), 1):
+        path.write_text(path.read_text() + "\n")
+        found.add(built_from(project))
+        assert len(found) == 1 + number
+
+
+def test_the_c_that_is_built_is_the_c_that_is_watched() -> None:
+    watched = {path.relative_to(ROOT) for path in written_by_hand(ROOT)}
+    for folder in (*FOLDERS, PASTED):
+        if folder != GENERATED:
+            there = {path.relative_to(ROOT) for path in (ROOT / folder).glob("*.[ch]")}
+            assert there and there <= watched

@@ -12,10 +12,14 @@ from typing import Any
 
 import cffi
 
+import mstmm.runtime.engine
 from mstmm.border import elements as abi
 from mstmm.derive.print.render import write_generated
 from mstmm.ir.spec import ElementSpec
 from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
+
+#: C of the looped engine.
+ENGINE = Path(mstmm.runtime.engine.__path__[0], "c")
 
 #: C17 with every warning an error; no contraction and no functions folded by the compiler, so that
 #: each operation rounds as in Python.
@@ -37,9 +41,9 @@ def compile_library(sources: Iterable[Path], target: Path, *flags: str) -> Path:
 def build(folder: Path, *specs: ElementSpec, flags: Sequence[str] = ()) -> CLibrary:
     """Generate, compile and open the elements and the tape interpreter."""
     write_generated(specs, folder)
-    stems = [f"{spec.kind}_{spec.name}" for spec in specs] + ["registry", "engine_tape"]
-    sources = [folder / f"{stem}.c" for stem in stems]
-    return CLibrary(compile_library(sources, folder / "elements.so", *flags))
+    stems = [*(f"{spec.kind}_{spec.name}" for spec in specs), "registry"]
+    sources = [*(folder / f"{stem}.c" for stem in stems), ENGINE / "tape.c"]
+    return CLibrary(compile_library(sources, folder / "elements.so", f"-I{folder}", *flags))
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cffi
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import ArrayLike
 
-import mstmm.templates
+import mstmm.runtime.integrate
 from mstmm.runtime.integrate.loop import Run, Status
 from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.integrate.steppers import Tableau, get
@@ -20,14 +18,8 @@ from mstmm.runtime.libraries.build_extension import cdef
 
 from .c_library import compile_library
 
-SOURCES = (
-    "engine_integrate", "engine_run", "engine_control", "engine_step", "engine_norm",
-    "engine_iterate", "engine_event", "engine_lanes",
-    "engine_lanes_step",
-)  # fmt: skip
-HEADERS = (
-    "engine_integrate", "engine_step", "engine_wide", "engine_lanes", "engine_lanes_step",
-)  # fmt: skip
+#: The whole of the time integration's C.
+INTEGRATION = Path(mstmm.runtime.integrate.__path__[0], "c")
 TEST_SYSTEMS = Path(__file__).parent.parent / "integrate" / "systems.c"
 TEST_DECLARATIONS = """
 typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
@@ -40,17 +32,6 @@ void test_use_normalise(mstmm_system *system);
 void test_use_accept(mstmm_system *system, parameters *at);
 void test_use_lanes(mstmm_system *system, parameters *at, int lanes);
 """
-
-
-def render_integration(folder: Path) -> None:
-    """Writes the C of the time integration into `folder`."""
-    templates = Environment(
-        loader=FileSystemLoader(mstmm.templates.__path__[0]),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    for name in [f"{s}.c" for s in SOURCES] + [f"{s}.h" for s in HEADERS]:
-        (folder / name).write_text(templates.get_template(f"{name}.jinja").render())
 
 
 @dataclass
@@ -81,14 +62,11 @@ class Lab:
     """The compiled library and its test systems."""
 
     def __init__(self, folder: Path, *flags: str) -> None:
-        render_integration(folder)
-        shutil.copy(TEST_SYSTEMS, folder)
-        sources = [folder / f"{s}.c" for s in SOURCES]
-        sources.append(folder / TEST_SYSTEMS.name)
+        sources = [*sorted(INTEGRATION.glob("*.c")), TEST_SYSTEMS]
         self.ffi: Any = cffi.FFI()
-        declared = [cdef(folder / f"{h}.h") for h in ("engine_integrate", "engine_lanes")]
+        declared = [cdef(INTEGRATION / f"{name}.h") for name in ("integrate", "lanes")]
         self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
-        options = ("-O2", *flags)
+        options = ("-O2", f"-I{INTEGRATION}", *flags)
         self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
 
     def problem(self, rhs: str, n: int, *p: float, n_error: int | None = None) -> Problem:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class ModalPivots:
     """Where gains and subspaces of the flexible bodies stand in the workspace.
 
-    Places as `templates/engine_modal.c.jinja` has them: of a body S_rf (6, n), the same re-based,
+    Places as `engine/c/modal.c` has them: of a body S_rf (6, n), the same re-based,
     ..., the gain (n, 7) from 25 n, S_ff (n, n) from 32 n; of a section its subspace (6, n) from
     6 n.
     """

@@ -1,0 +1,135 @@
+/* A scene whose accelerations come from code compiled for it: the integrator's right-hand side, for
+ * one state and for several side by side.  Events and settling stay with the looped engine. */
+#include <string.h>
+
+#include "compiled.h"
+
+/* Numbers that compiled code reads besides the state: the efforts, which are zero here; and for
+ * lanes, where entry i stands `lanes` times, the parameters and the memory. */
+int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes)
+{
+    const int64_t width = lanes ? lanes->lanes : 0;
+    return one->nu + width * (one->nu + one->np + one->n_memory);
+}
+
+static void repeat(int64_t count, int lanes, const real *from, real *to)
+{
+    for (int64_t i = 0; i < count; i++)
+        for (int j = 0; j < lanes; j++) to[i * lanes + j] = from[i];
+}
+
+static real *lanes_efforts(const mstmm_scene_run *run) { return run->fused_numbers + run->fused->nu; }
+
+static real *lanes_p(const mstmm_scene_run *run)
+{
+    return lanes_efforts(run) + (int64_t)run->fused_lanes->lanes * run->fused->nu;
+}
+
+static real *lanes_memory(const mstmm_scene_run *run)
+{
+    return lanes_p(run) + (int64_t)run->fused_lanes->lanes * run->fused->np;
+}
+
+void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const mstmm_fused *lanes,
+                          const real *p, real *numbers)
+{
+    run->fused = one;
+    run->fused_lanes = run->with_power ? NULL : lanes;
+    run->fused_p = p;
+    run->fused_numbers = numbers;
+    memset(numbers, 0, (size_t)mstmm_compiled_size(one, lanes) * sizeof *numbers);
+    if (run->fused_lanes) repeat(one->np, lanes->lanes, p, lanes_p(run));
+}
+
+static int failed(mstmm_scene_run *run, const mstmm_fused *fused, int code)
+{
+    const int *failure = fused->failures + 3 * (code - 1);
+    run->failure = (mstmm_failure){failure[0], failure[1], failure[2]};
+    return failure[0];
+}
+
+static int accelerations(void *context, double t, const double *y, double *dy)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *fused = run->fused;
+    const int code = fused->accelerations(run->fused_p, &t, y, y + fused->nq, run->memory,
+                                          run->fused_numbers, dy, dy + fused->nq);
+    return code ? failed(run, fused, code) : 0;
+}
+
+static int accelerations_and_power(void *context, double t, const double *y, double *dy)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *fused = run->fused;
+    real power = 0, potential;
+    const int code = fused->accelerations_power(run->fused_p, &t, y, y + fused->nq, run->memory,
+                                                run->fused_numbers, dy, dy + fused->nq, &power,
+                                                &potential);
+    dy[fused->nq + fused->nu] = code ? 0 : power;
+    return code ? failed(run, fused, code) : 0;
+}
+
+static int accelerations_in_lanes(void *context, const double *t, const double *y, double *dy,
+                                  int *codes)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *fused = run->fused_lanes;
+    const int64_t start = (int64_t)fused->nq * fused->lanes;
+    if (fused->n_memory) repeat(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
+    const int any = fused->accelerations_lanes(lanes_p(run), t, y, y + start, lanes_memory(run),
+                                               lanes_efforts(run), dy, dy + start, codes);
+    for (int lane = 0; any && lane < fused->lanes; lane++)
+        if (codes[lane]) codes[lane] = failed(run, fused, codes[lane]);
+    return any;
+}
+
+void mstmm_compiled_system(mstmm_scene_run *run, mstmm_system *system)
+{
+    system->rhs = run->with_power ? accelerations_and_power : accelerations;
+    if (!run->fused_lanes) return;
+    system->lanes = run->fused_lanes->lanes;
+    system->rhs_lanes = accelerations_in_lanes;
+}
+
+/* --- trajectories side by side ---------------------------------------------------------------- */
+
+static int settle_one(void *context, double t, double *y)
+{
+    mstmm_scene_lanes *lanes = context;
+    return mstmm_scene_settle(lanes->settle, t, y);
+}
+
+static int lanes_rhs(void *context, const double *t, const double *y, double *dy, int *codes)
+{
+    const mstmm_scene_lanes *lanes = context;
+    const mstmm_fused *fused = lanes->fused;
+    const int64_t width = fused->lanes, start = fused->nq * width;
+    const real *efforts = lanes->numbers + width * fused->np;
+    return fused->accelerations_lanes(lanes->numbers, t, y, y + start, efforts, efforts, dy,
+                                      dy + start, codes);
+}
+
+static void lanes_enter(void *context, int lane, int64_t trajectory)
+{
+    const mstmm_scene_lanes *lanes = context;
+    const real *p = lanes->p + trajectory * lanes->p_stride;
+    for (int64_t i = 0; i < lanes->fused->np; i++)
+        lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
+}
+
+int64_t mstmm_lanes_numbers(const mstmm_fused *fused)
+{
+    return (int64_t)fused->lanes * (fused->np + fused->nu);
+}
+
+void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, mstmm_group *group)
+{
+    mstmm_scene_system(lanes->settle, system);
+    memset(lanes->numbers, 0, (size_t)mstmm_lanes_numbers(lanes->fused) * sizeof(real));
+    system->context = lanes;
+    if (system->accept) system->accept = settle_one;
+    system->lanes = lanes->fused->lanes;
+    system->rhs_lanes = lanes_rhs;
+    group->system = system;
+    group->enter = lanes_enter;
+}

@@ -1,0 +1,35 @@
+/* A scene whose accelerations come from code compiled for it. */
+#ifndef MSTMM_COMPILED_H
+#define MSTMM_COMPILED_H
+
+#include "lanes.h"
+#include "scene.h"
+
+/* cdef begin */
+/* Numbers that `mstmm_scene_compiled` needs room for. */
+int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes);
+/* From now on `run` evaluates `one`, and several states at a time by `lanes` (or NULL; not used
+ * where the work is integrated too); p holds the numbers that both read.  To be called before
+ * mstmm_scene_system.  Everything given must live as long as the run. */
+void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const mstmm_fused *lanes,
+                          const real *p, real *numbers);
+
+/* Trajectories of a scene without events and memory side by side, on one thread. */
+typedef struct {
+    const mstmm_fused *fused;
+    const real *p;           /* n x np, or one row for all */
+    int64_t p_stride;        /* distance of rows, 0 for one row */
+    real *numbers;           /* mstmm_lanes_numbers */
+    mstmm_scene_run *settle; /* of this thread: what it settles after every step */
+} mstmm_scene_lanes;
+
+int64_t mstmm_lanes_numbers(const mstmm_fused *fused);
+/* Fills the integrator's view, whose failure codes are the guards' own, and the group's `enter`. */
+void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
+                              mstmm_group *group);
+/* cdef end */
+
+/* Right-hand sides of a run with compiled code; called by mstmm_scene_system. */
+void mstmm_compiled_system(mstmm_scene_run *run, mstmm_system *system);
+
+#endif

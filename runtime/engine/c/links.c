@@ -1,0 +1,277 @@
+/* Sweep by runs of links; see links.h. */
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "links.h"
+
+#define MSTMM_INLINE static inline __attribute__((always_inline, unused))
+#define MSTMM_RARE static __attribute__((noinline, cold, unused))
+#define MSTMM_LIKELY(x) __builtin_expect(!!(x), 1)
+
+#include "fused_sincos.c"
+
+typedef double two_t __attribute__((vector_size(16)));
+typedef long long two_bits_t __attribute__((vector_size(16)));
+
+MSTMM_INLINE int two_sincos_near(two_t x)
+{
+    const two_bits_t near = (x >= -MSTMM_SINCOS_RANGE) & (x <= MSTMM_SINCOS_RANGE);
+    return (near[0] & near[1]) != 0;
+}
+MSTMM_SINCOS(two_t, two_bits_t, 2, two_sincos)
+
+typedef int (*angle_kernel)(const real *link, const real *q, real *angle);
+typedef int (*forward_kernel)(const real *link, const real *turn, const real *b, const real *p,
+                              const real *q, const real *u, const real *parent, real *shift,
+                              real *motion, real *load, real *qdot);
+typedef int (*condense_kernel)(const real *link, const real *turn, const real *shift,
+                               const real *b, const real *p, const real *outer_inertia,
+                               const real *outer_load, const real *load, const real *tau,
+                               real *gain, real *offset, real *inertia_out, real *load_out);
+typedef int (*recover_kernel)(const real *link, const real *turn, const real *shift,
+                              const real *p, const real *gain, const real *offset,
+                              const real *parent, real *udot, real *deviation);
+
+/* Numbers of S and e side by side, as they travel from link to link. */
+#define CARRIED 27
+
+/* --- splitting into runs ----------------------------------------------------------------------- */
+
+static int continues(const mstmm_model *model, const mstmm_branch *run, const int *children, int i)
+{
+    const mstmm_body *body = &model->bodies[i], *before = body - 1;
+    if (body->parent != i - 1) return 0;
+    if (!run->numbers) return !body->link_condense;
+    return body->link_condense == before->link_condense && children[i - 1] == 1 &&
+           body->q == before->q + before->nq && body->u == before->u + before->nu;
+}
+
+static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **numbers, int i)
+{
+    const mstmm_body *body = &model->bodies[i];
+    *run = (mstmm_branch){.first = i, .parent = body->parent, .q = body->q, .u = body->u,
+                       .nq = body->nq, .nu = body->nu, .place = -1, .parent_place = -1};
+    if (!body->link_condense) return;
+    run->numbers = numbers + i;
+    run->angle = body->link_angle;
+    run->forward = body->link_forward;
+    run->condense = body->link_condense;
+    run->recover = body->link_recover;
+}
+
+static int64_t link_size(const mstmm_branch *run)
+{
+    return MSTMM_LINK_FIXED + MSTMM_LINK_PER_SPEED * (int64_t)run->nu;
+}
+
+/* Run that holds a body; the runs are in the order of the bodies. */
+static const mstmm_branch *run_of(const mstmm_branch *runs, int n, int body)
+{
+    int low = 0, high = n;
+    while (high - low > 1) {
+        int middle = low + (high - low) / 2;
+        if (runs[middle].first <= body)
+            low = middle;
+        else
+            high = middle;
+    }
+    return &runs[low];
+}
+
+int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **numbers,
+                    real *gathered, int64_t place, int64_t *size)
+{
+    int n = 0;
+    int64_t begin = place;
+    int *children = (int *)numbers; /* one number a body, until the pointers come */
+    memset(children, 0, (size_t)model->n_bodies * sizeof(int));
+    for (int i = 0; i < model->n_bodies; i++)
+        if (model->bodies[i].parent >= 0) children[model->bodies[i].parent]++;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (n == 0 || !continues(model, &runs[n - 1], children, i))
+            begin_run(model, &runs[n++], numbers, i);
+        runs[n - 1].count++;
+        runs[n - 1].open = children[i] > 0;
+    }
+    for (int k = 0; k < n; k++) {
+        mstmm_branch *run = &runs[k];
+        if (run->numbers) {
+            run->place = place;
+            place += run->count * link_size(run);
+        }
+        if (run->parent < 0) continue;
+        const mstmm_branch *outer = run_of(runs, n, run->parent);
+        if (outer->numbers)
+            run->parent_place = outer->place + (run->parent - outer->first) * link_size(outer);
+    }
+    for (int i = 0; i < model->n_bodies; i++) {
+        numbers[i] = model->bodies[i].link;
+        if (!gathered || !model->bodies[i].link_condense) continue;
+        real *own = gathered + (int64_t)i * MSTMM_LINK_NUMBERS;
+        memcpy(own, numbers[i], MSTMM_LINK_NUMBERS * sizeof(real));
+        numbers[i] = own;
+    }
+    *size = place - begin;
+    return n;
+}
+
+/* --- passes ------------------------------------------------------------------------------------- */
+
+/* Bias motion or deviation of what a run hangs on: a link, or a body's or the ground's block. */
+static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, int in_block)
+{
+    return run->parent_place >= 0
+               ? state->workspace + run->parent_place + MSTMM_LINK_MOTION
+               : mstmm_block(state->model, state->workspace, run->parent) + in_block;
+}
+
+/* Turn of every link: all angles of a run first, so that they can share their sines. */
+static void turn_links(mstmm_state *state, const mstmm_branch *run)
+{
+    const int64_t size = link_size(run);
+    const angle_kernel angle = (angle_kernel)run->angle;
+    const real *q = state->q + run->q;
+    real *turn = state->workspace + run->place + MSTMM_LINK_TURN;
+    for (int k = 0; k < run->count; k += 2, turn += 2 * size, q += 2 * run->nq) {
+        const int both = k + 1 < run->count;
+        two_t x = {0, 0};
+        angle(run->numbers[k], q, turn);
+        if (both) angle(run->numbers[k + 1], q + run->nq, turn + size);
+        x[0] = turn[0];
+        if (both) x[1] = turn[size];
+        const two_sincos_t pair = two_sincos(x);
+        turn[0] = pair.cosine[0];
+        turn[1] = pair.sine[0];
+        if (!both) break;
+        turn[size] = pair.cosine[1];
+        turn[size + 1] = pair.sine[1];
+    }
+}
+
+static int forward_links(mstmm_state *state, const mstmm_branch *run, real *qdot)
+{
+    turn_links(state, run);
+    const int64_t size = link_size(run);
+    const forward_kernel forward = (forward_kernel)run->forward;
+    const real *parent = of_parent(state, run, MSTMM_BLOCK_MOTION);
+    const real *q = state->q + run->q, *u = state->u + run->u;
+    real *link = state->workspace + run->place;
+    qdot += run->q;
+    for (int k = 0; k < run->count; k++) {
+        const real *numbers = run->numbers[k];
+        int code = forward(numbers, link + MSTMM_LINK_TURN, numbers + 5, numbers + 15, q, u,
+                           parent, link + MSTMM_LINK_SHIFT, link + MSTMM_LINK_MOTION,
+                           link + MSTMM_LINK_LOAD, qdot);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, run->first + k, code);
+        parent = link + MSTMM_LINK_MOTION;
+        link += size;
+        q += run->nq;
+        u += run->nu;
+        qdot += run->nq;
+    }
+    if (run->open) {
+        real *block = mstmm_block(state->model, state->workspace, run->first + run->count - 1);
+        memset(block + MSTMM_BLOCK_S, 0, CARRIED * sizeof(real)); /* S, then e */
+    }
+    return 0;
+}
+
+int mstmm_linked_forward(mstmm_state *state, real *qdot)
+{
+    const mstmm_model *model = state->model;
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (run->numbers) {
+            int code = forward_links(state, run, qdot);
+            if (code) return code;
+            continue;
+        }
+        const real *parent = of_parent(state, run, MSTMM_BLOCK_MOTION);
+        for (int i = run->first; i < run->first + run->count; i++) {
+            int code = mstmm_forward_body(state, i, parent, qdot);
+            if (code) return code;
+            parent = state->workspace + model->bodies[i].block + MSTMM_BLOCK_MOTION;
+        }
+    }
+    return 0;
+}
+
+/* Efforts on the hinge of a run's body k. */
+static const real *efforts_of(const mstmm_state *state, const mstmm_branch *run, int k)
+{
+    static const real none[6] = {0};
+    const mstmm_model *model = state->model;
+    if (model->n_laws)
+        return mstmm_tau(mstmm_block(model, state->workspace, run->first + k), run->nu);
+    return state->efforts ? state->efforts + run->u + (int64_t)k * run->nu : none;
+}
+
+static int condense_links(mstmm_state *state, const mstmm_branch *run)
+{
+    static const real nothing[CARRIED] = {0};
+    const int64_t size = link_size(run);
+    const condense_kernel condense = (condense_kernel)run->condense;
+    const int last = run->first + run->count - 1;
+    real carried[2][CARRIED], *out = carried[0];
+    const real *outer = run->open ? mstmm_block(state->model, state->workspace, last) +
+                                        MSTMM_BLOCK_S
+                                  : nothing;
+    real *link = state->workspace + run->place + (run->count - 1) * size;
+    for (int k = run->count - 1; k >= 0; k--, link -= size) {
+        const real *numbers = run->numbers[k];
+        out = carried[k & 1];
+        int code = condense(numbers, link + MSTMM_LINK_TURN, link + MSTMM_LINK_SHIFT, numbers + 5,
+                            numbers + 15, outer, outer + 21, link + MSTMM_LINK_LOAD,
+                            efforts_of(state, run, k), link + MSTMM_LINK_FIXED + run->nu,
+                            link + MSTMM_LINK_FIXED, out, out + 21);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, run->first + k, code);
+        outer = out;
+    }
+    real *parent = mstmm_block(state->model, state->workspace, run->parent) + MSTMM_BLOCK_S;
+    for (int j = 0; j < CARRIED; j++) parent[j] += out[j];
+    return 0;
+}
+
+static void recover_links(mstmm_state *state, const mstmm_branch *run, real *udot)
+{
+    const int64_t size = link_size(run);
+    const recover_kernel recover = (recover_kernel)run->recover;
+    const real *parent = of_parent(state, run, MSTMM_BLOCK_DELTA);
+    real *link = state->workspace + run->place;
+    udot += run->u;
+    for (int k = 0; k < run->count; k++) {
+        const real *numbers = run->numbers[k];
+        recover(numbers, link + MSTMM_LINK_TURN, link + MSTMM_LINK_SHIFT, numbers + 15,
+                link + MSTMM_LINK_FIXED + run->nu, link + MSTMM_LINK_FIXED, parent, udot,
+                link + MSTMM_LINK_MOTION);
+        parent = link + MSTMM_LINK_MOTION;
+        link += size;
+        udot += run->nu;
+    }
+}
+
+int mstmm_linked_sweep(mstmm_state *state, real *udot)
+{
+    const mstmm_model *model = state->model;
+    for (int k = model->n_runs - 1; k >= 0; k--) {
+        const mstmm_branch *run = &model->runs[k];
+        int code = run->numbers ? condense_links(state, run) : 0;
+        for (int i = run->first + run->count - 1; !code && !run->numbers && i >= run->first; i--)
+            code = mstmm_condense_body(state, i);
+        if (code) return code;
+    }
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (run->numbers) {
+            recover_links(state, run, udot);
+            continue;
+        }
+        const real *parent = of_parent(state, run, MSTMM_BLOCK_DELTA);
+        for (int i = run->first; i < run->first + run->count; i++) {
+            mstmm_recover_body(state, i, parent, udot);
+            parent = state->workspace + model->bodies[i].block + MSTMM_BLOCK_DELTA;
+        }
+    }
+    return 0;
+}

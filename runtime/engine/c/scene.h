@@ -1,0 +1,81 @@
+/* A scene as the integrator sees it, and what is observed of it at given states. */
+#ifndef MSTMM_SCENE_H
+#define MSTMM_SCENE_H
+
+#include "fused.h"
+#include "integrate.h"
+#include "sweep.h"
+
+/* cdef begin */
+/* A point of a body with axes of its own, whose motion is wanted. */
+typedef struct {
+    int body; /* -1: ground */
+    real axes[9], offset[3];
+} mstmm_probe;
+
+/* Numbers per probe: position, velocity, acceleration, angular velocity, angular acceleration
+ * (inertial axes), rotation matrix (probe axes to inertial axes). */
+#define MSTMM_PROBE_NUMBERS 24
+/* Sums: kinetic, gravity and spring energy, power, momentum (3), angular momentum (3). */
+#define MSTMM_SUM_NUMBERS 10
+
+typedef struct {
+    int n_probes;
+    const mstmm_probe *probes;
+    real *points;  /* n_probes x MSTMM_PROBE_NUMBERS, or NULL */
+    real *loads;   /* n_bodies x 6: force and moment of each inboard hinge, inertial axes, or NULL */
+    real *efforts; /* nu: H^T f + J udot, what laws and drives put in, or NULL */
+    real *udot;    /* nu, or NULL */
+    real *sums;    /* MSTMM_SUM_NUMBERS, or NULL */
+} mstmm_observation;
+
+/* Everything asked for at one state; returns 0 or a reason, with `failure` filled. */
+int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real *q, const real *u,
+                  const real *memory, const mstmm_observation *wanted, mstmm_failure *failure);
+/* The same for n states; arrays of `wanted` hold n blocks one after the other. */
+int mstmm_observe_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
+                       const real *q, const real *u, const real *memory,
+                       const mstmm_observation *wanted, mstmm_failure *failure, int64_t *failed_at);
+/* Accelerations of n states one after the other. */
+int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
+                             const real *q, const real *u, const real *memory,
+                             const real *efforts, real *qdot, real *udot, mstmm_failure *failure,
+                             int64_t *failed_at);
+
+typedef struct {
+    int action; /* MSTMM_FIRE_STOP, or MSTMM_FIRE_RESTART with `release` */
+    int release;
+} mstmm_event_action;
+
+/* State y = [q, u] and, with `with_power`, the work of everything not stored. */
+typedef struct {
+    const mstmm_model *model;
+    real *workspace, *memory;
+    mstmm_failure failure;
+    int with_power;
+    int n_quaternions;
+    const int *quaternions; /* first coordinate of each */
+    int n_events;
+    const mstmm_event_action *events;
+    int n_switches; /* their margins stand behind the events' values */
+    const mstmm_tape *event_tape; /* t, q, u, probe positions and velocities -> values */
+    int n_probes;
+    const mstmm_probe *probes;
+    real *probe_values; /* n_probes x 6, and MSTMM_PROBE_NUMBERS of scratch */
+    /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
+    const mstmm_fused *fused, *fused_lanes;
+    const real *fused_p;
+    real *fused_numbers;
+} mstmm_scene_run;
+
+/* Fills the integrator's view of `run`. */
+void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system);
+/* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
+int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
+/* The same for n states in rows of `width` numbers, each with its own memory; the run's memory is
+ * what it was, the rows take the turns they end in.  Returns the code of the first that fails, the others are settled all the same. */
+int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
+                            real *memory, real *y);
+/* cdef end */
+
+#endif

@@ -1,0 +1,256 @@
+/* The looped engine: element kernels driven over the bodies of a scene, tips to root and back.
+ * It orders calls and hands arrays on; every equation is in the generated kernels it calls. */
+#ifndef MSTMM_SWEEP_H
+#define MSTMM_SWEEP_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "tape.h"
+#include "mstmm.h"
+
+/* cdef begin */
+/* Numbers of a body's block in the workspace; the ground's block comes first. */
+#define MSTMM_BLOCK_R 0
+#define MSTMM_BLOCK_SHIFT 9
+#define MSTMM_BLOCK_MOTION 12
+#define MSTMM_BLOCK_S 21
+#define MSTMM_BLOCK_E 42
+#define MSTMM_BLOCK_DELTA 48
+#define MSTMM_BLOCK_A 54
+#define MSTMM_BLOCK_X 63
+#define MSTMM_BLOCK_V 66
+#define MSTMM_BLOCK_HINGE_R 69
+#define MSTMM_BLOCK_HINGE_D 78
+#define MSTMM_BLOCK_HINGE_V 81
+#define MSTMM_BLOCK_HINGE_W 84
+#define MSTMM_BLOCK_HINGE_C 87
+#define MSTMM_BLOCK_FLOOR 93
+#define MSTMM_BLOCK_FIXED 95
+/* behind them, per speed: s, tau, g, udot of the free speeds, G (6), H (6), H of the free speeds (6) */
+#define MSTMM_BLOCK_PER_SPEED 22
+
+/* Reasons of a failure. */
+#define MSTMM_FAILED_UNDETERMINED 1
+#define MSTMM_FAILED_FORCE 2
+#define MSTMM_FAILED_EXPRESSION 3
+#define MSTMM_FAILED_HINGE 4
+#define MSTMM_FAILED_PRODUCT_PIVOT 5
+#define MSTMM_FAILED_PRODUCT_ERROR 6
+#define MSTMM_FAILED_SECTION 7
+#define MSTMM_FAILED_MODES 8
+
+/* Moments of the fields of a flexible body under one density; see derive/flexible/symbols.py. */
+typedef struct {
+    const real *rigid, *c, *p, *b, *z[6], *y[3], *g[3], *m;
+} mstmm_moments;
+
+/* A flexible body: internal coordinates of the body that is its floating frame. */
+typedef struct {
+    int n, q, u; /* modes, their places in the state */
+    mstmm_moments moments;
+    const mstmm_moments *drag; /* NULL: none */
+    const real *stiffness, *damping;
+    int64_t place; /* of its numbers in the workspace, see mstmm_modal_numbers */
+} mstmm_modal;
+
+/* A section of a flexible body, and which way it is passed. */
+typedef struct {
+    const mstmm_modal *modal;
+    int inward; /* 1: from the section that is held to the floating frame; 0: outward, to an end */
+    const real *point, *phi, *theta, *drawn[3], *turned[3], *end; /* g and h of second order */
+    int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
+} mstmm_section;
+
+/* One body with its inboard hinge, in depth-first order. */
+typedef struct {
+    int parent;       /* index of the parent body, -1 for the ground */
+    int q, u, nq, nu; /* place and number of coordinates and speeds in the state */
+    int block;        /* first number of its block in the workspace */
+    int generic;      /* swept by the hinge kernel and the generic steps */
+    int n_imposed;    /* speeds driven or held until release */
+    const int *imposed_mask; /* per speed: 1 where imposed */
+    int release;      /* place in memory that is non-zero once they are free; -1: never */
+    const real *connection; /* Rt (9), ro (3) */
+    const real *link; /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    real held[3];     /* the hinge's own P from the origin of the body's frame */
+    const real *hinge_p, *body_p;
+    const real *rotor;       /* reflected inertia per speed */
+    const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
+    const mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
+    const mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
+    int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
+    void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+    void (*inertia)(void), (*bias_load)(void), (*energy)(void);
+    void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+} mstmm_body;
+
+/* Bodies in a row, each a child of the one before.  With `numbers` they are swept by the kernels of
+ * one type of link, and but for the last each has one child, so that S and e stay at hand. */
+typedef struct {
+    int first, count, parent; /* parent of the first, -1: the ground */
+    int open;                 /* other runs hang on the last */
+    int q, u, nq, nu;         /* of the first; the others follow without gaps */
+    int64_t place, parent_place; /* of its links in the workspace; of the parent's link, or -1 */
+    const real *const *numbers; /* `link` of every body */
+    void (*angle)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+} mstmm_branch;
+
+/* Law on coordinates of one hinge: `evaluate` is a kernel of sweep_laws. */
+typedef struct {
+    int body;
+    int kind;              /* 0: one coordinate, 1: quaternion with B and twist memory */
+    int coordinate, speed; /* first ones within the hinge */
+    int n;                 /* speeds it acts on */
+    int twist;             /* place in memory, or -1 */
+    const real *p, *axes;
+    const int *effort; /* per speed: place among the expression values, -1 for none */
+    void (*evaluate)(void);
+} mstmm_law;
+
+/* Force and moment at a point of a body. */
+typedef struct {
+    int body;
+    int axes;         /* body whose axes hold the components, -1 for inertial axes */
+    real axes_own[9]; /* those axes in the body's internal ones */
+    real offset[3];
+    int force[3], moment[3]; /* places among the expression values, -1 for zero */
+} mstmm_load;
+
+/* Massless element between an end F and an end T; body -1 is the ground. */
+typedef struct {
+    int body_f, body_t;
+    real axes_f[9], axes_t[9], offset_f[3], offset_t[3];
+    const mstmm_tape *effort; /* t, q, u, [length, its rate] -> given effort; NULL for none */
+    const real *p;
+    void (*wrench)(void);
+} mstmm_force;
+
+/* A coordinate that a drive prescribes: values number 3k, 3k+1, 3k+2 of the drive tape. */
+typedef struct {
+    int body, coordinate, speed; /* within the hinge */
+} mstmm_drive;
+
+/* Kinds of hinge that the plain product of classical matrices knows, one kind for a whole chain. */
+#define MSTMM_PRODUCT_PIN 0
+#define MSTMM_PRODUCT_BALL 1
+#define MSTMM_PRODUCT_ACCELERATION 2
+
+/* Numbers per body: two transfer matrices, scales, a state; applied loads. */
+#define MSTMM_PRODUCT_MATRICES 400
+#define MSTMM_PRODUCT_PER_BODY 406
+
+typedef struct {
+    int kind;
+    real accuracy; /* largest relative deviation from the Riccati sweep that is accepted */
+    int64_t place; /* of its numbers in the workspace: MSTMM_PRODUCT_PER_BODY a body, then nu */
+} mstmm_product;
+
+typedef struct {
+    int n_bodies, nq, nu, n_memory;
+    int n_flexible; /* bodies with modes */
+    const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
+    const mstmm_body *bodies;
+    int n_runs;
+    const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
+    real gravity[3];
+    int n_drives;
+    const mstmm_drive *drives;
+    const mstmm_tape *drive_tape; /* t -> value, rate, acceleration of each drive */
+    int n_values;
+    const mstmm_tape *value_tape; /* t, q, u -> efforts and load components */
+    int n_laws;
+    const mstmm_law *laws;
+    int n_loads;
+    const mstmm_load *loads;
+    int n_forces;
+    const mstmm_force *forces;
+    int needs_pose; /* loads or forces that need poses and velocities */
+    int64_t workspace; /* numbers of workspace */
+    int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */
+    int tape_slots;    /* largest workspace of a tape */
+} mstmm_model;
+
+/* What failed, where. `element` is a body's index, or a force's for MSTMM_FAILED_FORCE. */
+typedef struct {
+    int reason, element, code;
+} mstmm_failure;
+
+/* Sums over the scene. */
+typedef struct {
+    real power;     /* of dampers, friction, efforts, loads and drives: everything not stored */
+    real potential; /* of springs and laws */
+} mstmm_balance;
+
+/* Coordinate rates and accelerations.  `efforts` (nu) is added to the laws' efforts and may be
+ * NULL; `balance` may be NULL.  Returns 0, or the reason, with `failure` filled. */
+int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
+                        const real *u, const real *memory, const real *efforts, real *qdot,
+                        real *udot, mstmm_balance *balance, mstmm_failure *failure);
+/* Accelerations, with everything of the bodies left in the workspace for observations. */
+int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
+                             const real *u, const real *memory, real *qdot, real *udot,
+                             mstmm_balance *balance, mstmm_failure *failure);
+/* Efforts that the accelerations `udot` need beyond the laws' own (driven coordinates included). */
+int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
+                           const real *u, const real *memory, const real *udot, real *efforts,
+                           mstmm_failure *failure);
+/* Numbers that a flexible body of n modes, and one of its sections, keep in the workspace. */
+int64_t mstmm_modal_numbers(int n);
+int64_t mstmm_section_numbers(int n);
+/* cdef end */
+
+/* The rest is for the other engine files. */
+
+static inline real *mstmm_block(const mstmm_model *model, real *workspace, int body)
+{
+    return body < 0 ? workspace : workspace + model->bodies[body].block;
+}
+
+static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
+{
+    if (body->n_imposed == 0) return 0;
+    return body->release < 0 || !(fabs(memory[body->release]) > 0) ? body->n_imposed : 0;
+}
+
+/* Places behind the fixed part of a block. */
+static inline real *mstmm_s(real *block, int nu) { (void)nu; return block + MSTMM_BLOCK_FIXED; }
+static inline real *mstmm_tau(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + nu; }
+static inline real *mstmm_g(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 2 * nu; }
+static inline real *mstmm_free(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 3 * nu; }
+static inline real *mstmm_gain(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 4 * nu; }
+static inline real *mstmm_h(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 10 * nu; }
+static inline real *mstmm_h_free(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 16 * nu; }
+
+typedef struct mstmm_state {
+    const mstmm_model *model;
+    real *workspace;
+    real t;
+    const real *q, *u, *memory; /* q and u with driven coordinates filled in */
+    real *values, *slots;
+    int imposed_all; /* every speed follows `udot` (inverse dynamics) */
+    int linked;      /* runs with numbers are swept as links */
+    int observed;    /* idle ends are swept too */
+    const real *udot, *efforts;
+    mstmm_failure *failure;
+} mstmm_state;
+
+/* Fills driven coordinates and expression values, resets the ground. */
+int mstmm_state_begin(mstmm_state *state, const real *q, const real *u);
+int mstmm_forward_pass(mstmm_state *state, real *qdot);
+int mstmm_forward_body(mstmm_state *state, int body, const real *parent_motion, real *qdot);
+int mstmm_condense_body(mstmm_state *state, int body);
+void mstmm_recover_body(mstmm_state *state, int body, const real *parent_delta, real *udot);
+void mstmm_pose_pass(mstmm_state *state, int hinges_known);
+int mstmm_hinge_motion(mstmm_state *state, int body, real *qdot);
+int mstmm_law_pass(mstmm_state *state, mstmm_balance *balance);
+int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance);
+/* tau = H^T f for any number of speeds. */
+void mstmm_effort(int nu, const real *subspace, const real *load, real *tau);
+/* Accelerations by the product of classical matrices, before the Riccati sweep of the same state. */
+int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot);
+int mstmm_project(int nu, const real *rotation, const real *shift, const real *subspace,
+                  const real *deviation, const real *parent, real *udot);
+int mstmm_fail(mstmm_state *state, int reason, int element, int code);
+
+#endif

@@ -1,0 +1,179 @@
+/* Time integration: one loop for every embedded explicit Runge-Kutta method, told which one by a
+ * tableau.  It knows nothing of mechanics: a system is a right-hand side, a few call-backs and an
+ * array of discrete memory.  The loop owns no memory, keeps no global and never recurses.
+ *
+ * Between the two marks below stand the declarations that cffi reads as they are. */
+#ifndef MSTMM_INTEGRATE_H
+#define MSTMM_INTEGRATE_H
+
+#include <stdint.h>
+
+/* cdef begin */
+typedef struct mstmm_system {
+  void *context;
+  int n_state;
+  int n_error; /* only the first n_error components enter the error norm: quadratures come last */
+  /* dy = f(t, y); nonzero = failure code */
+  int (*rhs)(void *context, double t, const double *y, double *dy);
+  /* After every accepted step, may change y and memory.  0 = the saved first stage still holds,
+   * -1 = it does not, > 0 = failure code.  NULL: nothing to do. */
+  int (*accept)(void *context, double t, double *y);
+  int n_events;
+  /* Event i is true when g[i] >= 0; nonzero = failure code */
+  int (*events)(void *context, double t, const double *y, double *g);
+  /* Behind the events: n_switches margins, each zero where the right-hand side has a kink or jumps.
+   * Steps end where one changes its sign, either way; nothing is fired. */
+  int n_switches;
+  /* Called with the accepted state at the located time.  MSTMM_FIRE_*; < 0 = failure code */
+  int (*fire)(void *context, int event, double t, double *y);
+  int n_memory;
+  double *memory; /* constant within a step; changed by accept and fire alone */
+  /* The right-hand side at `lanes` states side by side (2, 4 or 8; 0: there is none):
+   * t[lane], y[i * lanes + lane], dy alike; codes[lane] as rhs returns; nonzero if any failed */
+  int lanes;
+  int (*rhs_lanes)(void *context, const double *t, const double *y, double *dy, int *codes);
+} mstmm_system;
+
+enum {
+  MSTMM_FIRE_IGNORE = 0,   /* nothing changed; never watch this event again */
+  MSTMM_FIRE_RESTART = 1,  /* state or memory changed: the step ends here */
+  MSTMM_FIRE_STOP = 2,     /* the run ends here */
+  MSTMM_FIRE_CONTINUE = 3  /* nothing changed; fire again the next time it becomes true */
+};
+
+/* s = n_stages stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage of
+ * the next step, then n_extra stages for dense output alone.
+ *
+ * Weights stand in sparse rows: row r holds the terms starts[r] .. starts[r + 1] - 1, each a weight
+ * and the stage it belongs to.  Rows: stages 1 .. s - 1, the step, the error, the second error,
+ * the extra stages, and the n_dense polynomials of dense output,
+ * y(theta) = y + h sum_i k_i sum_j dense[i][j] phi_j(theta) with phi = theta, theta(1-theta),
+ * theta^2(1-theta), theta^2(1-theta)^2, ... */
+typedef struct mstmm_tableau {
+  int n_stages, n_extra, n_dense;
+  int n_errors;    /* 0: fixed steps only; 2: combined as in the 8(5,3) pair of Hairer and Wanner */
+  int error_order; /* order of the error estimate; the step goes with norm^(-1/(order+1)) */
+  const int *starts, *columns;
+  const double *weights;
+  const double *c;       /* s */
+  const double *c_extra; /* n_extra */
+  double stability_limit; /* h |lambda| at the end of the stable real axis */
+  double beta;            /* exponent of the previous error in the step controller (0: plain) */
+  /* An iterated method: after k_0 its stages are n_iterations blocks of n_nodes (at most 8), and
+   * those of a block depend on the block before alone, so that they are evaluated side by side.
+   * n_nodes = 0 for other methods. */
+  int n_nodes, n_iterations;
+  const double *mix;  /* n_nodes x 8: mix[8 j + i] = weight of node j in node i, zeros behind */
+  const int *is_read; /* n_iterations: 1 where the step, the error or dense output need the block */
+} mstmm_tableau;
+
+enum {
+  MSTMM_RUNNING = 0, /* the wall time has passed; call again */
+  MSTMM_FINISHED = 1,
+  MSTMM_STOPPED = 2,     /* by event number `event` */
+  MSTMM_BUFFER_FULL = 3, /* empty the sample buffer (n_samples = 0) and call again */
+  MSTMM_STEP_TOO_SMALL = -1, /* `component` had the largest scaled error */
+  MSTMM_NOT_FINITE = -2,     /* `component` is the first non-finite one, at `fail_time` */
+  MSTMM_RHS_FAILED = -3,     /* with `code`, at `fail_time` */
+  MSTMM_ACCEPT_FAILED = -4,
+  MSTMM_EVENT_FAILED = -5, /* `code`, or 0 with `event` when that value was not a number */
+  MSTMM_FIRE_FAILED = -6,
+  MSTMM_TOO_MANY_STEPS = -7, /* max_steps; with `code` 1 there is none, but no end in sight */
+  MSTMM_EVENT_CHATTER = -8, /* `event` fires without end at one time */
+  MSTMM_BAD_ARGUMENT = -9   /* `code` says which, see mstmm_run_start */
+};
+
+/* The changing part of a run, only doubles and only 64-bit integers, so that it can be saved. */
+typedef struct mstmm_run_real {
+  double t;      /* time of the current good state */
+  double h_next; /* proposed next step */
+  double h, t_new;  /* the trial step: from t, and its end */
+  double t_stop;    /* where in the trial step to stop: at an event or at its end */
+  double t_scan;    /* events are known up to here */
+  double error_previous;
+  double fail_time;
+  double smallest_step, largest_step; /* of steps not cut short by a break, an event or the end */
+  double sum_local_error;  /* sum over the steps of the RMS local error estimate, in units of y */
+  double sum_scaled_error; /* the same in units of the tolerance */
+  double stiffness;        /* last estimate of h |lambda| */
+  double largest_stiffness;
+  double t_switch;     /* the first switch in the trial step, INFINITY: none */
+  double h_cut;        /* > 0: the step is to be no longer, so that it ends before a switch */
+  double pace_time;    /* t so many steps ago: how fast the run gets on */
+  double chatter_time; /* since then switch `chatter` is not watched */
+} mstmm_run_real;
+
+typedef struct mstmm_run_count {
+  int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense, lanes; /* compared on restoring */
+  int64_t n_switches;
+  int64_t phase, status;
+  int64_t fail_status, code, component, event;
+  int64_t break_index, output_index, grid_index, bound_index;
+  int64_t at_break;      /* t is a break: the first stage looks to its right */
+  int64_t lands_on_break, lands_on_grid, cut_short; /* of the trial step */
+  int64_t first_stage_valid, restarted, sampled, rejected_last;
+  int64_t fires_here; /* events fired without time passing */
+  int64_t crossings, crossings_here; /* of switches; those of one without time passing */
+  int64_t next_switch; /* the one at t_switch, counted behind the events */
+  int64_t chatter; /* the last switch that crossed without end, -1: none */
+  int64_t steps, rejected, evaluations, events_fired;
+  /* how many steps were about as long as stability allows, and whether that is a good part */
+  int64_t stability_limited_steps, stability_limited;
+} mstmm_run_count;
+
+typedef struct mstmm_run {
+  /* the problem: filled by the caller, only read by the loop */
+  const mstmm_system *system;
+  const mstmm_tableau *tableau;
+  double t_start, t_end;
+  double fixed_step; /* > 0: fixed steps t_start + i fixed_step; 0: adaptive */
+  double rtol;
+  const double *atol; /* n_error; may be NULL with fixed steps */
+  double first_step, min_step, max_step; /* 0: chosen */
+  int64_t max_steps; /* 0: as many as it takes, if the end is in sight */
+  int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
+  int64_t n_breaks;
+  const double *breaks; /* strictly increasing */
+  int64_t n_bounds; /* adaptive steps: none from bound_starts[i] on is longer than bounds[i] */
+  const double *bound_starts; /* strictly increasing, the first at or before t_start */
+  const double *bounds;
+  int64_t n_outputs;    /* < 0: a sample at every accepted step */
+  const double *outputs; /* strictly increasing, within [t_start, t_end] */
+  double *workspace;     /* mstmm_workspace_size doubles */
+  /* The sample buffer: the caller's; empty it by n_samples = 0.  Samples inside a step are the
+   * dense output, not passed through accept, with the memory of the step's start. */
+  int64_t sample_capacity; /* at least 2 */
+  int64_t n_samples;
+  double *sample_t;
+  double *sample_y;      /* sample_capacity x n_state */
+  double *sample_memory; /* sample_capacity x n_memory */
+  /* 0 for a step's end or an output time; i + 1 just after event i changed the state, -(i + 1) just
+   * before it unless that state stands in the samples already */
+  int64_t *sample_event;
+  /* the state: read freely, write never */
+  mstmm_run_real real;
+  mstmm_run_count count;
+} mstmm_run;
+
+/* Doubles of workspace; 0 for sizes that make no sense. */
+int64_t mstmm_workspace_size(const mstmm_system *system, const mstmm_tableau *tableau);
+/* Puts the run at t_start with the state y0 (n_state).  Returns MSTMM_RUNNING, or
+ * MSTMM_BAD_ARGUMENT with count.code = 1 sizes, 2 times, 3 tolerances or steps, 4 breaks,
+ * 5 output times, 6 sample buffer. */
+int mstmm_run_start(mstmm_run *run, const double *y0);
+/* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed; one step is
+ * always made, and the clock is looked at about every 0.1 ms or every step. */
+int mstmm_advance(mstmm_run *run, double wall_seconds);
+/* The current good state, n_state doubles inside the workspace. */
+const double *mstmm_run_y(const mstmm_run *run);
+/* State of a run as plain numbers: sizes, writing, and reading back into a run whose problem part
+ * has been filled in the same way.  Restoring returns 0, or MSTMM_BAD_ARGUMENT with the run
+ * unchanged. */
+int64_t mstmm_run_pack_reals(const mstmm_run *run);
+int64_t mstmm_run_pack_integers(const mstmm_run *run);
+void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers);
+int mstmm_run_restore(mstmm_run *run, int64_t n_reals, const double *reals, int64_t n_integers,
+                      const int64_t *integers);
+/* cdef end */
+
+#endif
