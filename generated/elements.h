@@ -21,271 +21,14 @@ int mstmm_classical_acceleration_transfer(const real *restrict U, const real *re
     const real *restrict d, const real *restrict d_n, const real *restrict tau_n,
     real *restrict U_h, real *restrict margin);
 
-extern const mstmm_element mstmm_classical_acceleration_planar;
-int mstmm_classical_acceleration_planar_transfer(const real *restrict U,
-    const real *restrict F_scale, const real *restrict d, const real *restrict d_n,
-    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
-
 extern const mstmm_element mstmm_classical_ball;
 int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
     const real *restrict tau_n, real *restrict U_h, real *restrict margin);
-
-extern const mstmm_element mstmm_classical_beam_planar_discrete;
-int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict s, const real *restrict S_c,
-    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
-    const real *restrict L, const real *restrict phi_O, const real *restrict Theta_O,
-    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
-    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
-    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
-    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
-    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
-    const real *restrict f_eta, real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_beam_planar_discrete_1;
-int mstmm_classical_beam_planar_discrete_1_transfer(const real *restrict m,
-    const real *restrict S_0, const real *restrict I_0, const real *restrict s,
-    const real *restrict S_c, const real *restrict M_f, const real *restrict K_f,
-    const real *restrict D_f, const real *restrict L, const real *restrict phi_O,
-    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
-    const real *restrict D_theta, const real *restrict B_eta, const real *restrict D_eta,
-    const real *restrict r_p, const real *restrict theta_p, const real *restrict eta_p,
-    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_beam_planar_discrete_2;
-int mstmm_classical_beam_planar_discrete_2_transfer(const real *restrict m,
-    const real *restrict S_0, const real *restrict I_0, const real *restrict s,
-    const real *restrict S_c, const real *restrict M_f, const real *restrict K_f,
-    const real *restrict D_f, const real *restrict L, const real *restrict phi_O,
-    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
-    const real *restrict D_theta, const real *restrict B_eta, const real *restrict D_eta,
-    const real *restrict r_p, const real *restrict theta_p, const real *restrict eta_p,
-    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_beam_spatial_discrete;
-int mstmm_classical_beam_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict J_0, const real *restrict s, const real *restrict e,
-    const real *restrict M_phi, const real *restrict K_f, const real *restrict D_f,
-    const real *restrict r_e, const real *restrict Phi_O, const real *restrict Theta_O,
-    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
-    const real *restrict B_r, const real *restrict B_w, const real *restrict D_w,
-    const real *restrict T, const real *restrict B_eta, const real *restrict D_eta,
-    const real *restrict r_p, const real *restrict R_p, const real *restrict eta_p,
-    const real *restrict q_p, const real *restrict m_p, const real *restrict m_pI,
-    const real *restrict K_g, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_body_planar;
-int mstmm_classical_body_planar_transfer(const real *restrict M, const real *restrict r_IO,
-    const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
-    const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
-
-extern const mstmm_element mstmm_classical_body_planar_discrete;
-int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict r_e, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
-    const real *restrict D_theta, const real *restrict r_p, const real *restrict theta_p,
-    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, real *restrict U);
 
 extern const mstmm_element mstmm_classical_body_spatial;
 int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
     const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
     const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
-
-extern const mstmm_element mstmm_classical_body_spatial_discrete;
-int mstmm_classical_body_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict J_0, const real *restrict r_e, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_w,
-    const real *restrict D_w, const real *restrict T, const real *restrict r_p,
-    const real *restrict R_p, const real *restrict q_p, const real *restrict g,
-    const real *restrict f_r, const real *restrict f_m, real *restrict U);
-
-extern const mstmm_element mstmm_classical_elastic_planar_discrete;
-int mstmm_classical_elastic_planar_discrete_transfer(const real *restrict m,
-    const real *restrict S_0, const real *restrict I_0, const real *restrict S_t,
-    const real *restrict S_r, const real *restrict S_c, const real *restrict G_f,
-    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
-    const real *restrict r_e, const real *restrict Phi_O, const real *restrict Theta_O,
-    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
-    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
-    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
-    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
-    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
-    const real *restrict f_eta, real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_elastic_spatial_discrete;
-int mstmm_classical_elastic_spatial_discrete_transfer(const real *restrict m,
-    const real *restrict S_0, const real *restrict J_0, const real *restrict S_t,
-    const real *restrict E, const real *restrict F, const real *restrict K_f,
-    const real *restrict D_f, const real *restrict r_e, const real *restrict Phi_O,
-    const real *restrict Theta_O, const real *restrict Theta_I, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_w,
-    const real *restrict D_w, const real *restrict T, const real *restrict B_eta,
-    const real *restrict D_eta, const real *restrict r_p, const real *restrict R_p,
-    const real *restrict eta_p, const real *restrict q_p, const real *restrict m_p,
-    const real *restrict m_pI, const real *restrict K_g, const real *restrict g,
-    const real *restrict f_r, const real *restrict f_m, const real *restrict f_eta,
-    real *restrict U, real *restrict W);
-
-extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_beam;
-int mstmm_classical_hinge_ball_spatial_beam_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_rigid;
-int mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_beam;
-int mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_rigid;
-int mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_beam;
-int mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(const real *restrict W,
-    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
-    const real *restrict eta_pO, const real *restrict k_t, const real *restrict c_t,
-    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
-    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_rigid;
-int mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(const real *restrict S_I,
-    const real *restrict eta_pI, const real *restrict k_t, const real *restrict c_t,
-    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
-    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_beam;
-int mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(const real *restrict W,
-    const real *restrict S_O, const real *restrict eta_pO, const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
-    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
-    const real *restrict m_s, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_rigid;
-int mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
-    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
-    const real *restrict m_s, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_beam;
-int mstmm_classical_hinge_fixed_planar_beam_beam_transfer(const real *restrict W,
-    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict gamma,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_rigid;
-int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict gamma, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_beam;
-int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict gamma, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_rigid;
-int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(const real *restrict gamma,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_beam;
-int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict W,
-    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
-    const real *restrict eta_pO, const real *restrict beta, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_rigid;
-int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(const real *restrict S_I,
-    const real *restrict eta_pI, const real *restrict beta, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_beam;
-int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(const real *restrict W,
-    const real *restrict S_O, const real *restrict eta_pO, const real *restrict beta,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_rigid;
-int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(const real *restrict beta,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_beam;
-int mstmm_classical_hinge_pin_spatial_beam_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict S_I, const real *restrict eta_pI,
-    const real *restrict S_O, const real *restrict eta_pO, const real *restrict a,
-    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
-    const real *restrict tau_n, const real *restrict S_N, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_rigid;
-int mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(const real *restrict U,
-    const real *restrict S_I, const real *restrict eta_pI, const real *restrict a,
-    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
-    const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_beam;
-int mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict S_O, const real *restrict eta_pO,
-    const real *restrict a, const real *restrict beta, const real *restrict a_n,
-    const real *restrict m_n, const real *restrict tau_n, const real *restrict S_N,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_rigid;
-int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict U,
-    const real *restrict a, const real *restrict beta, const real *restrict a_n,
-    const real *restrict m_n, const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_beam;
-int mstmm_classical_hinge_smooth_planar_beam_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_rigid;
-int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_beam;
-int mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(const real *restrict U,
-    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_rigid;
-int mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_beam;
-int mstmm_classical_hinge_spring_planar_beam_beam_transfer(const real *restrict W,
-    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
-    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
-    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
-    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_rigid;
-int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict k_t, const real *restrict c_t, const real *restrict k_1,
-    const real *restrict k_3, const real *restrict c_r, const real *restrict C,
-    const real *restrict D_phi, const real *restrict phi_0, const real *restrict phi_s,
-    const real *restrict theta_s, const real *restrict d_s, const real *restrict q_s,
-    real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_beam;
-int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict k_t, const real *restrict c_t,
-    const real *restrict k_1, const real *restrict k_3, const real *restrict c_r,
-    const real *restrict C, const real *restrict D_phi, const real *restrict phi_0,
-    const real *restrict phi_s, const real *restrict theta_s, const real *restrict d_s,
-    const real *restrict q_s, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_rigid;
-int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
-    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
-    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
-    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
-
-extern const mstmm_element mstmm_classical_pin_planar;
-int mstmm_classical_pin_planar_transfer(const real *restrict U, const real *restrict F_scale,
-    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
 
 extern const mstmm_element mstmm_classical_pin_spatial;
 int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *restrict F_scale,
@@ -314,10 +57,6 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_cylindrical;
 int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
@@ -334,10 +73,6 @@ int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restri
 int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_cylindrical_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_fixed;
 int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -370,10 +105,6 @@ int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_free_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_gimbal;
 int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -390,10 +121,6 @@ int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_gimbal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
 
@@ -412,10 +139,6 @@ int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_planar;
 int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -432,10 +155,6 @@ int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_planar_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_prismatic;
 int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
@@ -452,10 +171,6 @@ int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_prismatic_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_screw;
 int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -472,10 +187,6 @@ int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_screw_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 extern const mstmm_element mstmm_hinge_universal;
 int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
@@ -492,29 +203,6 @@ int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_universal_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-
-extern const mstmm_element mstmm_sweep_beam;
-int mstmm_sweep_beam_rigid(const real *restrict x, const real *restrict inertia,
-    real *restrict mass, real *restrict first, real *restrict second);
-int mstmm_sweep_beam_moments(const real *restrict x, const real *restrict inertia,
-    const real *restrict stiffness, const real *restrict axis_k, const real *restrict turn_k,
-    const real *restrict strain_k, const real *restrict axis_l, const real *restrict turn_l,
-    const real *restrict strain_l, real *restrict C, real *restrict E, real *restrict F,
-    real *restrict K);
-int mstmm_sweep_beam_section(const real *restrict values, const real *restrict slopes,
-    real *restrict phi, real *restrict theta);
-int mstmm_sweep_beam_turning(const real *restrict theta_k, const real *restrict theta_l,
-    const real *restrict kappa_k, const real *restrict kappa_l, real *restrict dh);
-int mstmm_sweep_beam_drawing(const real *restrict theta_k, const real *restrict theta_l,
-    const real *restrict stretch_k, const real *restrict stretch_l, const real *restrict h,
-    real *restrict dg);
-int mstmm_sweep_beam_second_moments(const real *restrict x, const real *restrict inertia,
-    const real *restrict turn_k, const real *restrict turn_l, const real *restrict g,
-    const real *restrict h_turn, real *restrict G, real *restrict X);
 
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
@@ -595,13 +283,6 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic1_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic1_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -619,13 +300,6 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic2_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic2_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -643,13 +317,6 @@ int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic3_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic3_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -667,13 +334,6 @@ int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic4_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic4_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -691,13 +351,6 @@ int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic5_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic5_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -715,13 +368,6 @@ int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic6_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
-int mstmm_sweep_generic6_recover_factored(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict Z, const real *restrict z,
-    const real *restrict W, const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -857,27 +503,5 @@ int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *r
     const real *restrict s, real *restrict e, real *restrict e_f);
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau);
-
-extern const mstmm_element mstmm_sweep_screw;
-int mstmm_sweep_screw_condense_turn(const real *restrict Rc, const real *restrict S,
-    const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_condense_turn_by_trace(const real *restrict Rc, const real *restrict S,
-    const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_condense_x(const real *restrict turn, const real *restrict d,
-    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_condense_plain_x(const real *restrict turn, const real *restrict d,
-    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_motion_x(const real *restrict turn, const real *restrict d,
-    const real *restrict motion_I, real *restrict motion);
-int mstmm_sweep_screw_delta_x(const real *restrict turn, const real *restrict d,
-    const real *restrict delta_I, real *restrict delta);
-int mstmm_sweep_screw_condense_z(const real *restrict turn, const real *restrict d,
-    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_condense_plain_z(const real *restrict turn, const real *restrict d,
-    const real *restrict S, const real *restrict e, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_screw_motion_z(const real *restrict turn, const real *restrict d,
-    const real *restrict motion_I, real *restrict motion);
-int mstmm_sweep_screw_delta_z(const real *restrict turn, const real *restrict d,
-    const real *restrict delta_I, real *restrict delta);
 
 #endif

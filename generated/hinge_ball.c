@@ -2,6 +2,7 @@
  *
  * hinge ball: ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
+ * replayed from the IR by the fused engine, and not here: eliminate
  */
 #include <math.h>
 #include <stddef.h>
@@ -23,10 +24,6 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1074,255 +1071,6 @@ static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* elimination of a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  p[0] parameters
- * in  q[4] coordinates: w, x, y, z
- * in  S[21] f = S a + e of everything outboard, at P
- * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[3] (N, N*m) efforts on the free coordinates
- * out F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
- * out Z[3][6] diag(d)^-1 L^-1 U^T, zero along unit directions
- * out z[3] diag(d)^-1 L^-1 (tau - H^T e)
- * out W[3][6] unit columns of H, transposed
- * out S_Q[21] S behind the hinge, hinge axes
- * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
- * out D_ii[3] (kg*m2 or kg) diagonal of D
- */
-int mstmm_hinge_ball_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii)
-{
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[15];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t1 = S[18] * ((real)1 / (real)10000000000000);
-    const real t2 = 1.0 / S[15];
-    const real t3 = S[16] * t2;
-    const real t4 = S[16] * t3;
-    const real t5 = S[18] - t4;
-    const real t6 = t1 < t5;
-    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t7 = S[20] * ((real)1 / (real)10000000000000);
-    const real t8 = S[17] * t2;
-    const real t9 = S[17] * t8;
-    const real t10 = S[20] - t9;
-    const real t11 = S[17] * t3;
-    const real t12 = S[19] - t11;
-    const real t13 = 1.0 / t5;
-    const real t14 = t13 * t12;
-    const real t15 = t12 * t14;
-    const real t16 = t10 - t15;
-    const real t17 = t7 < t16;
-    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    F[0] = t2;
-    F[1] = 0.0;
-    F[2] = 0.0;
-    F[3] = t3;
-    F[4] = t13;
-    F[5] = 0.0;
-    F[6] = t8;
-    F[7] = t14;
-    const real t18 = 1.0 / t16;
-    F[8] = t18;
-    const real t19 = S[3] * t2;
-    Z[0] = t19;
-    const real t20 = S[8] * t2;
-    Z[1] = t20;
-    const real t21 = S[12] * t2;
-    Z[2] = t21;
-    Z[3] = 0.0;
-    Z[4] = 0.0;
-    Z[5] = 0.0;
-    const real t22 = S[3] * t3;
-    const real t23 = S[4] - t22;
-    const real t24 = t13 * t23;
-    Z[6] = t24;
-    const real t25 = S[8] * t3;
-    const real t26 = S[9] - t25;
-    const real t27 = t13 * t26;
-    Z[7] = t27;
-    const real t28 = S[12] * t3;
-    const real t29 = S[13] - t28;
-    const real t30 = t13 * t29;
-    Z[8] = t30;
-    Z[9] = 0.0;
-    Z[10] = 0.0;
-    Z[11] = 0.0;
-    const real t31 = S[3] * t8;
-    const real t32 = S[5] - t31;
-    const real t33 = t14 * t23;
-    const real t34 = t32 - t33;
-    const real t35 = t18 * t34;
-    Z[12] = t35;
-    const real t36 = S[8] * t8;
-    const real t37 = S[10] - t36;
-    const real t38 = t14 * t26;
-    const real t39 = t37 - t38;
-    const real t40 = t18 * t39;
-    Z[13] = t40;
-    const real t41 = S[12] * t8;
-    const real t42 = S[14] - t41;
-    const real t43 = t14 * t29;
-    const real t44 = t42 - t43;
-    const real t45 = t18 * t44;
-    Z[14] = t45;
-    Z[15] = 0.0;
-    Z[16] = 0.0;
-    Z[17] = 0.0;
-    const real t46 = tau[0] - e[3];
-    const real t47 = t2 * t46;
-    z[0] = t47;
-    const real t48 = tau[1] - e[4];
-    const real t49 = t3 * t46;
-    const real t50 = t48 - t49;
-    const real t51 = t13 * t50;
-    z[1] = t51;
-    const real t52 = tau[2] - e[5];
-    const real t53 = t8 * t46;
-    const real t54 = t52 - t53;
-    const real t55 = t14 * t50;
-    const real t56 = t54 - t55;
-    const real t57 = t18 * t56;
-    z[2] = t57;
-    W[0] = 0.0;
-    W[1] = 0.0;
-    W[2] = 0.0;
-    W[3] = 1.0;
-    W[4] = 0.0;
-    W[5] = 0.0;
-    W[6] = 0.0;
-    W[7] = 0.0;
-    W[8] = 0.0;
-    W[9] = 0.0;
-    W[10] = 1.0;
-    W[11] = 0.0;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[14] = 0.0;
-    W[15] = 0.0;
-    W[16] = 0.0;
-    W[17] = 1.0;
-    const real t58 = S[3] * t19;
-    const real t59 = t23 * t24;
-    const real t60 = t58 + t59;
-    const real t61 = t34 * t35;
-    const real t62 = t60 + t61;
-    const real t63 = S[0] - t62;
-    S_Q[0] = t63;
-    const real t64 = S[3] * t20;
-    const real t65 = t23 * t27;
-    const real t66 = t64 + t65;
-    const real t67 = t34 * t40;
-    const real t68 = t66 + t67;
-    const real t69 = S[1] - t68;
-    S_Q[1] = t69;
-    const real t70 = S[3] * t21;
-    const real t71 = t23 * t30;
-    const real t72 = t70 + t71;
-    const real t73 = t34 * t45;
-    const real t74 = t72 + t73;
-    const real t75 = S[2] - t74;
-    S_Q[2] = t75;
-    S_Q[3] = 0.0;
-    S_Q[4] = 0.0;
-    S_Q[5] = 0.0;
-    const real t76 = S[8] * t20;
-    const real t77 = t26 * t27;
-    const real t78 = t76 + t77;
-    const real t79 = t39 * t40;
-    const real t80 = t78 + t79;
-    const real t81 = S[6] - t80;
-    S_Q[6] = t81;
-    const real t82 = S[8] * t21;
-    const real t83 = t26 * t30;
-    const real t84 = t82 + t83;
-    const real t85 = t39 * t45;
-    const real t86 = t84 + t85;
-    const real t87 = S[7] - t86;
-    S_Q[7] = t87;
-    S_Q[8] = 0.0;
-    S_Q[9] = 0.0;
-    S_Q[10] = 0.0;
-    const real t88 = S[12] * t21;
-    const real t89 = t29 * t30;
-    const real t90 = t88 + t89;
-    const real t91 = t44 * t45;
-    const real t92 = t90 + t91;
-    const real t93 = S[11] - t92;
-    S_Q[11] = t93;
-    S_Q[12] = 0.0;
-    S_Q[13] = 0.0;
-    S_Q[14] = 0.0;
-    S_Q[15] = 0.0;
-    S_Q[16] = 0.0;
-    S_Q[17] = 0.0;
-    S_Q[18] = 0.0;
-    S_Q[19] = 0.0;
-    S_Q[20] = 0.0;
-    const real t94 = t19 * t46;
-    const real t95 = t24 * t50;
-    const real t96 = t94 + t95;
-    const real t97 = t35 * t56;
-    const real t98 = t96 + t97;
-    const real t99 = e[0] + t98;
-    e_Q[0] = t99;
-    const real t100 = t20 * t46;
-    const real t101 = t27 * t50;
-    const real t102 = t100 + t101;
-    const real t103 = t40 * t56;
-    const real t104 = t102 + t103;
-    const real t105 = e[1] + t104;
-    e_Q[1] = t105;
-    const real t106 = t21 * t46;
-    const real t107 = t30 * t50;
-    const real t108 = t106 + t107;
-    const real t109 = t45 * t56;
-    const real t110 = t108 + t109;
-    const real t111 = e[2] + t110;
-    e_Q[2] = t111;
-    e_Q[3] = tau[0];
-    e_Q[4] = tau[1];
-    e_Q[5] = tau[2];
-    D_ii[0] = S[15];
-    D_ii[1] = S[18];
-    D_ii[2] = S[20];
-    return 0;
-}
-
-static int mstmm_hinge_ball_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_ball_eliminate_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_eliminate_outputs[] = {
-    {"F", 9, "", 0, 0},
-    {"Z", 18, "", 0, 0},
-    {"z", 3, "", 0, 0},
-    {"W", 18, "", 0, 0},
-    {"S_Q", 21, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-    {"D_ii", 3, "kg*m2 or kg", 0, 0},
-};
-
-static const mstmm_guard mstmm_hinge_ball_eliminate_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
-
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
 };
@@ -1388,18 +1136,6 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
-    {
-        .name = "eliminate",
-        .function = (void (*)(void))mstmm_hinge_ball_eliminate,
-        .call = mstmm_hinge_ball_eliminate_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_ball_eliminate_inputs,
-        .outputs = mstmm_hinge_ball_eliminate_outputs,
-        .ir_hash = "b3e1003e98237dbf2b42acf53a98d29ee48a54b4b87136b700df361bf69f9587",
-        .n_guards = 3,
-        .guards = mstmm_hinge_ball_eliminate_guards,
-    },
 };
 
 const mstmm_element mstmm_hinge_ball = {
@@ -1416,6 +1152,6 @@ const mstmm_element mstmm_hinge_ball = {
     .u_units = mstmm_hinge_ball_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 4,
     .kernels = mstmm_hinge_ball_kernels,
 };

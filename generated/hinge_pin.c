@@ -2,6 +2,7 @@
  *
  * hinge pin: pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
+ * replayed from the IR by the fused engine, and not here: eliminate
  */
 #include <math.h>
 #include <stddef.h>
@@ -23,10 +24,6 @@ int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii);
 
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
@@ -856,152 +853,6 @@ static const mstmm_port mstmm_hinge_pin_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* elimination of a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  p[0] parameters
- * in  q[1] coordinates: angle [rad]
- * in  S[21] f = S a + e of everything outboard, at P
- * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[1] (N, N*m) efforts on the free coordinates
- * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
- * out Z[1][6] diag(d)^-1 L^-1 U^T, zero along unit directions
- * out z[1] diag(d)^-1 L^-1 (tau - H^T e)
- * out W[1][6] unit columns of H, transposed
- * out S_Q[21] S behind the hinge, hinge axes
- * out e_Q[6] (N, N*m) e behind the hinge, hinge axes
- * out D_ii[1] (kg*m2 or kg) diagonal of D
- */
-int mstmm_hinge_pin_eliminate(const real *restrict p, const real *restrict q,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict F,
-    real *restrict Z, real *restrict z, real *restrict W, real *restrict S_Q, real *restrict e_Q,
-    real *restrict D_ii)
-{
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[20];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t1 = 1.0 / S[20];
-    F[0] = t1;
-    const real t2 = S[5] * t1;
-    Z[0] = t2;
-    const real t3 = S[10] * t1;
-    Z[1] = t3;
-    const real t4 = S[14] * t1;
-    Z[2] = t4;
-    const real t5 = S[17] * t1;
-    Z[3] = t5;
-    const real t6 = S[19] * t1;
-    Z[4] = t6;
-    Z[5] = 0.0;
-    const real t7 = tau[0] - e[5];
-    const real t8 = t1 * t7;
-    z[0] = t8;
-    W[0] = 0.0;
-    W[1] = 0.0;
-    W[2] = 0.0;
-    W[3] = 0.0;
-    W[4] = 0.0;
-    W[5] = 1.0;
-    const real t9 = S[5] * t2;
-    const real t10 = S[0] - t9;
-    S_Q[0] = t10;
-    const real t11 = S[5] * t3;
-    const real t12 = S[1] - t11;
-    S_Q[1] = t12;
-    const real t13 = S[5] * t4;
-    const real t14 = S[2] - t13;
-    S_Q[2] = t14;
-    const real t15 = S[5] * t5;
-    const real t16 = S[3] - t15;
-    S_Q[3] = t16;
-    const real t17 = S[5] * t6;
-    const real t18 = S[4] - t17;
-    S_Q[4] = t18;
-    S_Q[5] = 0.0;
-    const real t19 = S[10] * t3;
-    const real t20 = S[6] - t19;
-    S_Q[6] = t20;
-    const real t21 = S[10] * t4;
-    const real t22 = S[7] - t21;
-    S_Q[7] = t22;
-    const real t23 = S[10] * t5;
-    const real t24 = S[8] - t23;
-    S_Q[8] = t24;
-    const real t25 = S[10] * t6;
-    const real t26 = S[9] - t25;
-    S_Q[9] = t26;
-    S_Q[10] = 0.0;
-    const real t27 = S[14] * t4;
-    const real t28 = S[11] - t27;
-    S_Q[11] = t28;
-    const real t29 = S[14] * t5;
-    const real t30 = S[12] - t29;
-    S_Q[12] = t30;
-    const real t31 = S[14] * t6;
-    const real t32 = S[13] - t31;
-    S_Q[13] = t32;
-    S_Q[14] = 0.0;
-    const real t33 = S[17] * t5;
-    const real t34 = S[15] - t33;
-    S_Q[15] = t34;
-    const real t35 = S[17] * t6;
-    const real t36 = S[16] - t35;
-    S_Q[16] = t36;
-    S_Q[17] = 0.0;
-    const real t37 = S[19] * t6;
-    const real t38 = S[18] - t37;
-    S_Q[18] = t38;
-    S_Q[19] = 0.0;
-    S_Q[20] = 0.0;
-    const real t39 = t2 * t7;
-    const real t40 = e[0] + t39;
-    e_Q[0] = t40;
-    const real t41 = t3 * t7;
-    const real t42 = e[1] + t41;
-    e_Q[1] = t42;
-    const real t43 = t4 * t7;
-    const real t44 = e[2] + t43;
-    e_Q[2] = t44;
-    const real t45 = t5 * t7;
-    const real t46 = e[3] + t45;
-    e_Q[3] = t46;
-    const real t47 = t6 * t7;
-    const real t48 = e[4] + t47;
-    e_Q[4] = t48;
-    e_Q[5] = tau[0];
-    D_ii[0] = S[20];
-    return 0;
-}
-
-static int mstmm_hinge_pin_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_eliminate(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_pin_eliminate_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_eliminate_outputs[] = {
-    {"F", 1, "", 0, 0},
-    {"Z", 6, "", 0, 0},
-    {"z", 1, "", 0, 0},
-    {"W", 6, "", 0, 0},
-    {"S_Q", 21, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-    {"D_ii", 1, "kg*m2 or kg", 0, 0},
-};
-
-static const mstmm_guard mstmm_hinge_pin_eliminate_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
-
 static const char *const mstmm_hinge_pin_q_names[] = {
     "angle",
 };
@@ -1067,18 +918,6 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
-    {
-        .name = "eliminate",
-        .function = (void (*)(void))mstmm_hinge_pin_eliminate,
-        .call = mstmm_hinge_pin_eliminate_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_pin_eliminate_inputs,
-        .outputs = mstmm_hinge_pin_eliminate_outputs,
-        .ir_hash = "0173c296aba772bf68c9ff1231d266b0bb0e5e284d622c8e1dcece15a267102a",
-        .n_guards = 1,
-        .guards = mstmm_hinge_pin_eliminate_guards,
-    },
 };
 
 const mstmm_element mstmm_hinge_pin = {
@@ -1095,6 +934,6 @@ const mstmm_element mstmm_hinge_pin = {
     .u_units = mstmm_hinge_pin_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 4,
     .kernels = mstmm_hinge_pin_kernels,
 };

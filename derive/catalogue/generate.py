@@ -6,16 +6,13 @@ import difflib
 from pathlib import Path
 
 from ..print.render import generated_files, write_generated
-from .specs import all_facts, all_specs
-
-#: Files of `generated/` that are written by hand or by the compiler.
-NOT_GENERATED = ("__init__.py",)
+from .specs import all_facts, all_specs, on_demand_specs
 
 
 def regenerate(folder: Path | str) -> list[Path]:
     """Derive everything and write it; files of elements that are gone are removed."""
     target, specs = Path(folder), all_specs()
-    written = write_generated(specs, target, hinges=all_facts(specs))
+    written = write_generated(specs, target, hinges=all_facts(specs), on_demand=on_demand_specs())
     for path in target.iterdir():
         if path.suffix in (".c", ".h", ".json") and path not in written:
             path.unlink()
@@ -26,7 +23,7 @@ def differences(folder: Path | str) -> list[str]:
     """Unified diffs between a fresh derivation and `folder`; empty if they agree byte for byte."""
     target = Path(folder)
     specs = all_specs()
-    fresh = generated_files(specs, hinges=all_facts(specs))
+    fresh = generated_files(specs, hinges=all_facts(specs), on_demand=on_demand_specs())
     stored = {
         path.name: path.read_text(encoding="utf-8")
         for path in sorted(target.iterdir())

@@ -10,7 +10,7 @@ import sympy as sp
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
 
-from ..classical.catalogue import CLASSICAL, classical_guards
+from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
 from ..equations import force as force_kernels
@@ -185,12 +185,12 @@ def beam_kernels() -> tuple[Kernel, ...]:
 
 def classical_kernel(name: str) -> Kernel:
     """The classical transfer matrix `name`."""
-    derivation = CLASSICAL[name]()
+    derivation = classical_derivation(name)
     return Kernel("transfer", derivation, classical_guards(derivation))
 
 
 def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
-    """(kind, name) -> its kernels, for everything that is compiled with the package."""
+    """(kind, name) -> its kernels, for everything that comes with the package."""
     table: dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]] = {
         (kind_of(e), e.name): lambda e=e: kernels_of(e)  # type: ignore[misc]
         for e in builtin_elements()

@@ -10,7 +10,7 @@ from mstmm.ir import KernelIR
 from mstmm.ir.facts import HingeFacts, facts_of
 from mstmm.ir.spec import ElementSpec
 
-from ..classical.catalogue import CLASSICAL, classical_spec
+from ..classical.catalogue import CLASSICAL, RUN, classical_derivation, classical_spec
 from ..equations import sweep
 from ..equations.hinge import speeds_of
 from ..language.element import Hinge
@@ -36,6 +36,7 @@ __all__ = [
     "all_facts",
     "all_specs",
     "generic_spec",
+    "on_demand_specs",
     "shared_specs",
     "spec_from",
     "spec_of",
@@ -120,9 +121,18 @@ def shared_specs() -> list[ElementSpec]:
 
 
 def all_specs() -> list[ElementSpec]:
-    """Everything that is generated and compiled when the package is built."""
+    """Everything that is generated: what runs need, compiled or replayed."""
     return [
         *(spec_of(e) for e in builtin_elements()),
         *shared_specs(),
-        *(classical_spec(name) for name in CLASSICAL),
+        *(classical_spec(name) for name in RUN),
+    ]
+
+
+def on_demand_specs() -> list[ElementSpec]:
+    """Classical matrices that no run needs, without their kernels."""
+    made = ((name, classical_derivation(name)) for name in CLASSICAL if name not in RUN)
+    return [
+        ElementSpec("classical", name, matrix.title, (), (), (), (), matrix.sources)
+        for name, matrix in made
     ]

@@ -1,4 +1,4 @@
-"""Which classical transfer matrices are generated, and how they are lowered.
+"""Which classical transfer matrices there are, and how they are lowered.
 
 `CLASSICAL` names them all, those of the discrete-time form included; `classical_guards` are the
 pivot guards to lower them with.
@@ -7,6 +7,7 @@ pivot guards to lower them with.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import sympy as sp
 
@@ -23,7 +24,7 @@ def _planar_acceleration() -> Derivation:
     return acceleration.derivation(acceleration.PLANAR_DIRECTIONS, planar=True)
 
 
-#: Name -> derivation of the classical elements that are generated.
+#: Name -> derivation of the classical elements.
 CLASSICAL: dict[str, Callable[[], Derivation]] = {
     "body_planar": body_planar.derivation,
     "body_spatial": body_spatial.derivation,
@@ -35,6 +36,10 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
     **FLEXIBLE,
 }
 
+#: Those of which a run multiplies the matrices (`sweep = "product"`).  They are generated and
+#: compiled; the others are derived when somebody shows or checks them.
+RUN = ("body_spatial", "pin_spatial", "ball", "acceleration")
+
 
 def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards of a classical element: the pivot's for a hinge, none for a body."""
@@ -42,9 +47,15 @@ def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str],
     return guards(derivation) if has_margin else ()
 
 
+@cache
+def classical_derivation(name: str) -> Derivation:
+    """The classical matrix `name`, derived once in a process."""
+    return CLASSICAL[name]()
+
+
 def classical_spec(name: str) -> ElementSpec:
     """What generation needs of a classical element: one kernel, `transfer`."""
-    derivation = CLASSICAL[name]()
+    derivation = classical_derivation(name)
     kernel = lower(derivation, "transfer", classical_guards(derivation))
     return ElementSpec(
         "classical", name, derivation.title, (), (), (), (kernel,), derivation.sources

@@ -31,7 +31,7 @@ _OWN_SIZES = (1, 2, 3, 4)
 
 
 def element_source(spec: ElementSpec) -> str:
-    """C file of one element: a function and a trampoline per kernel, and the descriptor."""
+    """C file of one element: a function and a trampoline per kernel that has C; the descriptor."""
     return _render("element.c.jinja", element=_element_view(spec))
 
 
@@ -41,7 +41,7 @@ def header() -> str:
 
 
 def registry_source(specs: Sequence[ElementSpec]) -> str:
-    """`registry.c`: the table of the elements' descriptors, in the order given."""
+    """`registry.c`: the table of the descriptors of what has C, in the order given."""
     return _render("registry.c.jinja", elements=_summaries(specs))
 
 
@@ -76,29 +76,54 @@ def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
     return json.dumps(found, indent=1) + "\n"
 
 
+def catalogue(specs: Iterable[ElementSpec]) -> str:
+    """`catalogue.json`: what a list says of elements, without their kernels."""
+    found = [
+        {
+            "kind": spec.kind,
+            "name": spec.name,
+            "title": spec.title,
+            "coordinates": {p.name: p.unit for p in spec.coordinates},
+            "speeds": {p.name: p.unit for p in spec.speeds},
+            "parameters": {p.name: p.unit for p in spec.parameters},
+            "sources": list(spec.sources),
+        }
+        for spec in specs
+    ]
+    return json.dumps(found, indent=1) + "\n"
+
+
 def generated_files(
     specs: Iterable[ElementSpec],
     *,
     hinges: Sequence[HingeFacts] = (),
+    on_demand: Iterable[ElementSpec] = (),
 ) -> dict[str, str]:
     """File name -> text of everything generated, elements sorted by kind and name.
 
-    `hinges` are the facts of those that a scene may name.
+    `hinges` are the facts of those that a scene may name; `on_demand` are elements whose kernels
+    are derived when they are asked for: listed, no more.
     ValueError if two elements share kind and name.
     """
-    ordered = sorted(specs, key=lambda spec: (spec.kind, spec.name))
+    ordered = sorted(specs, key=_kind_and_name)
     files = {"mstmm.h": header(), "elements.h": elements_header(ordered), **border_headers()}
     for spec in ordered:
         stem = f"{spec.kind}_{spec.name}"
         if f"{stem}.json" in files:
             raise ValueError(f"two elements are called {spec.kind} {spec.name!r}")
-        files[f"{stem}.c"] = element_source(spec)
+        if abi.has_c(spec):
+            files[f"{stem}.c"] = element_source(spec)
         files[f"{stem}.json"] = element_to_json(spec)
     files["registry.c"] = registry_source(ordered)
     if hinges:
         files["hinges.json"] = json.dumps([facts_to_data(h) for h in hinges], indent=1) + "\n"
+    files["catalogue.json"] = catalogue(sorted((*ordered, *on_demand), key=_kind_and_name))
     files["manifest.json"] = manifest(ordered, files)
     return files
+
+
+def _kind_and_name(spec: ElementSpec) -> tuple[str, str]:
+    return spec.kind, spec.name
 
 
 def write_generated(
@@ -106,12 +131,13 @@ def write_generated(
     folder: Path | str,
     *,
     hinges: Sequence[HingeFacts] = (),
+    on_demand: Iterable[ElementSpec] = (),
 ) -> list[Path]:
     """Write `generated_files` into `folder` (made if missing); returns the paths, sorted."""
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name, text in generated_files(specs, hinges=hinges).items():
+    for name, text in generated_files(specs, hinges=hinges, on_demand=on_demand).items():
         path = target / name
         path.write_text(text, encoding="utf-8", newline="\n")
         paths.append(path)
@@ -164,14 +190,15 @@ def _summaries(specs: Sequence[ElementSpec]) -> list[dict[str, Any]]:
     return [
         {
             "symbol": abi.element_symbol(spec.kind, spec.name),
-            "prototypes": [abi.prototype(spec.kind, spec.name, k) for k in spec.kernels],
+            "prototypes": [abi.prototype(spec.kind, spec.name, k) for k in abi.c_kernels(spec)],
         }
         for spec in specs
+        if abi.has_c(spec)
     ]
 
 
 def _element_view(spec: ElementSpec) -> dict[str, Any]:
-    symbol = abi.element_symbol(spec.kind, spec.name)
+    symbol, kernels = abi.element_symbol(spec.kind, spec.name), abi.c_kernels(spec)
     return {
         "symbol": symbol,
         "kind": spec.kind,
@@ -179,7 +206,8 @@ def _element_view(spec: ElementSpec) -> dict[str, Any]:
         "title": spec.title,
         "sources": list(spec.sources),
         "hash": spec.hash(),
-        "solves": any(abi.needs_work(kernel) for kernel in spec.kernels),
+        "replayed": [kernel.name for kernel in spec.kernels if kernel not in kernels],
+        "solves": any(abi.needs_work(kernel) for kernel in kernels),
         "tables": [
             *_name_tables("q", spec.coordinates),
             *_name_tables("u", spec.speeds),
@@ -188,7 +216,7 @@ def _element_view(spec: ElementSpec) -> dict[str, Any]:
         "nq": len(spec.coordinates),
         "nu": len(spec.speeds),
         "np": len(spec.parameters),
-        "kernels": [_kernel_view(spec, kernel) for kernel in spec.kernels],
+        "kernels": [_kernel_view(spec, kernel) for kernel in kernels],
     }
 
 

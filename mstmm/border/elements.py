@@ -10,6 +10,7 @@ import re
 import textwrap
 
 from ..ir import LOOPS, KernelIR, Port, Solve
+from ..ir.spec import ElementSpec
 
 #: Number of the layout below; changed with every change of it, and checked when a module opens.
 ABI = 2
@@ -83,6 +84,11 @@ int mstmm_tape_run(const mstmm_tape *tape, const real *const *inputs, real *work
                    real *const *outputs);
 """
 
+#: What has no C function, for no C calls it: the fused engine replays these kernels from their IR,
+#: and the fields of beams are evaluated over whole arrays when a scene is packed.
+_REPLAYED_KERNELS = frozenset({"eliminate", "recover_factored"})
+_REPLAYED_ELEMENTS = frozenset({("sweep", "screw"), ("sweep", "beam")})
+
 #: Words a C parameter may not be called: C17 keywords, what the kernels call, and their locals.
 _RESERVED_WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if "
@@ -107,6 +113,18 @@ def cdef(*, registry: bool = True, tape: bool = False, opened: bool = True) -> s
         parts.append(text.replace("extern const int", "extern int") if opened else text)
     parts += [TAPE_DECLARATIONS] if tape else []
     return "\n".join(parts)
+
+
+def c_kernels(spec: ElementSpec) -> tuple[KernelIR, ...]:
+    """The kernels of an element that have a C function; of the others there is the IR alone."""
+    if (spec.kind, spec.name) in _REPLAYED_ELEMENTS:
+        return ()
+    return tuple(kernel for kernel in spec.kernels if kernel.name not in _REPLAYED_KERNELS)
+
+
+def has_c(spec: ElementSpec) -> bool:
+    """Whether an element has a C file and a descriptor."""
+    return not spec.kernels or bool(c_kernels(spec))
 
 
 def element_symbol(kind: str, name: str) -> str:

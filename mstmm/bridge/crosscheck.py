@@ -1,8 +1,9 @@
 """Every kernel of an element three ways, and what mechanics asks of it.
 
 The stated equations at 50 digits (`derive.audit.evaluate_equations`), the IR at 50 digits, the
-compiled C in doubles within the bound that running error analysis gives for its rounding; at random
-points and at those where a formula could break.  Beside that what `derive.audit.properties` states.
+compiled C in doubles within the bound that running error analysis gives for its rounding (where
+there is no C, the engine's interpreter); at random points and at those where a formula could break.
+Beside that what `derive.audit.properties` states.
 
     report = mstmm.bridge.crosscheck.crosscheck("hinge", "pin")
     print(report); report.passed
@@ -12,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ElementError
 from ..ir import KernelIR
 from ..ir.spec import ElementSpec
+from ..ir.tape import Tape, compile_tape
 from .report import KernelCheck, Report, Statement
 
 if TYPE_CHECKING:
@@ -51,9 +53,9 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
         element = next(
             (e for e in builtin_elements() if (kind_of(e), e.name) == (kind, name)), None
         )
-        return crosscheck_kernels(
-            kind, name, element, kernels, prebuilt.element(kind, name), points
-        )
+        compiled = prebuilt.elements().get((kind, name))
+        subject = replace(_subject(kind, name, element, kernels, compiled), interpreted=True)
+        return subject.report(points, ())
     stored = store.spec((kind, name))
     if stored is None:
         raise ElementError(f"there is no {kind} called {name!r}; mstmm list shows what there is")
@@ -130,6 +132,7 @@ class _Subject:
     irs: Mapping[str, KernelIR]
     stated: Mapping[str, Kernel]
     compiled: Compiled | None
+    interpreted: bool = False  # kernels without a C function, by the engine's interpreter
 
     @classmethod
     def stored(cls, spec: ElementSpec, compiled: Compiled) -> _Subject:
@@ -150,6 +153,7 @@ class _Subject:
         worst, where, stopped, count = [0.0, 0.0], "", 0, 0
         problems: list[str] = []
         c_seen = self._function(kernel) is not None
+        interpreted = c_seen and not self._has_c(kernel)
         for point in self.source.points(kernel, points):
             count += 1
             compared = self._compare(kernel, point.inputs, point.n)
@@ -163,7 +167,7 @@ class _Subject:
                 worst = [max(a, b) for a, b in zip(worst, compared, strict=True)]
         return KernelCheck(
             kernel.name, count, stopped, worst[0] if self.stated else None,
-            worst[1] if c_seen else None, where, tuple(problems),
+            worst[1] if c_seen else None, where, tuple(problems), interpreted,
         )  # fmt: skip
 
     def _compare(
@@ -222,11 +226,14 @@ class _Subject:
     # --- the compiled kernels -------------------------------------------------------------------
 
     def _function(self, kernel: KernelIR) -> Callable[..., Any] | None:
-        if self.compiled is None:
-            return None
-        if self.compiled.tape is not None:
+        if self.compiled is not None and self._has_c(kernel):
+            return partial(_call, self.compiled)
+        if self.compiled is not None and self.compiled.tape is not None:
             return partial(_interpret, self.compiled.tape) if kernel.name == "hinge" else None
-        return partial(_call, self.compiled)
+        return partial(_interpret, _tape(kernel)) if self.interpreted else None
+
+    def _has_c(self, kernel: KernelIR) -> bool:
+        return self.compiled is not None and kernel.name in self.compiled.functions
 
     def _c_values(
         self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
@@ -331,10 +338,15 @@ def _named(kernel: KernelIR, arrays: Sequence[Any], n: int = 0) -> dict[str, lis
     }
 
 
+@lru_cache(maxsize=1)  # all points of a kernel, one after the other
+def _tape(kernel: KernelIR) -> Tape:
+    return compile_tape(kernel)
+
+
 def _interpret(
     tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
-    """The hinge kernel of an element without a library, as the engine interprets it."""
+    """A kernel without a C function, as the engine interprets it."""
     from ..runtime.kernels import prebuilt
     from ..runtime.kernels.tape import c_tape
 

@@ -14,7 +14,8 @@ class KernelCheck:
     """One kernel: largest errors over its points.
 
     `equations`: relative, IR against the stated equations at 50 digits; None if the definition is
-    not at hand.  `compiled`: error of the C as a share of its rounding bound; None if not compiled.
+    not at hand.  `compiled`: error of the C as a share of its rounding bound, or of the engine's
+    interpreter for a kernel that has no C (`interpreted`); None if not compiled.
     `stopped` counts points at which a guard stopped all ways alike.
     """
 
@@ -25,6 +26,7 @@ class KernelCheck:
     compiled: float | None
     worst_point: str
     problems: tuple[str, ...] = ()
+    interpreted: bool = False
 
     @property
     def passed(self) -> bool:
@@ -99,5 +101,6 @@ def _errors(kernel: KernelCheck) -> str:
     if kernel.equations is not None:
         parts.append(f"equations - IR {kernel.equations:.1e}")
     if kernel.compiled is not None:
-        parts.append(f"C {kernel.compiled:.2f} of its rounding bound")
+        by = "interpreter" if kernel.interpreted else "C"
+        parts.append(f"{by} {kernel.compiled:.2f} of its rounding bound")
     return ", ".join(parts) or "not compared"

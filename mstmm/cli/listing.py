@@ -102,16 +102,9 @@ def _matrices() -> Section:
     found = [
         (f"classical_{entry.name}", entry.title, "; ".join(entry.sources))
         for entry in builtin("classical")
-    ] or _derived_matrices()
+    ]
     data = [dict(zip(("name", "title", "sources"), row, strict=True)) for row in found]
     return Section("classical transfer matrices", ("matrix", "what it is", "source"), found, data)
-
-
-def _derived_matrices() -> list[tuple[str, ...]]:
-    from mstmm.derive.classical.catalogue import CLASSICAL
-
-    made = ((name, derive()) for name, derive in CLASSICAL.items())
-    return [(f"classical_{name}", d.title, "; ".join(d.sources)) for name, d in made]
 
 
 def _sweep() -> Section:

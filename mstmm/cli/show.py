@@ -96,14 +96,19 @@ def _views(element: str, at: str) -> list[ElementView]:
         return [views.of_element(each) for each in defined]
     kind, name = found(element)
     full = f"{kind}_{name}"
-    source = stored.text(full, ".c")
-    if source is None:
+    if name not in (entry.name for entry in stored.builtin(kind)):
         return [_kept(kind, name, at)]
-    if at in ("ir", "c"):  # the committed kernels: no need to derive them again
-        from mstmm.ir.stored import element_from_json
+    kernels, source = stored.text(full, ".json"), stored.text(full, ".c")
+    if kernels is None or at not in ("ir", "c"):
+        return [views.view(full)]
+    if at == "c" and source is None:
+        raise ElementError(
+            f"{full} has no C: runs replay its intermediate form; "
+            f"show that: mstmm show {full} --at ir"
+        )
+    from mstmm.ir.stored import element_from_json
 
-        return [_of_spec(element_from_json(str(stored.text(full, ".json"))), source)]
-    return [views.view(full)]
+    return [_of_spec(element_from_json(kernels), source or "")]  # no need to derive them again
 
 
 def _kept(kind: str, name: str, at: str) -> ElementView:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -33,12 +34,13 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def builtin(kind: str) -> list[Entry]:
-    """The generated elements of one kind, by name."""
-    found = []
-    for file in sorted(files("mstmm.generated").iterdir(), key=lambda f: f.name):
-        if file.name.startswith(f"{kind}_") and file.name.endswith(".json"):
-            found.append(_entry(json.loads(file.read_text(encoding="utf-8"))))
-    return found
+    """The built-in elements of one kind, by name."""
+    return [entry for entry in _catalogue() if entry.kind == kind]
+
+
+@cache
+def _catalogue() -> tuple[Entry, ...]:
+    return tuple(_entry(data) for data in json.loads(text("catalogue", ".json") or "[]"))
 
 
 def of_spec(spec: ElementSpec) -> Entry:
@@ -50,7 +52,7 @@ def of_spec(spec: ElementSpec) -> Entry:
 
 def _entry(data: dict[str, Any]) -> Entry:
     groups = {
-        group: tuple(with_unit(name, unit) for name, unit, *_ in data[group])
+        group: tuple(with_unit(name, unit) for name, unit in data[group].items())
         for group in ("coordinates", "speeds", "parameters")
     }
     return Entry(

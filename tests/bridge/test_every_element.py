@@ -1,6 +1,7 @@
 """Every compiled kernel agrees with its equations, with its IR, and with mechanics."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,15 +9,26 @@ import pytest
 from mstmm.bridge.crosscheck import Report, crosscheck
 from mstmm.derive.catalogue.kernels import built_in
 from mstmm.errors import ElementError
+from mstmm.runtime.kernels import prebuilt
+from mstmm.runtime.libraries.build_extension import written_by_hand
 
-MANIFEST = Path(__file__).resolve().parents[2] / "generated" / "manifest.json"
-ELEMENTS = [(e["kind"], e["name"]) for e in json.loads(MANIFEST.read_text())["elements"]]
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+ELEMENTS = [
+    (entry["kind"], entry["name"])
+    for entry in json.loads((GENERATED / "catalogue.json").read_text())
+]
 
 
 @pytest.fixture(scope="module")
 def reports() -> dict[tuple[str, str], Report]:
     """Reports by element, each made once."""
     return {}
+
+
+def linked(kind: str, name: str) -> set[str]:
+    """The kernels of an element that have a C function."""
+    element = prebuilt.elements().get((kind, name))
+    return set(element.functions) if element else set()
 
 
 @pytest.mark.parametrize(("kind", "name"), ELEMENTS)
@@ -26,6 +38,7 @@ def test_element_agrees(kind: str, name: str, reports: dict[tuple[str, str], Rep
     for kernel in report.kernels:
         assert kernel.equations is not None
         assert kernel.compiled is not None
+        assert kernel.interpreted == (kernel.kernel not in linked(kind, name))
         assert kernel.points - kernel.stopped >= 2
     if kind in ("hinge", "body", "force") or name.startswith(("generic", "laws")):
         assert report.statements
@@ -33,8 +46,24 @@ def test_element_agrees(kind: str, name: str, reports: dict[tuple[str, str], Rep
     assert str(report).startswith(f"{kind} {name}: agrees")
 
 
-def test_every_compiled_element_has_derivations() -> None:
-    assert set(ELEMENTS) == set(built_in())
+def test_every_listed_element_has_derivations() -> None:
+    assert set(ELEMENTS) == set(built_in()) > set(prebuilt.elements())
+
+
+def test_what_no_run_calls_has_no_c() -> None:
+    """Functions that the engine's C, or Python by a descriptor, calls; and no others but these."""
+    called = "".join(path.read_text() for path in written_by_hand(GENERATED.parent))
+    by_name = {
+        "hinge", "forward", "condense", "recover", "angle", "singularity", "inertia", "bias_load",
+        "energy", "wrench", "linear", "full", "rotation", "six",
+    }  # fmt: skip
+    for (kind, name), element in prebuilt.elements().items():
+        for kernel in element.functions:
+            whole = f"mstmm_{kind}_{name}_{kernel}"
+            counted = name.startswith("generic") and f"BY_SPEEDS({kernel})" in called
+            plain = kind in ("hinge", "body", "force") or name.startswith(("link_", "laws"))
+            by_descriptor = plain and kernel in by_name
+            assert re.search(rf"\b{whole}\b", called) or counted or by_descriptor, whole
 
 
 def test_unknown_element_is_refused() -> None:

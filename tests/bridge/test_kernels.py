@@ -1,16 +1,21 @@
-"""The committed C of every element computes its committed IR, compiled and as a tape."""
+"""The C of every element computes its IR, compiled and as a tape.
+
+Committed C and IR; of classical matrices that no run uses what is derived on demand.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.c_library import ENGINE, CLibrary, compile_library, same
+from support.c_library import ENGINE, CLibrary, Outcome, build, compile_library, same
 
 from mstmm.border import elements as abi
 from mstmm.derive.audit.rounding import rounding_bounds
+from mstmm.derive.classical.catalogue import CLASSICAL, RUN, classical_spec
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.replay import GuardFailure, evaluate_floats
 from mstmm.ir.spec import ElementSpec
@@ -23,14 +28,23 @@ SPECS: dict[str, ElementSpec] = {
     stem: element_from_json((GENERATED / f"{stem}.json").read_text())
     for stem in (f"{entry['kind']}_{entry['name']}" for entry in MANIFEST["elements"])
 }
+ON_DEMAND = sorted(set(CLASSICAL) - set(RUN))
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
     """Compiled with every warning an error, and without contraction, so that bits can agree."""
-    sources = [*(GENERATED / f"{stem}.c" for stem in (*SPECS, "registry")), ENGINE / "tape.c"]
+    stems = [stem for stem, spec in SPECS.items() if abi.has_c(spec)]
+    sources = [*(GENERATED / f"{stem}.c" for stem in (*stems, "registry")), ENGINE / "tape.c"]
     target = tmp_path_factory.mktemp("generated") / "all.so"
     return CLibrary(compile_library(sources, target, f"-I{GENERATED}"))
+
+
+@pytest.fixture(scope="module")
+def on_demand(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, ElementSpec], CLibrary]:
+    """The classical matrices that no run uses, and their C, compiled likewise."""
+    specs = {name: classical_spec(name) for name in ON_DEMAND}
+    return specs, build(tmp_path_factory.mktemp("on_demand"), *specs.values())
 
 
 def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
@@ -38,11 +52,14 @@ def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
     for entry, (stem, spec) in zip(MANIFEST["elements"], SPECS.items(), strict=True):
         assert (entry["hash"], entry["kind"], entry["name"]) == (spec.hash(), spec.kind, spec.name)
         assert entry["kernels"] == {kernel.name: kernel.hash() for kernel in spec.kernels}
+        if stem not in library.elements:
+            assert not (GENERATED / f"{stem}.c").exists() and not abi.has_c(spec)
+            continue
         descriptor = library.elements[stem]
         assert library.text(descriptor.hash) == spec.hash()
         assert descriptor.abi == abi.ABI
         counts = (descriptor.nq, descriptor.nu, descriptor.np, descriptor.n_kernels)
-        groups = (spec.coordinates, spec.speeds, spec.parameters, spec.kernels)
+        groups = (spec.coordinates, spec.speeds, spec.parameters, abi.c_kernels(spec))
         assert counts == tuple(len(group) for group in groups)
 
 
@@ -69,41 +86,61 @@ def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
     return [0.0] * length if special else [float(v) for v in rng.uniform(-1, 1, length)]
 
 
-def agree(library: CLibrary, stem: str, kernel: KernelIR, inputs: dict[str, list[float]]) -> bool:
-    """Compare C, tape, floats and exact values; False if a guard stopped all of them alike.
-
-    Kernels with a run-time size have no tape.
-    """
-    n = SIZE if kernel.size_symbol else 0
-    compiled = library.call(stem, kernel.name, inputs, n)
-    rows = None
-    if not n:
+def ways(
+    library: CLibrary, stem: str, kernel: KernelIR, inputs: dict[str, list[float]], in_c: bool
+) -> Iterator[Outcome]:
+    """What C gives, and the tape; kernels with a run-time size have no tape."""
+    if in_c:
+        yield library.call(stem, kernel.name, inputs, SIZE if kernel.size_symbol else 0)
+    if not kernel.size_symbol:
         code, rows = library.run_tape(compile_tape(kernel), [inputs[p.name] for p in kernel.inputs])
-        assert code == compiled.code
+        yield Outcome(code, {p.name: row for p, row in zip(kernel.outputs, rows, strict=True)})
+
+
+def agree(kernel: KernelIR, inputs: dict[str, list[float]], found: Iterable[Outcome]) -> bool:
+    """Compare with floats and exact values; False if a guard stopped all of them alike."""
+    n = SIZE if kernel.size_symbol else 0
+    outcomes = list(found)
+    assert outcomes
     try:
         floats = evaluate_floats(kernel, inputs, n)
     except GuardFailure as failure:
-        assert compiled.code == failure.code
+        assert {outcome.code for outcome in outcomes} == {failure.code}
         return False
-    assert compiled.code == 0
-    for name, row in floats.items():
-        assert same(compiled.outputs[name], row), name
-    for (name, row), interpreted in zip(floats.items(), rows or (), strict=rows is not None):
-        assert same(interpreted, row), name
+    for outcome in outcomes:
+        assert outcome.code == 0
+        for name, row in floats.items():
+            assert same(outcome.outputs[name], row), name
     if all(np.isfinite(row).all() for row in floats.values()):
         for name, limits in rounding_bounds(kernel, inputs, n).items():
-            for got, (value, bound) in zip(compiled.outputs[name], limits, strict=True):
+            for got, (value, bound) in zip(outcomes[0].outputs[name], limits, strict=True):
                 assert abs(got - value) <= bound, name
     return True
 
 
-@pytest.mark.parametrize("stem", SPECS)
-def test_c_tape_and_ir_agree(stem: str, library: CLibrary, rng: np.random.Generator) -> None:
-    for kernel in SPECS[stem].kernels:
+def compare(library: CLibrary, stem: str, spec: ElementSpec, rng: np.random.Generator) -> None:
+    """Every kernel of an element at points that pass its guards."""
+    compiled = {kernel.name for kernel in abi.c_kernels(spec)}
+    for kernel in spec.kernels:
         passed = 0
         for draw in range(60):  # many draws fail a guard, which has to fail alike in all three
             inputs = {port.name: drawn(port, rng, draw == 0) for port in kernel.inputs}
-            passed += agree(library, stem, kernel, inputs)
+            found = ways(library, stem, kernel, inputs, kernel.name in compiled)
+            passed += agree(kernel, inputs, found)
             if draw >= 3 and passed:
                 break
         assert passed, f"{kernel.name}: no drawn point passes its guards"
+
+
+@pytest.mark.parametrize("stem", SPECS)
+def test_c_tape_and_ir_agree(stem: str, library: CLibrary, rng: np.random.Generator) -> None:
+    compare(library, stem, SPECS[stem], rng)
+
+
+@pytest.mark.parametrize("name", ON_DEMAND)
+def test_what_is_derived_on_demand_agrees(
+    name: str, on_demand: tuple[dict[str, ElementSpec], CLibrary], rng: np.random.Generator
+) -> None:
+    specs, library = on_demand
+    assert f"classical_{name}" not in SPECS
+    compare(library, f"classical_{name}", specs[name], rng)
