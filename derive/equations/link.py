@@ -151,8 +151,8 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
             ),
             Equation("e of body and outboard part", E.symbol, OWN_LOAD.symbol + OUTER_E.symbol),
             *elimination.definitions,
-            *_about_z().carried(REDUCED_S.symbol, REDUCED_E.symbol, middle, plain=True),
-            *_about_x().carried(*middle, (OUT_S.symbol, OUT_E.symbol), plain=True),
+            *_about_z().carried(REDUCED_S.symbol, REDUCED_E.symbol, middle),
+            *_about_x().carried(*middle, (OUT_S.symbol, OUT_E.symbol)),
         ),
         sources=SOURCES,
     )

@@ -8,15 +8,7 @@ inboard ones; the outboard origin lies d along the axis:
 
     S_I = X^T S X,   e_I = X^T e,   delta = X delta_I,   X = [R^T  -R^T r~; 0  R^T],   r = d e_k
 
-In the plane of the turn a symmetric block [a b; b d] becomes, with t = s (a - d) + 2 c b,
-
-    a' = a - s t,   d' = d + s t,   b' = c t - b
-
-and in the mixed block [p q; r w], whose antisymmetric part a turn leaves as it is, with
-t = s (p - w) + c (q + r):   p' = p - s t,   w' = w + s t,   q' = c t - r,   r' = c t - q.
-
-These forms rely on c^2 + s^2 = 1 and do not fold where c and s are constants 0 or +-1 (c t - r with
-t = q + r); `condense_plain` is R A R^T as it stands and does.
+S is carried as R A R^T as it stands, so that its products fold where c and s are constants.
 """
 
 from __future__ import annotations
@@ -27,7 +19,7 @@ import sympy as sp
 
 from ..language.derivation import Derivation, Equation, Quantity, tilde
 from .algebra import part, stack, symbol
-from .sweep import DELTA, MOTION, PARENT_DELTA, PARENT_MOTION, SOURCES, E, S
+from .sweep import SOURCES, E, S
 
 TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle")
 SHIFT_ALONG = Quantity(symbol("d", 1), "m", "shift along the axis")
@@ -52,10 +44,6 @@ def _matrix(entries: Scalars) -> sp.ImmutableDenseMatrix:
 
 def _block(symbol: sp.MatrixSymbol, row: int, column: int) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix(3, 3, lambda i, j: symbol[row + i, column + j])
-
-
-def _screw(name: str, axis: str) -> str:
-    return f"{name} across a screw about {axis}"
 
 
 # --- S and e ----------------------------------------------------------------------------------
@@ -90,13 +78,10 @@ class Stage:
         """An intermediate quantity of this stage."""
         return symbol(name + self.mark, rows, columns)
 
-    def carried(
-        self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair, *, plain: bool = False
-    ) -> tuple[Equation, ...]:
+    def carried(self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair) -> tuple[Equation, ...]:
         """Equations that carry s and e to the inboard origin; `out` are the results' symbols."""
         rotation = Equation("rotation", self.symbol("R", 3, 3), self.rotation)
-        turned = self._turned_plainly(s) if plain else self._turned(s)
-        return (rotation, *turned, *self._load_turned(e), *self._shifted(*out))
+        return (rotation, *self._turned(s), *self._load_turned(e), *self._shifted(*out))
 
     def _load_turned(self, e: sp.MatrixSymbol) -> tuple[Equation, ...]:
         turn = self.symbol("R", 3, 3)
@@ -105,49 +90,16 @@ class Stage:
             Equation("moment, inboard axes", self.symbol("moment", 3), turn * part(e, 3)),
         )
 
-    def _turned_plainly(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    def _turned(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
         """R A R^T, R B R^T, R C R^T."""
-        return tuple(self._block(s, *block, None) for block in _BLOCKS)
-
-    def _block(
-        self,
-        s: sp.MatrixSymbol,
-        name: str,
-        words: str,
-        row: int,
-        column: int,
-        computed: sp.Basic | None,
-    ) -> Equation:
         turn = self.symbol("R", 3, 3)
-        value = turn * _block(s, row, column) * turn.T
-        return Equation(
-            f"{words}, inboard axes", self.symbol(name, 3, 3), value,
-            symmetric=row == column, computed=computed,
-        )  # fmt: skip
-
-    def _turned(self, whole: sp.MatrixSymbol) -> tuple[Equation, ...]:
-        """The same by the double angle."""
-        k, (i, j) = self.k, _plane(self.k)
-        c, s = self.cosine, self.sine
-        found = []
-        for name, words, row, column in _BLOCKS:
-            m = _block(whole, row, column)
-            t = self.symbol(f"t_{name}", 1)
-            # The sum of the two mixed entries is 2 b of a symmetric block.
-            swing = 2 * (c * m[i, j]) if row == column else c * (m[i, j] + m[j, i])
-            found.append(
-                Equation(f"double angle of the {words}", t, s * (m[i, i] - m[j, j]) + swing)
+        return tuple(
+            Equation(
+                f"{words}, inboard axes", self.symbol(name, 3, 3),
+                turn * _block(s, row, column) * turn.T, symmetric=row == column,
             )
-            t0 = t[0, 0]
-            entries: Scalars = {
-                (k, k): m[k, k],
-                (i, i): m[i, i] - s * t0, (j, j): m[j, j] + s * t0,
-                (i, j): c * t0 - m[j, i], (j, i): c * t0 - m[i, j],
-                (k, i): c * m[k, i] - s * m[k, j], (k, j): s * m[k, i] + c * m[k, j],
-                (i, k): c * m[i, k] - s * m[j, k], (j, k): s * m[i, k] + c * m[j, k],
-            }  # fmt: skip
-            found.append(self._block(whole, name, words, row, column, _matrix(entries)))
-        return tuple(found)
+            for name, words, row, column in _BLOCKS
+        )  # fmt: skip
 
     def _shifted(self, out_s: sp.MatrixSymbol, out_e: sp.MatrixSymbol) -> tuple[Equation, ...]:
         """B_I = B - A r~,  C_I = C + r~ B_I - B^T r~,  moment + r x force."""
@@ -226,19 +178,19 @@ def _entries(symbol: sp.MatrixSymbol) -> Scalars:
     return {(m, n): symbol[m, n] for m in range(3) for n in range(3)}
 
 
-def _given(axis: str) -> Stage:
+def given(axis: str) -> Stage:
+    """The screw about `axis` whose turn and shift are inputs."""
     return Stage(AXES[axis], TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT_ALONG.symbol[0, 0])
 
 
-def condense(axis: str, *, plain: bool = False) -> Derivation:
-    """S and e across a screw about `axis`; `plain` without the double angle (constant turns)."""
-    out = (OUT_S.symbol, OUT_E.symbol)
+def condense(axis: str) -> Derivation:
+    """S and e across a screw about `axis`."""
     return Derivation(
         "screw",
-        _screw("S and e", axis) + (", plain products" if plain else ""),
+        f"S and e across a screw about {axis}",
         (TURN, SHIFT_ALONG, S, E),
         (OUT_S, OUT_E),
-        _given(axis).carried(S.symbol, E.symbol, out, plain=plain),
+        given(axis).carried(S.symbol, E.symbol, (OUT_S.symbol, OUT_E.symbol)),
         sources=SOURCES,
     )
 
@@ -291,36 +243,7 @@ def turn_by_trace() -> Derivation:
     )
 
 
-def motion(axis: str) -> Derivation:
-    """Angular velocity, angular acceleration and acceleration of the outboard origin."""
-    return Derivation(
-        "screw",
-        _screw("bias motion", axis),
-        (TURN, SHIFT_ALONG, PARENT_MOTION),
-        (MOTION,),
-        _given(axis).behind(PARENT_MOTION.symbol, MOTION.symbol),
-        sources=SOURCES,
-    )
-
-
-def delta(axis: str) -> Derivation:
-    """Deviation of the outboard acceleration for a rigid connection."""
-    return Derivation(
-        "screw",
-        _screw("deviation", axis),
-        (TURN, SHIFT_ALONG, PARENT_DELTA),
-        (DELTA,),
-        _given(axis).deviation(PARENT_DELTA.symbol, DELTA.symbol),
-        sources=SOURCES,
-    )
-
-
 def derivations() -> dict[str, Derivation]:
     """Every step by its kernel's name."""
-    found = {"condense_turn": turn(), "condense_turn_by_trace": turn_by_trace()}
-    for axis in AXES:
-        found[f"condense_{axis}"] = condense(axis)
-        found[f"condense_plain_{axis}"] = condense(axis, plain=True)
-        found[f"motion_{axis}"] = motion(axis)
-        found[f"delta_{axis}"] = delta(axis)
-    return found
+    across = {f"condense_{axis}": condense(axis) for axis in AXES}
+    return {"condense_turn_by_trace": turn_by_trace(), **across}

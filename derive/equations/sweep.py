@@ -21,8 +21,6 @@ from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde
 from .algebra import column, part, stack, symbol
 from .hinge import HingeMotion
 
-THREE = (3, 3)
-
 #: A pivot must exceed this share of the mean inertia of the body that it moves.
 PIVOT_FLOOR = sp.Rational(1, 10**14)
 

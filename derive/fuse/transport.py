@@ -68,7 +68,7 @@ class Stage:
             k = AXES.index(axis)
             i, j = (k + 1) % 3, (k + 2) % 3
             found = f.screw(
-                f"condense_plain_{axis}", turn=[self.rotation[4 * i], self.rotation[3 * j + i]],
+                f"condense_{axis}", turn=[self.rotation[4 * i], self.rotation[3 * j + i]],
                 d=[self.position[k]], S=inertia, e=load,
             )  # fmt: skip
             return found["S_I"], found["e_I"]

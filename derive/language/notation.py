@@ -81,11 +81,6 @@ def residual(equation: Equation) -> Matrix:
     return Matrix(explicit(equation.left) - explicit(equation.right))
 
 
-def unit_vector(index: int, length: int) -> Matrix:
-    """Column with a one at `index`."""
-    return Matrix([1 if i == index else 0 for i in range(length)])
-
-
 def solve_linear(
     premises: Sequence[Equation],
     unknowns: Sequence[sp.MatrixSymbol],

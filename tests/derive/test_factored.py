@@ -12,8 +12,9 @@ import sympy as sp
 from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.audit.evaluate_equations import Undefined, evaluate_equations
 from mstmm.derive.audit.samples import rotation
-from mstmm.derive.catalogue.kernels import generic_kernels, hinge_kernels, screw_kernels
+from mstmm.derive.catalogue.kernels import generic_kernels, hinge_kernels
 from mstmm.derive.catalogue.registry import builtin_elements
+from mstmm.derive.equations import screw
 from mstmm.derive.language.derivation import Derivation, Equation, Factor, Quantity, Triangular
 from mstmm.derive.language.element import Hinge
 from mstmm.derive.lower.kernel import lower
@@ -158,12 +159,13 @@ def test_factored_elimination_of_unit_directions(name: str) -> None:
 
 
 def test_turn_by_trace_is_the_turn() -> None:
-    kernels = {k.name: k.ir() for k in screw_kernels()}
+    turn = lower(screw.turn(), "condense_turn")
+    by_trace = lower(screw.turn_by_trace(), "condense_turn_by_trace")
     numbers = random.Random(5)
     with mpmath.workdps(DIGITS):
         given = {"Rc": rotation(numbers), "S": upper(definite(6, numbers)), "e": some(6, numbers)}
-        plain = evaluate(kernels["condense_turn"], given, DIGITS)
-        traced = evaluate(kernels["condense_turn_by_trace"], given, DIGITS)
+        plain = evaluate(turn, given, DIGITS)
+        traced = evaluate(by_trace, given, DIGITS)
         assert close(traced["S_I"], plain["S_I"])
         assert close(traced["e_I"], plain["e_I"])
-    assert kernels["condense_turn_by_trace"].flops() < kernels["condense_turn"].flops()
+    assert by_trace.flops() < turn.flops()
