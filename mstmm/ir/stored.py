@@ -41,8 +41,8 @@ def element_from_json(text: str) -> ElementSpec:
     if "facts" in data:
         facts = facts_from_data(data["facts"])
     elif data["kind"] == "hinge":  # stored before hinges brought theirs
-        motion = next(kernel for kernel in kernels if kernel.name == "hinge")
-        facts = facts_of(motion, data["name"], **groups)
+        motion = [kernel for kernel in kernels if kernel.name == "hinge"]
+        facts = facts_of(motion[0], data["name"], **groups) if motion else None
     return ElementSpec(
         kind=data["kind"], name=data["name"], title=data["title"], kernels=kernels,
         sources=tuple(data["sources"]), facts=facts, **groups,
