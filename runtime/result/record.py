@@ -29,23 +29,9 @@ _MODEST = 1e60
 
 
 class Record(FlexibleResults, ABC):
-    """What a run gave: states, and everything that follows from them, over the sample times.
+    """States of a run, and everything that follows from them, over the sample times.
 
-    Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
-    Quantities beyond q and u are computed in one batch when the first of them is asked for, and
-    kept (their arrays are read-only).  Where a sample cannot be evaluated they are nan and
-    `warnings` says so.
-
-    Attributes:
-        model: the model that ran.
-        t: (n,) s.  Equal neighbours stand just before and just after an event.
-        q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
-        u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
-        event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
-        status: why it ended; None if it was interrupted.
-        statistics: counts of the integrator; None for runs of other integrators.
-        settings: how the run was made.
-        checkpoint: the file that keeps the run until its result is saved; None without one.
+    `Result` says what its attributes are; it adds what vouches for them, and the ways out.
     """
 
     def __init__(

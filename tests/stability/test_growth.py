@@ -44,13 +44,19 @@ def error(scene: dict[str, Any], rng: np.random.Generator, **options: Any) -> fl
     return found
 
 
+def of_rounding(count: int) -> float:
+    """Error that a sweep along so many bodies may gather: a few roundings a body, which add up at
+    worst (largest of some hundred states: 1.4e-13 along 1000, where they mostly cancel)."""
+    return 1e-14 + 4 * count * 2.0**-53
+
+
 @pytest.mark.parametrize("count", [1, 3, 30, 1000])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_riccati_keeps_its_digits(family: str, count: int, rng: np.random.Generator) -> None:
     scene = rods(family, count)
     model = mstmm.compile(mstmm.Scene(**scene))
     q, u = drawn_state(scene, rng)
-    assert worst(model.accelerations(q, u), precise_accelerations(scene, q, u)) < 1e-13
+    assert worst(model.accelerations(q, u), precise_accelerations(scene, q, u)) < of_rounding(count)
 
 
 def test_oblique_planar_chain_keeps_its_digits(rng: np.random.Generator) -> None:
@@ -58,7 +64,7 @@ def test_oblique_planar_chain_keeps_its_digits(rng: np.random.Generator) -> None
     scene = rods("planar", 800, start=(0.7, -0.4, 1.1), gravity=(3.0, -7.0, 5.0))
     model = mstmm.compile(mstmm.Scene(**scene))
     q, u = drawn_state(scene, rng)
-    assert worst(model.accelerations(q, u), precise_accelerations(scene, q, u)) < 1e-13
+    assert worst(model.accelerations(q, u), precise_accelerations(scene, q, u)) < of_rounding(800)
 
 
 #: Family -> bodies, smallest and largest error of the product expected there.
