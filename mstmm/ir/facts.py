@@ -7,6 +7,7 @@ results ask these facts, which a built-in hinge and one of the user's have alike
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cache
@@ -15,7 +16,7 @@ from typing import Any
 
 from .kernel import KernelIR, from_json, to_json
 from .param import Param
-from .replay import evaluate_floats
+from .replay import GuardFailure, evaluate_floats
 from .statements import Assign, Constant, Element, Operand, Store, Temporary
 
 Vector = tuple[float, float, float]
@@ -25,8 +26,10 @@ Vector = tuple[float, float, float]
 #: to both; z along the normal `axis` and x along `axis2`.
 FRAMES = ("own", "axis", "crossing", "plane")
 
-#: Largest rotation or translation, per unit of a speed, that is none.
-_NONE = 1e-9
+#: Entries of two rotations closer than this are the same.
+_SAME = 1e-9
+#: An entry of H that is never stored.
+_ZERO = Constant("0")
 
 
 @dataclass(frozen=True)
@@ -150,10 +153,11 @@ def facts_of(
     depends = _Dependence(hinge)
     quaternion = _quaternion(hinge, len(coordinates), nu)
     varies = tuple(
-        "".join(depends.letter(values["H", row * nu + k]) for row in range(6)) for k in range(nu)
+        "".join(depends.letter(values.get(("H", row * nu + k), _ZERO)) for row in range(6))
+        for k in range(nu)
     )
     straight = len(coordinates) == nu and all(
-        values["qdot", k] == Element("u", (k,)) for k in range(nu)
+        values.get(("qdot", k)) == Element("u", (k,)) for k in range(nu)
     )
     start = start_of(len(coordinates), quaternion)
     return HingeFacts(
@@ -193,7 +197,7 @@ class _Dependence:
                 self._of[statement.number] = max(letters, default="")
 
     def _reads(self, operand: Operand) -> str:
-        """ "" a constant, "p" parameters alone, "q" coordinates (or speeds) too."""
+        """Nothing for a constant, "p" for parameters alone, "q" for coordinates (or speeds) too."""
         if isinstance(operand, Temporary):
             return self._of[operand.number]
         if isinstance(operand, Element):
@@ -243,13 +247,16 @@ def _quaternion(hinge: KernelIR, nq: int, nu: int) -> int | None:
     rest = {"p": [0.7 + 0.1 * k for k in range(sizes["p"])], "u": [0.0] * sizes["u"]}
 
     def rotation(q: Sequence[float]) -> list[float]:
-        return evaluate_floats(hinge, {"q": q, **rest})["R"]
+        try:
+            return evaluate_floats(hinge, {"q": q, **rest})["R"]
+        except GuardFailure:  # not defined there
+            return [math.nan] * 9
 
-    for first in range(nq - 3):
+    for first in range(nq - 3):  # by trial: N(q) u = qdot may be written in many ways
         longer = [2 * x if first <= k < first + 4 else x for k, x in enumerate(q)]
         turned = [x + 0.1 if k == first else x for k, x in enumerate(q)]
-        same = _apart(rotation(q), rotation(longer)) <= _NONE
-        if same and _apart(rotation(q), rotation(turned)) > _NONE:
+        same = _apart(rotation(q), rotation(longer)) <= _SAME
+        if same and _apart(rotation(q), rotation(turned)) > _SAME:
             return first
     return None
 

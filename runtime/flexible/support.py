@@ -82,11 +82,13 @@ class Supports:
             return None
         if _prescribed(hinge):
             return np.zeros((6, 0))
-        facts = hinge.facts
-        if facts is None or (facts.slides and (facts.turns or not facts.steady)):
+        facts, motions = hinge.facts, start_motion(hinge)
+        if facts is None or motions is None:
+            return None
+        if facts.slides and (facts.turns or not facts.steady):
             return None
         if facts.slides:
-            along = np.array([translation for translation, _ in start_motion(hinge)]).T
+            along = np.array([translation for translation, _ in motions]).T
             return np.concatenate([along, np.zeros_like(along)])
         axes = np.array(free_axes(hinge)).reshape(-1, 3).T
         return np.concatenate([np.zeros_like(axes), axes])

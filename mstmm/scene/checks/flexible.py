@@ -104,7 +104,7 @@ def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
     if released and hinge.is_weld:
         return _AXES
     drive = () if released else hinge.drive or ()
-    turned = [rotation for _, rotation in start_motion(hinge)]
+    turned = [rotation for _, rotation in start_motion(hinge) or ()]
     free = (a for k, a in enumerate(turned) if any(a) and (k >= len(drive) or drive[k] is None))
     return tuple(_unit(axis) for axis in free)
 

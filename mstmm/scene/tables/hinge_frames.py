@@ -5,6 +5,8 @@ Everything here stays exact where axes lie along axes, and differentiable (`numb
 
 from __future__ import annotations
 
+import math
+
 from ...numbers.dual import atan2
 from ...numbers.rotations import (
     IDENTITY,
@@ -49,16 +51,21 @@ def key_numbers(hinge: HingeKeys) -> dict[str, float]:
     return found
 
 
-def start_motion(hinge: HingeKeys) -> list[tuple[Vector, Vector]]:
-    """(translation, rotation) of the outboard end per unit of each speed at the start values of the
-    coordinates, in the axes of that end; none where the type is not known."""
+def start_motion(hinge: HingeKeys) -> list[tuple[Vector, Vector]] | None:
+    """(translation, rotation) of the outboard end per unit of each speed, in its own axes, at the
+    default start values of the coordinates.
+
+    None where the type is not known, or its coordinates fail there.
+    """
     facts = hinge.facts
     if facts is None:
-        return []
+        return None
     given = {**hinge.parameters, **key_numbers(hinge)}
     numbers = [float(given.get(p.name, p.default or 0.0)) for p in facts.parameters]
-    _, outboard = hinge_frames(hinge)
-    return [(_turned(outboard, t), _turned(outboard, r)) for t, r in facts.at_start(numbers)]
+    motions, (_, outboard) = facts.at_start(numbers), hinge_frames(hinge)
+    if not all(math.isfinite(x) for pair in motions for vector in pair for x in vector):
+        return None
+    return [(_turned(outboard, t), _turned(outboard, r)) for t, r in motions]
 
 
 def _turned(axes: Matrix, v: Vector) -> Vector:

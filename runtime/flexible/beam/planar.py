@@ -131,12 +131,12 @@ class Planar:
         return abs(where - height) <= _ROUNDING * max(1.0, abs(height))
 
     def _hinge_stays(self, hinge: Hinge, n: Array) -> bool:
-        facts, (outer, _, end) = hinge.facts, self._end(hinge.outboard)
-        if facts is None:
+        facts, motions = hinge.facts, start_motion(hinge)
+        if facts is None or motions is None:
             return False
+        outer, _, end = self._end(hinge.outboard)
         turn = self._turn[outer] @ end
         if facts.steady:
-            motions = start_motion(hinge)
             return all(_stays(turn @ np.array(t), turn @ np.array(r), n) for t, r in motions)
         z = turn @ np.array(hinge_frames(hinge)[1])[:, 2]
         return facts.keeps_z and abs(float(z @ n)) >= 1 - _ROUNDING

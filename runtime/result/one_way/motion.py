@@ -148,14 +148,15 @@ def _with(port: ModalPort, phi: Array, theta: Array) -> ModalPort:
 
 def _not_free(hinge: Hinge | None, rotation: Array) -> Array:
     """(3, 3) projection of rotations, body axes, on those that a hinge holds."""
-    if hinge is None or hinge.facts is None:
+    motions = None if hinge is None else start_motion(hinge)
+    if hinge is None or hinge.facts is None or motions is None:
         return np.zeros((3, 3))
     facts, driven = hinge.facts, hinge.drive is not None and None not in hinge.drive
     if driven or not facts.turns:
         return np.eye(3)
     if len(facts.turns) > 1 or "q" in facts.varies[facts.turns[0]][3:]:
         return np.zeros((3, 3))
-    axis = rotation @ np.array(start_motion(hinge)[facts.turns[0]][1])
+    axis = rotation @ np.array(motions[facts.turns[0]][1])
     axis /= np.linalg.norm(axis)
     return np.eye(3) - np.outer(axis, axis)
 
