@@ -44,6 +44,8 @@ class HingeFacts:
         runs_as: the element whose kernels move it, its own name but where two share them.
         quaternion: place in q of the first entry (w) of a unit quaternion, None without one.
         straight: the speeds are the rates of the coordinates.
+        in_place: at the start values the kernel neither turns nor shifts the ends, whatever the
+            parameters: they lie as the scene says.
         varies: per speed, six letters for the rows v, w of H: "0" zero and "1" one in every
             position, "p" a number of the parameters alone, "q" any other.
         start_motion: kernel p -> H (6 nu) at the start values of the coordinates.
@@ -59,6 +61,7 @@ class HingeFacts:
     runs_as: str
     quaternion: int | None
     straight: bool
+    in_place: bool
     varies: tuple[str, ...]
     start_motion: KernelIR
 
@@ -69,8 +72,8 @@ class HingeFacts:
 
     @property
     def welds(self) -> bool:
-        """Nothing moves."""
-        return not self.speeds
+        """Nothing moves, and both ends are one."""
+        return not self.speeds and self.in_place
 
     @property
     def turns(self) -> tuple[int, ...]:
@@ -162,7 +165,7 @@ def facts_of(
     start = start_of(len(coordinates), quaternion)
     return HingeFacts(
         name, allows, coordinates, speeds, parameters, frame, keys, name, quaternion, straight,
-        varies, _at(hinge, start),
+        _in_place(hinge, start, frame), varies, _at(hinge, start),
     )  # fmt: skip
 
 
@@ -261,6 +264,23 @@ def _quaternion(hinge: KernelIR, nq: int, nu: int) -> int | None:
     return None
 
 
+def _in_place(hinge: KernelIR, start: Sequence[float], frame: str) -> bool:
+    """Whether R and d join the ends as the scene lays them, whatever the parameters."""
+    sizes = {port.name: port.length() for port in hinge.inputs}
+    for first in (0.7, 1.1):
+        p = [first + 0.1 * k for k in range(sizes["p"])]
+        try:
+            found = evaluate_floats(hinge, {"q": start, "p": p, "u": [0.0] * sizes["u"]})
+        except GuardFailure:  # not defined there
+            return False
+        c, s = (math.cos(p[0]), math.sin(p[0])) if frame == "crossing" else (1.0, 0.0)
+        laid = [1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c]  # the axes of a crossing frame differ
+        apart = _apart([*found["R"], *found["d"]], [*laid, 0.0, 0.0, 0.0])
+        if not apart <= _SAME:
+            return False
+    return True
+
+
 def _apart(one: Sequence[float], other: Sequence[float]) -> float:
     return max(abs(a - b) for a, b in zip(one, other, strict=True))
 
@@ -277,7 +297,7 @@ def facts_to_data(facts: HingeFacts) -> dict[str, Any]:
     return {
         "name": facts.name, "allows": facts.allows, **groups, "frame": facts.frame,
         "keys": list(facts.keys), "runs_as": facts.runs_as, "quaternion": facts.quaternion,
-        "straight": facts.straight, "varies": list(facts.varies),
+        "straight": facts.straight, "in_place": facts.in_place, "varies": list(facts.varies),
         "start_motion": json.loads(to_json(facts.start_motion)),
     }  # fmt: skip
 
@@ -291,6 +311,7 @@ def facts_from_data(data: dict[str, Any]) -> HingeFacts:
     rest = {key: data[key] for key in ("name", "allows", "frame", "runs_as", "quaternion")}
     return HingeFacts(
         **rest, **groups, keys=tuple(data["keys"]), straight=data["straight"],
+        in_place=data["in_place"],
         varies=tuple(data["varies"]), start_motion=from_json(json.dumps(data["start_motion"])),
     )  # fmt: skip
 

@@ -83,7 +83,7 @@ class Supports:
         if _prescribed(hinge):
             return np.zeros((6, 0))
         facts, motions = hinge.facts, start_motion(hinge)
-        if facts is None or motions is None:
+        if facts is None or motions is None or not facts.in_place:
             return None
         if facts.slides and (facts.turns or not facts.steady):
             return None

@@ -317,7 +317,7 @@ class BodyRecords:
 
     def _hinge_parameters(self, hinge: Hinge) -> tuple[float, ...]:
         """Numbers of the hinge's kernel: of keys of the scene, and given by name."""
-        if hinge.facts is None or hinge.is_weld:
+        if hinge.facts is None:
             return ()
         own = hinge.facts.own_parameters()
         given = declared_numbers(own, hinge.parameters, f'hinge "{hinge.name}"')

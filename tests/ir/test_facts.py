@@ -36,6 +36,8 @@ def test_facts_of_the_built_in_hinges() -> None:
         for name, f in builtin_hinges().items()
     }
     assert found == KNOWN
+    assert all(facts.in_place for facts in builtin_hinges().values())
+    assert [name for name, f in builtin_hinges().items() if f.welds] == ["fixed"]
     assert [name for name, f in builtin_hinges().items() if f.free_body] == ["elastic", "free"]
     assert [name for name, f in builtin_hinges().items() if f.goes_anywhere] == [
         "planar", "elastic", "free",
@@ -64,10 +66,8 @@ def odd(value: tuple[Assign, ...]) -> HingeFacts:
     stores = (
         Store("H", (0,), Temporary(value[-1].number)), Store("qdot", (0,), Element("u", (0,))),
     )  # fmt: skip
-    kernel = KernelIR(
-        "hinge", (p, q, u), (Port("H", (6,)), Port("qdot", (1,)), Port("R", (3, 3))),
-        (*value, *stores),
-    )  # fmt: skip
+    outputs = (Port("H", (6,)), Port("qdot", (1,)), Port("R", (3, 3)), Port("d", (3,)))
+    kernel = KernelIR("hinge", (p, q, u), outputs, (*value, *stores))
     return facts_of(kernel, "odd", (Param("a", "m"),), (Param("a_rate", "m/s"),), ())
 
 

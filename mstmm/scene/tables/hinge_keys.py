@@ -55,7 +55,7 @@ class HingeKeys(Table):
 
     @property
     def is_weld(self) -> bool:
-        """Nothing moves, by its type."""
+        """Both ends are one, by its type."""
         return self.facts is not None and self.facts.welds
 
     @property

@@ -132,7 +132,7 @@ class Planar:
 
     def _hinge_stays(self, hinge: Hinge, n: Array) -> bool:
         facts, motions = hinge.facts, start_motion(hinge)
-        if facts is None or motions is None:
+        if facts is None or motions is None or not facts.in_place:
             return False
         outer, _, end = self._end(hinge.outboard)
         turn = self._turn[outer] @ end
