@@ -240,6 +240,10 @@ int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
+int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, real *restrict tau_d);
+int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
+    real *restrict P);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
 int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
@@ -266,6 +270,14 @@ int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic1;
 int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
@@ -283,6 +295,14 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -300,6 +320,14 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic2_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -317,6 +345,14 @@ int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic3_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -334,6 +370,14 @@ int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic4_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -351,6 +395,14 @@ int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic5_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -368,6 +420,14 @@ int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic6_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -503,5 +563,10 @@ int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *r
     const real *restrict s, real *restrict e, real *restrict e_f);
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau);
+int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+    const real *restrict e_f, real *restrict e_c);
+int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
+    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
+    real *restrict work);
 
 #endif

@@ -43,6 +43,10 @@ int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
+int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, real *restrict tau_d);
+int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
+    real *restrict P);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
 int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
@@ -1454,6 +1458,68 @@ static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
     {"T", 1, "J", 0, 0},
 };
 
+/* effort that a prescribed acceleration needs
+ * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
+ * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
+ * in  udot[1] acceleration
+ * in  tau[1] (N, N*m) effort that is there already
+ * out tau_d[1] (N, N*m) what is missing
+ */
+int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, real *restrict tau_d)
+{
+    const real t0 = J[0] * udot[0];
+    const real t1 = t0 - tau[0];
+    const real t2 = felt[0] + t1;
+    tau_d[0] = t2;
+    return 0;
+}
+
+static int mstmm_sweep_frames_driven_effort_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_driven_effort(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_driven_effort_inputs[] = {
+    {"felt", 1, "N, N*m", 0, 0},
+    {"J", 1, "kg or kg*m2", 0, 0},
+    {"udot", 1, "", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_driven_effort_outputs[] = {
+    {"tau_d", 1, "N, N*m", 0, 0},
+};
+
+/* power of an effort
+ * in  tau[1] (N, N*m) effort
+ * in  u[1] (m/s, rad/s) speed
+ * out P[1] (W) power
+ */
+int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
+    real *restrict P)
+{
+    const real t0 = tau[0] * u[0];
+    P[0] = t0;
+    return 0;
+}
+
+static int mstmm_sweep_frames_speed_power_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_speed_power(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_speed_power_inputs[] = {
+    {"tau", 1, "N, N*m", 0, 0},
+    {"u", 1, "m/s, rad/s", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_speed_power_outputs[] = {
+    {"P", 1, "W", 0, 0},
+};
+
 /* distance of two points
  * in  x_F[3]
  * in  v_F[3]
@@ -2052,6 +2118,30 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "driven_effort",
+        .function = (void (*)(void))mstmm_sweep_frames_driven_effort,
+        .call = mstmm_sweep_frames_driven_effort_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_driven_effort_inputs,
+        .outputs = mstmm_sweep_frames_driven_effort_outputs,
+        .ir_hash = "0daf641a3cce328a3f5da3576060f6b261dfcbc1f5fe9b10bf57679bbf6a2e6b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "speed_power",
+        .function = (void (*)(void))mstmm_sweep_frames_speed_power,
+        .call = mstmm_sweep_frames_speed_power_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_speed_power_inputs,
+        .outputs = mstmm_sweep_frames_speed_power_outputs,
+        .ir_hash = "195bcd5a7115098d4cc2a3faed583e8c5a6701c8817f260cc5a3691f2d85e231",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "length",
         .function = (void (*)(void))mstmm_sweep_frames_length,
         .call = mstmm_sweep_frames_length_call,
@@ -2105,7 +2195,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "ea7ff599a6321a93807f7d11f01080ad098c520e042f3b230c39a822d63050b0",
+    .hash = "10797f50d500127315633c228c28c7b9a2c749c329d6e505cc5589612d8a7889",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2115,6 +2205,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 22,
     .kernels = mstmm_sweep_frames_kernels,
 };

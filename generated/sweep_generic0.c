@@ -25,6 +25,14 @@ int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 0 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -914,6 +922,258 @@ static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
     {"udot", 0, "", 0, 0},
 };
 
+/* factor of D of a hinge with no free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][0] motion subspace of the free coordinates
+ * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[0][0] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    (void)H;
+    (void)J;
+    (void)S;
+    (void)F;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_factor_inputs[] = {
+    {"H", 0, "", 0, 0},
+    {"J", 0, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
+    {"F", 0, "", 0, 0},
+};
+
+/* load of a column carried across a hinge with no free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][0] motion subspace of the free coordinates
+ * in  G[0][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[0] (N, N*m) the column's efforts on the free coordinates
+ * out y[0] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    (void)H;
+    (void)G;
+    (void)tau;
+    (void)y;
+    const real t0 = Rc[0] * e[0];
+    const real t1 = Rc[1] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[2] * e[2];
+    const real t4 = t2 + t3;
+    e_I[0] += t4;
+    const real t5 = Rc[3] * e[0];
+    const real t6 = Rc[4] * e[1];
+    const real t7 = t5 + t6;
+    const real t8 = Rc[5] * e[2];
+    const real t9 = t7 + t8;
+    e_I[1] += t9;
+    const real t10 = Rc[6] * e[0];
+    const real t11 = Rc[7] * e[1];
+    const real t12 = t10 + t11;
+    const real t13 = Rc[8] * e[2];
+    const real t14 = t12 + t13;
+    e_I[2] += t14;
+    const real t15 = Rc[0] * e[3];
+    const real t16 = Rc[1] * e[4];
+    const real t17 = t15 + t16;
+    const real t18 = Rc[2] * e[5];
+    const real t19 = t17 + t18;
+    const real t20 = Rc[6] * r[1];
+    const real t21 = Rc[3] * r[2];
+    const real t22 = t20 - t21;
+    const real t23 = e[0] * t22;
+    const real t24 = Rc[7] * r[1];
+    const real t25 = Rc[4] * r[2];
+    const real t26 = t24 - t25;
+    const real t27 = e[1] * t26;
+    const real t28 = t23 + t27;
+    const real t29 = Rc[8] * r[1];
+    const real t30 = Rc[5] * r[2];
+    const real t31 = t29 - t30;
+    const real t32 = e[2] * t31;
+    const real t33 = t28 + t32;
+    const real t34 = t19 + t33;
+    e_I[3] += t34;
+    const real t35 = Rc[3] * e[3];
+    const real t36 = Rc[4] * e[4];
+    const real t37 = t35 + t36;
+    const real t38 = Rc[5] * e[5];
+    const real t39 = t37 + t38;
+    const real t40 = Rc[0] * r[2];
+    const real t41 = Rc[6] * r[0];
+    const real t42 = t40 - t41;
+    const real t43 = e[0] * t42;
+    const real t44 = Rc[1] * r[2];
+    const real t45 = Rc[7] * r[0];
+    const real t46 = t44 - t45;
+    const real t47 = e[1] * t46;
+    const real t48 = t43 + t47;
+    const real t49 = Rc[2] * r[2];
+    const real t50 = Rc[8] * r[0];
+    const real t51 = t49 - t50;
+    const real t52 = e[2] * t51;
+    const real t53 = t48 + t52;
+    const real t54 = t39 + t53;
+    e_I[4] += t54;
+    const real t55 = Rc[6] * e[3];
+    const real t56 = Rc[7] * e[4];
+    const real t57 = t55 + t56;
+    const real t58 = Rc[8] * e[5];
+    const real t59 = t57 + t58;
+    const real t60 = Rc[3] * r[0];
+    const real t61 = Rc[0] * r[1];
+    const real t62 = t60 - t61;
+    const real t63 = e[0] * t62;
+    const real t64 = Rc[4] * r[0];
+    const real t65 = Rc[1] * r[1];
+    const real t66 = t64 - t65;
+    const real t67 = e[1] * t66;
+    const real t68 = t63 + t67;
+    const real t69 = Rc[5] * r[0];
+    const real t70 = Rc[2] * r[1];
+    const real t71 = t69 - t70;
+    const real t72 = e[2] * t71;
+    const real t73 = t68 + t72;
+    const real t74 = t59 + t73;
+    e_I[5] += t74;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 0, "", 0, 0},
+    {"G", 0, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 0, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_push_outputs[] = {
+    {"y", 0, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with no free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][0] motion subspace of the free coordinates
+ * in  F[0][0] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[0][6] D^-1 H^T S
+ * in  y[0] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[0] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    (void)H;
+    (void)F;
+    (void)G;
+    (void)y;
+    (void)udot;
+    const real t0 = r[2] * delta_I[4];
+    const real t1 = r[1] * delta_I[5];
+    const real t2 = t0 - t1;
+    const real t3 = delta_I[0] + t2;
+    const real t4 = Rc[0] * t3;
+    const real t5 = r[0] * delta_I[5];
+    const real t6 = r[2] * delta_I[3];
+    const real t7 = t5 - t6;
+    const real t8 = delta_I[1] + t7;
+    const real t9 = Rc[3] * t8;
+    const real t10 = t4 + t9;
+    const real t11 = r[1] * delta_I[3];
+    const real t12 = r[0] * delta_I[4];
+    const real t13 = t11 - t12;
+    const real t14 = delta_I[2] + t13;
+    const real t15 = Rc[6] * t14;
+    const real t16 = t10 + t15;
+    delta[0] = t16;
+    const real t17 = Rc[1] * t3;
+    const real t18 = Rc[4] * t8;
+    const real t19 = t17 + t18;
+    const real t20 = Rc[7] * t14;
+    const real t21 = t19 + t20;
+    delta[1] = t21;
+    const real t22 = Rc[2] * t3;
+    const real t23 = Rc[5] * t8;
+    const real t24 = t22 + t23;
+    const real t25 = Rc[8] * t14;
+    const real t26 = t24 + t25;
+    delta[2] = t26;
+    const real t27 = Rc[0] * delta_I[3];
+    const real t28 = Rc[3] * delta_I[4];
+    const real t29 = t27 + t28;
+    const real t30 = Rc[6] * delta_I[5];
+    const real t31 = t29 + t30;
+    delta[3] = t31;
+    const real t32 = Rc[1] * delta_I[3];
+    const real t33 = Rc[4] * delta_I[4];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[7] * delta_I[5];
+    const real t36 = t34 + t35;
+    delta[4] = t36;
+    const real t37 = Rc[2] * delta_I[3];
+    const real t38 = Rc[5] * delta_I[4];
+    const real t39 = t37 + t38;
+    const real t40 = Rc[8] * delta_I[5];
+    const real t41 = t39 + t40;
+    delta[5] = t41;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 0, "", 0, 0},
+    {"F", 0, "", 0, 0},
+    {"G", 0, "", 0, 0},
+    {"y", 0, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
+    {"udot", 0, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
     {
         .name = "forward",
@@ -975,13 +1235,49 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic0_factor,
+        .call = mstmm_sweep_generic0_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_factor_inputs,
+        .outputs = mstmm_sweep_generic0_factor_outputs,
+        .ir_hash = "2e2aad8771362e82c47380b1a427a889180ff28e7895c86871c49bc066a65dd9",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic0_push,
+        .call = mstmm_sweep_generic0_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic0_push_inputs,
+        .outputs = mstmm_sweep_generic0_push_outputs,
+        .ir_hash = "c30bbbd9317c1f165561732308a49f3dca3546f81be459d98d55b5ce7d42a1cb",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic0_answer,
+        .call = mstmm_sweep_generic0_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic0_answer_inputs,
+        .outputs = mstmm_sweep_generic0_answer_outputs,
+        .ir_hash = "1a4f9a9cb4de0ce793048400246fd472c25b162526cba9d33bfdd35c37b9cb3a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "2d02f2152addccc1eef46663111c99d1767ce4970245c0ca69de78b8c0964fc9",
+    .hash = "4094c0e3519a4a52e495027bcfb97b1a008f53a8d8958b2eba476dfc547ac599",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -991,6 +1287,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic0_kernels,
 };

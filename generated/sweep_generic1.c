@@ -26,6 +26,14 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1215,6 +1223,382 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* factor of D of a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6] motion subspace of the free coordinates
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[1] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[1] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[2] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[3] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[4] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[5] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[1] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[1] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[2] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[3] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[4] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[5] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[2] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[1] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[2] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[3] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[4] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[5] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[3] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[1] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[2] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[3] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[4] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[5] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[4] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[1] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[2] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[3] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[4] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[5] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[5] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t79 = 1.0 / t77;
+    F[0] = t79;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_factor_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_factor_outputs[] = {
+    {"F", 1, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* load of a column carried across a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace of the free coordinates
+ * in  G[1][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * out y[1] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[1] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = G[0] * t11;
+    const real t13 = e[0] + t12;
+    const real t14 = Rc[0] * t13;
+    const real t15 = G[1] * t11;
+    const real t16 = e[1] + t15;
+    const real t17 = Rc[1] * t16;
+    const real t18 = t14 + t17;
+    const real t19 = G[2] * t11;
+    const real t20 = e[2] + t19;
+    const real t21 = Rc[2] * t20;
+    const real t22 = t18 + t21;
+    e_I[0] += t22;
+    const real t23 = Rc[3] * t13;
+    const real t24 = Rc[4] * t16;
+    const real t25 = t23 + t24;
+    const real t26 = Rc[5] * t20;
+    const real t27 = t25 + t26;
+    e_I[1] += t27;
+    const real t28 = Rc[6] * t13;
+    const real t29 = Rc[7] * t16;
+    const real t30 = t28 + t29;
+    const real t31 = Rc[8] * t20;
+    const real t32 = t30 + t31;
+    e_I[2] += t32;
+    const real t33 = G[3] * t11;
+    const real t34 = e[3] + t33;
+    const real t35 = Rc[0] * t34;
+    const real t36 = G[4] * t11;
+    const real t37 = e[4] + t36;
+    const real t38 = Rc[1] * t37;
+    const real t39 = t35 + t38;
+    const real t40 = G[5] * t11;
+    const real t41 = e[5] + t40;
+    const real t42 = Rc[2] * t41;
+    const real t43 = t39 + t42;
+    const real t44 = Rc[6] * r[1];
+    const real t45 = Rc[3] * r[2];
+    const real t46 = t44 - t45;
+    const real t47 = t13 * t46;
+    const real t48 = Rc[7] * r[1];
+    const real t49 = Rc[4] * r[2];
+    const real t50 = t48 - t49;
+    const real t51 = t16 * t50;
+    const real t52 = t47 + t51;
+    const real t53 = Rc[8] * r[1];
+    const real t54 = Rc[5] * r[2];
+    const real t55 = t53 - t54;
+    const real t56 = t20 * t55;
+    const real t57 = t52 + t56;
+    const real t58 = t43 + t57;
+    e_I[3] += t58;
+    const real t59 = Rc[3] * t34;
+    const real t60 = Rc[4] * t37;
+    const real t61 = t59 + t60;
+    const real t62 = Rc[5] * t41;
+    const real t63 = t61 + t62;
+    const real t64 = Rc[0] * r[2];
+    const real t65 = Rc[6] * r[0];
+    const real t66 = t64 - t65;
+    const real t67 = t13 * t66;
+    const real t68 = Rc[1] * r[2];
+    const real t69 = Rc[7] * r[0];
+    const real t70 = t68 - t69;
+    const real t71 = t16 * t70;
+    const real t72 = t67 + t71;
+    const real t73 = Rc[2] * r[2];
+    const real t74 = Rc[8] * r[0];
+    const real t75 = t73 - t74;
+    const real t76 = t20 * t75;
+    const real t77 = t72 + t76;
+    const real t78 = t63 + t77;
+    e_I[4] += t78;
+    const real t79 = Rc[6] * t34;
+    const real t80 = Rc[7] * t37;
+    const real t81 = t79 + t80;
+    const real t82 = Rc[8] * t41;
+    const real t83 = t81 + t82;
+    const real t84 = Rc[3] * r[0];
+    const real t85 = Rc[0] * r[1];
+    const real t86 = t84 - t85;
+    const real t87 = t13 * t86;
+    const real t88 = Rc[4] * r[0];
+    const real t89 = Rc[1] * r[1];
+    const real t90 = t88 - t89;
+    const real t91 = t16 * t90;
+    const real t92 = t87 + t91;
+    const real t93 = Rc[5] * r[0];
+    const real t94 = Rc[2] * r[1];
+    const real t95 = t93 - t94;
+    const real t96 = t20 * t95;
+    const real t97 = t92 + t96;
+    const real t98 = t83 + t97;
+    e_I[5] += t98;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_push_outputs[] = {
+    {"y", 1, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace of the free coordinates
+ * in  F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[1][6] D^-1 H^T S
+ * in  y[1] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[1] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = r[2] * delta_I[4];
+    const real t2 = r[1] * delta_I[5];
+    const real t3 = t1 - t2;
+    const real t4 = delta_I[0] + t3;
+    const real t5 = Rc[0] * t4;
+    const real t6 = r[0] * delta_I[5];
+    const real t7 = r[2] * delta_I[3];
+    const real t8 = t6 - t7;
+    const real t9 = delta_I[1] + t8;
+    const real t10 = Rc[3] * t9;
+    const real t11 = t5 + t10;
+    const real t12 = r[1] * delta_I[3];
+    const real t13 = r[0] * delta_I[4];
+    const real t14 = t12 - t13;
+    const real t15 = delta_I[2] + t14;
+    const real t16 = Rc[6] * t15;
+    const real t17 = t11 + t16;
+    const real t18 = G[0] * t17;
+    const real t19 = Rc[1] * t4;
+    const real t20 = Rc[4] * t9;
+    const real t21 = t19 + t20;
+    const real t22 = Rc[7] * t15;
+    const real t23 = t21 + t22;
+    const real t24 = G[1] * t23;
+    const real t25 = t18 + t24;
+    const real t26 = Rc[2] * t4;
+    const real t27 = Rc[5] * t9;
+    const real t28 = t26 + t27;
+    const real t29 = Rc[8] * t15;
+    const real t30 = t28 + t29;
+    const real t31 = G[2] * t30;
+    const real t32 = t25 + t31;
+    const real t33 = Rc[0] * delta_I[3];
+    const real t34 = Rc[3] * delta_I[4];
+    const real t35 = t33 + t34;
+    const real t36 = Rc[6] * delta_I[5];
+    const real t37 = t35 + t36;
+    const real t38 = G[3] * t37;
+    const real t39 = t32 + t38;
+    const real t40 = Rc[1] * delta_I[3];
+    const real t41 = Rc[4] * delta_I[4];
+    const real t42 = t40 + t41;
+    const real t43 = Rc[7] * delta_I[5];
+    const real t44 = t42 + t43;
+    const real t45 = G[4] * t44;
+    const real t46 = t39 + t45;
+    const real t47 = Rc[2] * delta_I[3];
+    const real t48 = Rc[5] * delta_I[4];
+    const real t49 = t47 + t48;
+    const real t50 = Rc[8] * delta_I[5];
+    const real t51 = t49 + t50;
+    const real t52 = G[5] * t51;
+    const real t53 = t46 + t52;
+    const real t54 = t0 - t53;
+    udot[0] = t54;
+    const real t55 = H[0] * t54;
+    const real t56 = t17 + t55;
+    delta[0] = t56;
+    const real t57 = H[1] * t54;
+    const real t58 = t23 + t57;
+    delta[1] = t58;
+    const real t59 = H[2] * t54;
+    const real t60 = t30 + t59;
+    delta[2] = t60;
+    const real t61 = H[3] * t54;
+    const real t62 = t37 + t61;
+    delta[3] = t62;
+    const real t63 = H[4] * t54;
+    const real t64 = t44 + t63;
+    delta[4] = t64;
+    const real t65 = H[5] * t54;
+    const real t66 = t51 + t65;
+    delta[5] = t66;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"F", 1, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"y", 1, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
+    {"udot", 1, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -1276,13 +1660,49 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 1,
         .guards = mstmm_sweep_generic1_project_guards,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic1_factor,
+        .call = mstmm_sweep_generic1_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_factor_inputs,
+        .outputs = mstmm_sweep_generic1_factor_outputs,
+        .ir_hash = "eab1eab078beb3f24b6ec49d1cc6034df8fe3f548e5c87625e9e510cc46542ae",
+        .n_guards = 1,
+        .guards = mstmm_sweep_generic1_factor_guards,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic1_push,
+        .call = mstmm_sweep_generic1_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_push_inputs,
+        .outputs = mstmm_sweep_generic1_push_outputs,
+        .ir_hash = "c9969b7fdb300e673ea805d41287ff7858e4912a4393b68580ac50006b242799",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic1_answer,
+        .call = mstmm_sweep_generic1_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_answer_inputs,
+        .outputs = mstmm_sweep_generic1_answer_outputs,
+        .ir_hash = "01e6d7b934f73c0ab2544ce4c046f548cb3f7874833e5200e68c2e25d059ed26",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "5385fa8ed820dfa08d9a27dee3d47acf74bd56bdfe49fa5a0674a8cb119cb6ab",
+    .hash = "629147231fa319330564f88dd569b9bc5179a40ea558d5e355c8f09587f60a29",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1292,6 +1712,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic1_kernels,
 };

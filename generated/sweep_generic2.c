@@ -26,6 +26,14 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic2_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1534,6 +1542,537 @@ static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
     {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* factor of D of a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic2_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[2] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[2] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[4] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[6] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[8] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[10] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[2] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[2] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[4] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[6] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[8] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[10] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[4] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[2] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[4] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[6] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[8] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[10] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[6] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[2] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[4] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[6] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[8] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[10] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[8] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[2] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[4] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[6] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[8] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[10] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[10] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t79 = H[1] * S[0];
+    const real t80 = H[3] * S[1];
+    const real t81 = t79 + t80;
+    const real t82 = H[5] * S[2];
+    const real t83 = t81 + t82;
+    const real t84 = H[7] * S[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[9] * S[4];
+    const real t87 = t85 + t86;
+    const real t88 = H[11] * S[5];
+    const real t89 = t87 + t88;
+    const real t90 = H[1] * t89;
+    const real t91 = H[1] * S[1];
+    const real t92 = H[3] * S[6];
+    const real t93 = t91 + t92;
+    const real t94 = H[5] * S[7];
+    const real t95 = t93 + t94;
+    const real t96 = H[7] * S[8];
+    const real t97 = t95 + t96;
+    const real t98 = H[9] * S[9];
+    const real t99 = t97 + t98;
+    const real t100 = H[11] * S[10];
+    const real t101 = t99 + t100;
+    const real t102 = H[3] * t101;
+    const real t103 = t90 + t102;
+    const real t104 = H[1] * S[2];
+    const real t105 = H[3] * S[7];
+    const real t106 = t104 + t105;
+    const real t107 = H[5] * S[11];
+    const real t108 = t106 + t107;
+    const real t109 = H[7] * S[12];
+    const real t110 = t108 + t109;
+    const real t111 = H[9] * S[13];
+    const real t112 = t110 + t111;
+    const real t113 = H[11] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = H[5] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = H[1] * S[3];
+    const real t118 = H[3] * S[8];
+    const real t119 = t117 + t118;
+    const real t120 = H[5] * S[12];
+    const real t121 = t119 + t120;
+    const real t122 = H[7] * S[15];
+    const real t123 = t121 + t122;
+    const real t124 = H[9] * S[16];
+    const real t125 = t123 + t124;
+    const real t126 = H[11] * S[17];
+    const real t127 = t125 + t126;
+    const real t128 = H[7] * t127;
+    const real t129 = t116 + t128;
+    const real t130 = H[1] * S[4];
+    const real t131 = H[3] * S[9];
+    const real t132 = t130 + t131;
+    const real t133 = H[5] * S[13];
+    const real t134 = t132 + t133;
+    const real t135 = H[7] * S[16];
+    const real t136 = t134 + t135;
+    const real t137 = H[9] * S[18];
+    const real t138 = t136 + t137;
+    const real t139 = H[11] * S[19];
+    const real t140 = t138 + t139;
+    const real t141 = H[9] * t140;
+    const real t142 = t129 + t141;
+    const real t143 = H[1] * S[5];
+    const real t144 = H[3] * S[10];
+    const real t145 = t143 + t144;
+    const real t146 = H[5] * S[14];
+    const real t147 = t145 + t146;
+    const real t148 = H[7] * S[17];
+    const real t149 = t147 + t148;
+    const real t150 = H[9] * S[19];
+    const real t151 = t149 + t150;
+    const real t152 = H[11] * S[20];
+    const real t153 = t151 + t152;
+    const real t154 = H[11] * t153;
+    const real t155 = t142 + t154;
+    const real t156 = J[1] + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[1] * t10;
+    const real t159 = H[3] * t22;
+    const real t160 = t158 + t159;
+    const real t161 = H[5] * t35;
+    const real t162 = t160 + t161;
+    const real t163 = H[7] * t48;
+    const real t164 = t162 + t163;
+    const real t165 = H[9] * t61;
+    const real t166 = t164 + t165;
+    const real t167 = H[11] * t74;
+    const real t168 = t166 + t167;
+    const real t169 = 1.0 / t77;
+    const real t170 = t168 * t169;
+    const real t171 = t168 * t170;
+    const real t172 = t156 - t171;
+    const real t173 = t157 < t172;
+    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = t170;
+    const real t174 = 1.0 / t172;
+    F[3] = t174;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_factor_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_factor_outputs[] = {
+    {"F", 4, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* load of a column carried across a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  G[2][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) the column's efforts on the free coordinates
+ * out y[2] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[2] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[3] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[5] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[7] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[9] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[11] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = G[0] * t11;
+    const real t25 = G[6] * t23;
+    const real t26 = t24 + t25;
+    const real t27 = e[0] + t26;
+    const real t28 = Rc[0] * t27;
+    const real t29 = G[1] * t11;
+    const real t30 = G[7] * t23;
+    const real t31 = t29 + t30;
+    const real t32 = e[1] + t31;
+    const real t33 = Rc[1] * t32;
+    const real t34 = t28 + t33;
+    const real t35 = G[2] * t11;
+    const real t36 = G[8] * t23;
+    const real t37 = t35 + t36;
+    const real t38 = e[2] + t37;
+    const real t39 = Rc[2] * t38;
+    const real t40 = t34 + t39;
+    e_I[0] += t40;
+    const real t41 = Rc[3] * t27;
+    const real t42 = Rc[4] * t32;
+    const real t43 = t41 + t42;
+    const real t44 = Rc[5] * t38;
+    const real t45 = t43 + t44;
+    e_I[1] += t45;
+    const real t46 = Rc[6] * t27;
+    const real t47 = Rc[7] * t32;
+    const real t48 = t46 + t47;
+    const real t49 = Rc[8] * t38;
+    const real t50 = t48 + t49;
+    e_I[2] += t50;
+    const real t51 = G[3] * t11;
+    const real t52 = G[9] * t23;
+    const real t53 = t51 + t52;
+    const real t54 = e[3] + t53;
+    const real t55 = Rc[0] * t54;
+    const real t56 = G[4] * t11;
+    const real t57 = G[10] * t23;
+    const real t58 = t56 + t57;
+    const real t59 = e[4] + t58;
+    const real t60 = Rc[1] * t59;
+    const real t61 = t55 + t60;
+    const real t62 = G[5] * t11;
+    const real t63 = G[11] * t23;
+    const real t64 = t62 + t63;
+    const real t65 = e[5] + t64;
+    const real t66 = Rc[2] * t65;
+    const real t67 = t61 + t66;
+    const real t68 = Rc[6] * r[1];
+    const real t69 = Rc[3] * r[2];
+    const real t70 = t68 - t69;
+    const real t71 = t27 * t70;
+    const real t72 = Rc[7] * r[1];
+    const real t73 = Rc[4] * r[2];
+    const real t74 = t72 - t73;
+    const real t75 = t32 * t74;
+    const real t76 = t71 + t75;
+    const real t77 = Rc[8] * r[1];
+    const real t78 = Rc[5] * r[2];
+    const real t79 = t77 - t78;
+    const real t80 = t38 * t79;
+    const real t81 = t76 + t80;
+    const real t82 = t67 + t81;
+    e_I[3] += t82;
+    const real t83 = Rc[3] * t54;
+    const real t84 = Rc[4] * t59;
+    const real t85 = t83 + t84;
+    const real t86 = Rc[5] * t65;
+    const real t87 = t85 + t86;
+    const real t88 = Rc[0] * r[2];
+    const real t89 = Rc[6] * r[0];
+    const real t90 = t88 - t89;
+    const real t91 = t27 * t90;
+    const real t92 = Rc[1] * r[2];
+    const real t93 = Rc[7] * r[0];
+    const real t94 = t92 - t93;
+    const real t95 = t32 * t94;
+    const real t96 = t91 + t95;
+    const real t97 = Rc[2] * r[2];
+    const real t98 = Rc[8] * r[0];
+    const real t99 = t97 - t98;
+    const real t100 = t38 * t99;
+    const real t101 = t96 + t100;
+    const real t102 = t87 + t101;
+    e_I[4] += t102;
+    const real t103 = Rc[6] * t54;
+    const real t104 = Rc[7] * t59;
+    const real t105 = t103 + t104;
+    const real t106 = Rc[8] * t65;
+    const real t107 = t105 + t106;
+    const real t108 = Rc[3] * r[0];
+    const real t109 = Rc[0] * r[1];
+    const real t110 = t108 - t109;
+    const real t111 = t27 * t110;
+    const real t112 = Rc[4] * r[0];
+    const real t113 = Rc[1] * r[1];
+    const real t114 = t112 - t113;
+    const real t115 = t32 * t114;
+    const real t116 = t111 + t115;
+    const real t117 = Rc[5] * r[0];
+    const real t118 = Rc[2] * r[1];
+    const real t119 = t117 - t118;
+    const real t120 = t38 * t119;
+    const real t121 = t116 + t120;
+    const real t122 = t107 + t121;
+    e_I[5] += t122;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"G", 12, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_push_outputs[] = {
+    {"y", 2, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[2][6] D^-1 H^T S
+ * in  y[2] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[2] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[2] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[3] * t2;
+    const real t4 = F[2] * t3;
+    const real t5 = t0 - t4;
+    const real t6 = r[2] * delta_I[4];
+    const real t7 = r[1] * delta_I[5];
+    const real t8 = t6 - t7;
+    const real t9 = delta_I[0] + t8;
+    const real t10 = Rc[0] * t9;
+    const real t11 = r[0] * delta_I[5];
+    const real t12 = r[2] * delta_I[3];
+    const real t13 = t11 - t12;
+    const real t14 = delta_I[1] + t13;
+    const real t15 = Rc[3] * t14;
+    const real t16 = t10 + t15;
+    const real t17 = r[1] * delta_I[3];
+    const real t18 = r[0] * delta_I[4];
+    const real t19 = t17 - t18;
+    const real t20 = delta_I[2] + t19;
+    const real t21 = Rc[6] * t20;
+    const real t22 = t16 + t21;
+    const real t23 = G[0] * t22;
+    const real t24 = Rc[1] * t9;
+    const real t25 = Rc[4] * t14;
+    const real t26 = t24 + t25;
+    const real t27 = Rc[7] * t20;
+    const real t28 = t26 + t27;
+    const real t29 = G[1] * t28;
+    const real t30 = t23 + t29;
+    const real t31 = Rc[2] * t9;
+    const real t32 = Rc[5] * t14;
+    const real t33 = t31 + t32;
+    const real t34 = Rc[8] * t20;
+    const real t35 = t33 + t34;
+    const real t36 = G[2] * t35;
+    const real t37 = t30 + t36;
+    const real t38 = Rc[0] * delta_I[3];
+    const real t39 = Rc[3] * delta_I[4];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[6] * delta_I[5];
+    const real t42 = t40 + t41;
+    const real t43 = G[3] * t42;
+    const real t44 = t37 + t43;
+    const real t45 = Rc[1] * delta_I[3];
+    const real t46 = Rc[4] * delta_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[7] * delta_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = G[4] * t49;
+    const real t51 = t44 + t50;
+    const real t52 = Rc[2] * delta_I[3];
+    const real t53 = Rc[5] * delta_I[4];
+    const real t54 = t52 + t53;
+    const real t55 = Rc[8] * delta_I[5];
+    const real t56 = t54 + t55;
+    const real t57 = G[5] * t56;
+    const real t58 = t51 + t57;
+    const real t59 = t5 - t58;
+    udot[0] = t59;
+    const real t60 = G[6] * t22;
+    const real t61 = G[7] * t28;
+    const real t62 = t60 + t61;
+    const real t63 = G[8] * t35;
+    const real t64 = t62 + t63;
+    const real t65 = G[9] * t42;
+    const real t66 = t64 + t65;
+    const real t67 = G[10] * t49;
+    const real t68 = t66 + t67;
+    const real t69 = G[11] * t56;
+    const real t70 = t68 + t69;
+    const real t71 = t3 - t70;
+    udot[1] = t71;
+    const real t72 = H[0] * t59;
+    const real t73 = H[1] * t71;
+    const real t74 = t72 + t73;
+    const real t75 = t22 + t74;
+    delta[0] = t75;
+    const real t76 = H[2] * t59;
+    const real t77 = H[3] * t71;
+    const real t78 = t76 + t77;
+    const real t79 = t28 + t78;
+    delta[1] = t79;
+    const real t80 = H[4] * t59;
+    const real t81 = H[5] * t71;
+    const real t82 = t80 + t81;
+    const real t83 = t35 + t82;
+    delta[2] = t83;
+    const real t84 = H[6] * t59;
+    const real t85 = H[7] * t71;
+    const real t86 = t84 + t85;
+    const real t87 = t42 + t86;
+    delta[3] = t87;
+    const real t88 = H[8] * t59;
+    const real t89 = H[9] * t71;
+    const real t90 = t88 + t89;
+    const real t91 = t49 + t90;
+    delta[4] = t91;
+    const real t92 = H[10] * t59;
+    const real t93 = H[11] * t71;
+    const real t94 = t92 + t93;
+    const real t95 = t56 + t94;
+    delta[5] = t95;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"F", 4, "", 0, 0},
+    {"G", 12, "", 0, 0},
+    {"y", 2, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
+    {"udot", 2, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
     {
         .name = "forward",
@@ -1595,13 +2134,49 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_guards = 2,
         .guards = mstmm_sweep_generic2_project_guards,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic2_factor,
+        .call = mstmm_sweep_generic2_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_factor_inputs,
+        .outputs = mstmm_sweep_generic2_factor_outputs,
+        .ir_hash = "f78a65ab695311803bed7654ac93850820731fd2139de09856e859ecedf93bc1",
+        .n_guards = 2,
+        .guards = mstmm_sweep_generic2_factor_guards,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic2_push,
+        .call = mstmm_sweep_generic2_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_push_inputs,
+        .outputs = mstmm_sweep_generic2_push_outputs,
+        .ir_hash = "8f2bde75895ffe00bd5d9902aef48b2d7348604ab4886b397ec4d02076ea950d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic2_answer,
+        .call = mstmm_sweep_generic2_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_answer_inputs,
+        .outputs = mstmm_sweep_generic2_answer_outputs,
+        .ir_hash = "d04549e53a714922fb69daa2670baea21d963a57d52958c25d02c0c0fcbeecc3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "fe3929d6ac65fb008bb1a229541417fbf3c8c4e5ff213cc51edc7740d214c5a4",
+    .hash = "ea0babe81a86ac1891643997df4b59955b36ab886843b43c2b297bbef967a358",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1611,6 +2186,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -26,6 +26,14 @@ int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic3_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1917,6 +1925,714 @@ static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
     {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* factor of D of a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][3] motion subspace of the free coordinates
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic3_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[3] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[3] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[6] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[9] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[12] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[15] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[3] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[3] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[6] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[9] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[12] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[15] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[6] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[3] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[6] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[9] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[12] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[15] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[9] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[3] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[6] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[9] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[12] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[15] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[12] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[3] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[6] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[9] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[12] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[15] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[15] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t79 = H[1] * S[0];
+    const real t80 = H[4] * S[1];
+    const real t81 = t79 + t80;
+    const real t82 = H[7] * S[2];
+    const real t83 = t81 + t82;
+    const real t84 = H[10] * S[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[13] * S[4];
+    const real t87 = t85 + t86;
+    const real t88 = H[16] * S[5];
+    const real t89 = t87 + t88;
+    const real t90 = H[1] * t89;
+    const real t91 = H[1] * S[1];
+    const real t92 = H[4] * S[6];
+    const real t93 = t91 + t92;
+    const real t94 = H[7] * S[7];
+    const real t95 = t93 + t94;
+    const real t96 = H[10] * S[8];
+    const real t97 = t95 + t96;
+    const real t98 = H[13] * S[9];
+    const real t99 = t97 + t98;
+    const real t100 = H[16] * S[10];
+    const real t101 = t99 + t100;
+    const real t102 = H[4] * t101;
+    const real t103 = t90 + t102;
+    const real t104 = H[1] * S[2];
+    const real t105 = H[4] * S[7];
+    const real t106 = t104 + t105;
+    const real t107 = H[7] * S[11];
+    const real t108 = t106 + t107;
+    const real t109 = H[10] * S[12];
+    const real t110 = t108 + t109;
+    const real t111 = H[13] * S[13];
+    const real t112 = t110 + t111;
+    const real t113 = H[16] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = H[7] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = H[1] * S[3];
+    const real t118 = H[4] * S[8];
+    const real t119 = t117 + t118;
+    const real t120 = H[7] * S[12];
+    const real t121 = t119 + t120;
+    const real t122 = H[10] * S[15];
+    const real t123 = t121 + t122;
+    const real t124 = H[13] * S[16];
+    const real t125 = t123 + t124;
+    const real t126 = H[16] * S[17];
+    const real t127 = t125 + t126;
+    const real t128 = H[10] * t127;
+    const real t129 = t116 + t128;
+    const real t130 = H[1] * S[4];
+    const real t131 = H[4] * S[9];
+    const real t132 = t130 + t131;
+    const real t133 = H[7] * S[13];
+    const real t134 = t132 + t133;
+    const real t135 = H[10] * S[16];
+    const real t136 = t134 + t135;
+    const real t137 = H[13] * S[18];
+    const real t138 = t136 + t137;
+    const real t139 = H[16] * S[19];
+    const real t140 = t138 + t139;
+    const real t141 = H[13] * t140;
+    const real t142 = t129 + t141;
+    const real t143 = H[1] * S[5];
+    const real t144 = H[4] * S[10];
+    const real t145 = t143 + t144;
+    const real t146 = H[7] * S[14];
+    const real t147 = t145 + t146;
+    const real t148 = H[10] * S[17];
+    const real t149 = t147 + t148;
+    const real t150 = H[13] * S[19];
+    const real t151 = t149 + t150;
+    const real t152 = H[16] * S[20];
+    const real t153 = t151 + t152;
+    const real t154 = H[16] * t153;
+    const real t155 = t142 + t154;
+    const real t156 = J[1] + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[1] * t10;
+    const real t159 = H[4] * t22;
+    const real t160 = t158 + t159;
+    const real t161 = H[7] * t35;
+    const real t162 = t160 + t161;
+    const real t163 = H[10] * t48;
+    const real t164 = t162 + t163;
+    const real t165 = H[13] * t61;
+    const real t166 = t164 + t165;
+    const real t167 = H[16] * t74;
+    const real t168 = t166 + t167;
+    const real t169 = 1.0 / t77;
+    const real t170 = t168 * t169;
+    const real t171 = t168 * t170;
+    const real t172 = t156 - t171;
+    const real t173 = t157 < t172;
+    if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t174 = H[2] * S[0];
+    const real t175 = H[5] * S[1];
+    const real t176 = t174 + t175;
+    const real t177 = H[8] * S[2];
+    const real t178 = t176 + t177;
+    const real t179 = H[11] * S[3];
+    const real t180 = t178 + t179;
+    const real t181 = H[14] * S[4];
+    const real t182 = t180 + t181;
+    const real t183 = H[17] * S[5];
+    const real t184 = t182 + t183;
+    const real t185 = H[2] * t184;
+    const real t186 = H[2] * S[1];
+    const real t187 = H[5] * S[6];
+    const real t188 = t186 + t187;
+    const real t189 = H[8] * S[7];
+    const real t190 = t188 + t189;
+    const real t191 = H[11] * S[8];
+    const real t192 = t190 + t191;
+    const real t193 = H[14] * S[9];
+    const real t194 = t192 + t193;
+    const real t195 = H[17] * S[10];
+    const real t196 = t194 + t195;
+    const real t197 = H[5] * t196;
+    const real t198 = t185 + t197;
+    const real t199 = H[2] * S[2];
+    const real t200 = H[5] * S[7];
+    const real t201 = t199 + t200;
+    const real t202 = H[8] * S[11];
+    const real t203 = t201 + t202;
+    const real t204 = H[11] * S[12];
+    const real t205 = t203 + t204;
+    const real t206 = H[14] * S[13];
+    const real t207 = t205 + t206;
+    const real t208 = H[17] * S[14];
+    const real t209 = t207 + t208;
+    const real t210 = H[8] * t209;
+    const real t211 = t198 + t210;
+    const real t212 = H[2] * S[3];
+    const real t213 = H[5] * S[8];
+    const real t214 = t212 + t213;
+    const real t215 = H[8] * S[12];
+    const real t216 = t214 + t215;
+    const real t217 = H[11] * S[15];
+    const real t218 = t216 + t217;
+    const real t219 = H[14] * S[16];
+    const real t220 = t218 + t219;
+    const real t221 = H[17] * S[17];
+    const real t222 = t220 + t221;
+    const real t223 = H[11] * t222;
+    const real t224 = t211 + t223;
+    const real t225 = H[2] * S[4];
+    const real t226 = H[5] * S[9];
+    const real t227 = t225 + t226;
+    const real t228 = H[8] * S[13];
+    const real t229 = t227 + t228;
+    const real t230 = H[11] * S[16];
+    const real t231 = t229 + t230;
+    const real t232 = H[14] * S[18];
+    const real t233 = t231 + t232;
+    const real t234 = H[17] * S[19];
+    const real t235 = t233 + t234;
+    const real t236 = H[14] * t235;
+    const real t237 = t224 + t236;
+    const real t238 = H[2] * S[5];
+    const real t239 = H[5] * S[10];
+    const real t240 = t238 + t239;
+    const real t241 = H[8] * S[14];
+    const real t242 = t240 + t241;
+    const real t243 = H[11] * S[17];
+    const real t244 = t242 + t243;
+    const real t245 = H[14] * S[19];
+    const real t246 = t244 + t245;
+    const real t247 = H[17] * S[20];
+    const real t248 = t246 + t247;
+    const real t249 = H[17] * t248;
+    const real t250 = t237 + t249;
+    const real t251 = J[2] + t250;
+    const real t252 = t251 * ((real)1 / (real)10000000000000);
+    const real t253 = H[2] * t10;
+    const real t254 = H[5] * t22;
+    const real t255 = t253 + t254;
+    const real t256 = H[8] * t35;
+    const real t257 = t255 + t256;
+    const real t258 = H[11] * t48;
+    const real t259 = t257 + t258;
+    const real t260 = H[14] * t61;
+    const real t261 = t259 + t260;
+    const real t262 = H[17] * t74;
+    const real t263 = t261 + t262;
+    const real t264 = t263 * t169;
+    const real t265 = t263 * t264;
+    const real t266 = t251 - t265;
+    const real t267 = H[2] * t89;
+    const real t268 = H[5] * t101;
+    const real t269 = t267 + t268;
+    const real t270 = H[8] * t114;
+    const real t271 = t269 + t270;
+    const real t272 = H[11] * t127;
+    const real t273 = t271 + t272;
+    const real t274 = H[14] * t140;
+    const real t275 = t273 + t274;
+    const real t276 = H[17] * t153;
+    const real t277 = t275 + t276;
+    const real t278 = t263 * t170;
+    const real t279 = t277 - t278;
+    const real t280 = 1.0 / t172;
+    const real t281 = t280 * t279;
+    const real t282 = t279 * t281;
+    const real t283 = t266 - t282;
+    const real t284 = t252 < t283;
+    if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = t170;
+    F[4] = t280;
+    F[5] = 0.0;
+    F[6] = t264;
+    F[7] = t281;
+    const real t285 = 1.0 / t283;
+    F[8] = t285;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_factor_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_factor_outputs[] = {
+    {"F", 9, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* load of a column carried across a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace of the free coordinates
+ * in  G[3][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[3] (N, N*m) the column's efforts on the free coordinates
+ * out y[3] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[3] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[4] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[7] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[10] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[13] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[16] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[5] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[8] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[11] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[14] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[17] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    const real t36 = G[0] * t11;
+    const real t37 = G[6] * t23;
+    const real t38 = t36 + t37;
+    const real t39 = G[12] * t35;
+    const real t40 = t38 + t39;
+    const real t41 = e[0] + t40;
+    const real t42 = Rc[0] * t41;
+    const real t43 = G[1] * t11;
+    const real t44 = G[7] * t23;
+    const real t45 = t43 + t44;
+    const real t46 = G[13] * t35;
+    const real t47 = t45 + t46;
+    const real t48 = e[1] + t47;
+    const real t49 = Rc[1] * t48;
+    const real t50 = t42 + t49;
+    const real t51 = G[2] * t11;
+    const real t52 = G[8] * t23;
+    const real t53 = t51 + t52;
+    const real t54 = G[14] * t35;
+    const real t55 = t53 + t54;
+    const real t56 = e[2] + t55;
+    const real t57 = Rc[2] * t56;
+    const real t58 = t50 + t57;
+    e_I[0] += t58;
+    const real t59 = Rc[3] * t41;
+    const real t60 = Rc[4] * t48;
+    const real t61 = t59 + t60;
+    const real t62 = Rc[5] * t56;
+    const real t63 = t61 + t62;
+    e_I[1] += t63;
+    const real t64 = Rc[6] * t41;
+    const real t65 = Rc[7] * t48;
+    const real t66 = t64 + t65;
+    const real t67 = Rc[8] * t56;
+    const real t68 = t66 + t67;
+    e_I[2] += t68;
+    const real t69 = G[3] * t11;
+    const real t70 = G[9] * t23;
+    const real t71 = t69 + t70;
+    const real t72 = G[15] * t35;
+    const real t73 = t71 + t72;
+    const real t74 = e[3] + t73;
+    const real t75 = Rc[0] * t74;
+    const real t76 = G[4] * t11;
+    const real t77 = G[10] * t23;
+    const real t78 = t76 + t77;
+    const real t79 = G[16] * t35;
+    const real t80 = t78 + t79;
+    const real t81 = e[4] + t80;
+    const real t82 = Rc[1] * t81;
+    const real t83 = t75 + t82;
+    const real t84 = G[5] * t11;
+    const real t85 = G[11] * t23;
+    const real t86 = t84 + t85;
+    const real t87 = G[17] * t35;
+    const real t88 = t86 + t87;
+    const real t89 = e[5] + t88;
+    const real t90 = Rc[2] * t89;
+    const real t91 = t83 + t90;
+    const real t92 = Rc[6] * r[1];
+    const real t93 = Rc[3] * r[2];
+    const real t94 = t92 - t93;
+    const real t95 = t41 * t94;
+    const real t96 = Rc[7] * r[1];
+    const real t97 = Rc[4] * r[2];
+    const real t98 = t96 - t97;
+    const real t99 = t48 * t98;
+    const real t100 = t95 + t99;
+    const real t101 = Rc[8] * r[1];
+    const real t102 = Rc[5] * r[2];
+    const real t103 = t101 - t102;
+    const real t104 = t56 * t103;
+    const real t105 = t100 + t104;
+    const real t106 = t91 + t105;
+    e_I[3] += t106;
+    const real t107 = Rc[3] * t74;
+    const real t108 = Rc[4] * t81;
+    const real t109 = t107 + t108;
+    const real t110 = Rc[5] * t89;
+    const real t111 = t109 + t110;
+    const real t112 = Rc[0] * r[2];
+    const real t113 = Rc[6] * r[0];
+    const real t114 = t112 - t113;
+    const real t115 = t41 * t114;
+    const real t116 = Rc[1] * r[2];
+    const real t117 = Rc[7] * r[0];
+    const real t118 = t116 - t117;
+    const real t119 = t48 * t118;
+    const real t120 = t115 + t119;
+    const real t121 = Rc[2] * r[2];
+    const real t122 = Rc[8] * r[0];
+    const real t123 = t121 - t122;
+    const real t124 = t56 * t123;
+    const real t125 = t120 + t124;
+    const real t126 = t111 + t125;
+    e_I[4] += t126;
+    const real t127 = Rc[6] * t74;
+    const real t128 = Rc[7] * t81;
+    const real t129 = t127 + t128;
+    const real t130 = Rc[8] * t89;
+    const real t131 = t129 + t130;
+    const real t132 = Rc[3] * r[0];
+    const real t133 = Rc[0] * r[1];
+    const real t134 = t132 - t133;
+    const real t135 = t41 * t134;
+    const real t136 = Rc[4] * r[0];
+    const real t137 = Rc[1] * r[1];
+    const real t138 = t136 - t137;
+    const real t139 = t48 * t138;
+    const real t140 = t135 + t139;
+    const real t141 = Rc[5] * r[0];
+    const real t142 = Rc[2] * r[1];
+    const real t143 = t141 - t142;
+    const real t144 = t56 * t143;
+    const real t145 = t140 + t144;
+    const real t146 = t131 + t145;
+    e_I[5] += t146;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"G", 18, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 3, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_push_outputs[] = {
+    {"y", 3, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace of the free coordinates
+ * in  F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[3][6] D^-1 H^T S
+ * in  y[3] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[3] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[3] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[4] * t2;
+    const real t4 = F[6] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[7] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[8] * t7;
+    const real t9 = F[7] * t8;
+    const real t10 = t3 - t9;
+    const real t11 = F[3] * t10;
+    const real t12 = t0 - t11;
+    const real t13 = F[6] * t8;
+    const real t14 = t12 - t13;
+    const real t15 = r[2] * delta_I[4];
+    const real t16 = r[1] * delta_I[5];
+    const real t17 = t15 - t16;
+    const real t18 = delta_I[0] + t17;
+    const real t19 = Rc[0] * t18;
+    const real t20 = r[0] * delta_I[5];
+    const real t21 = r[2] * delta_I[3];
+    const real t22 = t20 - t21;
+    const real t23 = delta_I[1] + t22;
+    const real t24 = Rc[3] * t23;
+    const real t25 = t19 + t24;
+    const real t26 = r[1] * delta_I[3];
+    const real t27 = r[0] * delta_I[4];
+    const real t28 = t26 - t27;
+    const real t29 = delta_I[2] + t28;
+    const real t30 = Rc[6] * t29;
+    const real t31 = t25 + t30;
+    const real t32 = G[0] * t31;
+    const real t33 = Rc[1] * t18;
+    const real t34 = Rc[4] * t23;
+    const real t35 = t33 + t34;
+    const real t36 = Rc[7] * t29;
+    const real t37 = t35 + t36;
+    const real t38 = G[1] * t37;
+    const real t39 = t32 + t38;
+    const real t40 = Rc[2] * t18;
+    const real t41 = Rc[5] * t23;
+    const real t42 = t40 + t41;
+    const real t43 = Rc[8] * t29;
+    const real t44 = t42 + t43;
+    const real t45 = G[2] * t44;
+    const real t46 = t39 + t45;
+    const real t47 = Rc[0] * delta_I[3];
+    const real t48 = Rc[3] * delta_I[4];
+    const real t49 = t47 + t48;
+    const real t50 = Rc[6] * delta_I[5];
+    const real t51 = t49 + t50;
+    const real t52 = G[3] * t51;
+    const real t53 = t46 + t52;
+    const real t54 = Rc[1] * delta_I[3];
+    const real t55 = Rc[4] * delta_I[4];
+    const real t56 = t54 + t55;
+    const real t57 = Rc[7] * delta_I[5];
+    const real t58 = t56 + t57;
+    const real t59 = G[4] * t58;
+    const real t60 = t53 + t59;
+    const real t61 = Rc[2] * delta_I[3];
+    const real t62 = Rc[5] * delta_I[4];
+    const real t63 = t61 + t62;
+    const real t64 = Rc[8] * delta_I[5];
+    const real t65 = t63 + t64;
+    const real t66 = G[5] * t65;
+    const real t67 = t60 + t66;
+    const real t68 = t14 - t67;
+    udot[0] = t68;
+    const real t69 = G[6] * t31;
+    const real t70 = G[7] * t37;
+    const real t71 = t69 + t70;
+    const real t72 = G[8] * t44;
+    const real t73 = t71 + t72;
+    const real t74 = G[9] * t51;
+    const real t75 = t73 + t74;
+    const real t76 = G[10] * t58;
+    const real t77 = t75 + t76;
+    const real t78 = G[11] * t65;
+    const real t79 = t77 + t78;
+    const real t80 = t10 - t79;
+    udot[1] = t80;
+    const real t81 = G[12] * t31;
+    const real t82 = G[13] * t37;
+    const real t83 = t81 + t82;
+    const real t84 = G[14] * t44;
+    const real t85 = t83 + t84;
+    const real t86 = G[15] * t51;
+    const real t87 = t85 + t86;
+    const real t88 = G[16] * t58;
+    const real t89 = t87 + t88;
+    const real t90 = G[17] * t65;
+    const real t91 = t89 + t90;
+    const real t92 = t8 - t91;
+    udot[2] = t92;
+    const real t93 = H[0] * t68;
+    const real t94 = H[1] * t80;
+    const real t95 = t93 + t94;
+    const real t96 = H[2] * t92;
+    const real t97 = t95 + t96;
+    const real t98 = t31 + t97;
+    delta[0] = t98;
+    const real t99 = H[3] * t68;
+    const real t100 = H[4] * t80;
+    const real t101 = t99 + t100;
+    const real t102 = H[5] * t92;
+    const real t103 = t101 + t102;
+    const real t104 = t37 + t103;
+    delta[1] = t104;
+    const real t105 = H[6] * t68;
+    const real t106 = H[7] * t80;
+    const real t107 = t105 + t106;
+    const real t108 = H[8] * t92;
+    const real t109 = t107 + t108;
+    const real t110 = t44 + t109;
+    delta[2] = t110;
+    const real t111 = H[9] * t68;
+    const real t112 = H[10] * t80;
+    const real t113 = t111 + t112;
+    const real t114 = H[11] * t92;
+    const real t115 = t113 + t114;
+    const real t116 = t51 + t115;
+    delta[3] = t116;
+    const real t117 = H[12] * t68;
+    const real t118 = H[13] * t80;
+    const real t119 = t117 + t118;
+    const real t120 = H[14] * t92;
+    const real t121 = t119 + t120;
+    const real t122 = t58 + t121;
+    delta[4] = t122;
+    const real t123 = H[15] * t68;
+    const real t124 = H[16] * t80;
+    const real t125 = t123 + t124;
+    const real t126 = H[17] * t92;
+    const real t127 = t125 + t126;
+    const real t128 = t65 + t127;
+    delta[5] = t128;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"F", 9, "", 0, 0},
+    {"G", 18, "", 0, 0},
+    {"y", 3, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
+    {"udot", 3, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
     {
         .name = "forward",
@@ -1978,13 +2694,49 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_guards = 3,
         .guards = mstmm_sweep_generic3_project_guards,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic3_factor,
+        .call = mstmm_sweep_generic3_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_factor_inputs,
+        .outputs = mstmm_sweep_generic3_factor_outputs,
+        .ir_hash = "400081228fc0304d0580f49dcc7d50831bdefe53d6a83ca8f6c1a15350b674e3",
+        .n_guards = 3,
+        .guards = mstmm_sweep_generic3_factor_guards,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic3_push,
+        .call = mstmm_sweep_generic3_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_push_inputs,
+        .outputs = mstmm_sweep_generic3_push_outputs,
+        .ir_hash = "2ceca546ce5e98c5fac946caeb87c84bc4b86630841235af9c58507bf15c7d15",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic3_answer,
+        .call = mstmm_sweep_generic3_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_answer_inputs,
+        .outputs = mstmm_sweep_generic3_answer_outputs,
+        .ir_hash = "0fbf825da4788bcdddbc1a20411ba97a2901bc8ad78b8226b71e6ec376a5d221",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "bfd303188d3cc1d477717995f23ad3f48c508a5f17df8abbda50ece4cd85e32f",
+    .hash = "e673c6ae697d00227dcff9379df79bec6cd6651b4f42e82c810bdb581a3a36eb",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1994,6 +2746,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic3_kernels,
 };

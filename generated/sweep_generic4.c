@@ -26,6 +26,14 @@ int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic4_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 4 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2368,6 +2376,915 @@ static const mstmm_guard mstmm_sweep_generic4_project_guards[] = {
     {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* factor of D of a hinge with 4 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][4] motion subspace of the free coordinates
+ * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[4][4] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic4_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[4] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[8] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[12] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[16] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[4] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[8] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[12] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[16] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[20] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[4] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[4] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[8] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[12] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[16] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[20] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[8] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[4] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[8] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[12] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[16] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[20] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[12] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[4] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[8] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[12] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[16] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[20] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[16] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[4] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[8] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[12] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[16] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[20] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[20] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t79 = H[1] * S[0];
+    const real t80 = H[5] * S[1];
+    const real t81 = t79 + t80;
+    const real t82 = H[9] * S[2];
+    const real t83 = t81 + t82;
+    const real t84 = H[13] * S[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[17] * S[4];
+    const real t87 = t85 + t86;
+    const real t88 = H[21] * S[5];
+    const real t89 = t87 + t88;
+    const real t90 = H[1] * t89;
+    const real t91 = H[1] * S[1];
+    const real t92 = H[5] * S[6];
+    const real t93 = t91 + t92;
+    const real t94 = H[9] * S[7];
+    const real t95 = t93 + t94;
+    const real t96 = H[13] * S[8];
+    const real t97 = t95 + t96;
+    const real t98 = H[17] * S[9];
+    const real t99 = t97 + t98;
+    const real t100 = H[21] * S[10];
+    const real t101 = t99 + t100;
+    const real t102 = H[5] * t101;
+    const real t103 = t90 + t102;
+    const real t104 = H[1] * S[2];
+    const real t105 = H[5] * S[7];
+    const real t106 = t104 + t105;
+    const real t107 = H[9] * S[11];
+    const real t108 = t106 + t107;
+    const real t109 = H[13] * S[12];
+    const real t110 = t108 + t109;
+    const real t111 = H[17] * S[13];
+    const real t112 = t110 + t111;
+    const real t113 = H[21] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = H[9] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = H[1] * S[3];
+    const real t118 = H[5] * S[8];
+    const real t119 = t117 + t118;
+    const real t120 = H[9] * S[12];
+    const real t121 = t119 + t120;
+    const real t122 = H[13] * S[15];
+    const real t123 = t121 + t122;
+    const real t124 = H[17] * S[16];
+    const real t125 = t123 + t124;
+    const real t126 = H[21] * S[17];
+    const real t127 = t125 + t126;
+    const real t128 = H[13] * t127;
+    const real t129 = t116 + t128;
+    const real t130 = H[1] * S[4];
+    const real t131 = H[5] * S[9];
+    const real t132 = t130 + t131;
+    const real t133 = H[9] * S[13];
+    const real t134 = t132 + t133;
+    const real t135 = H[13] * S[16];
+    const real t136 = t134 + t135;
+    const real t137 = H[17] * S[18];
+    const real t138 = t136 + t137;
+    const real t139 = H[21] * S[19];
+    const real t140 = t138 + t139;
+    const real t141 = H[17] * t140;
+    const real t142 = t129 + t141;
+    const real t143 = H[1] * S[5];
+    const real t144 = H[5] * S[10];
+    const real t145 = t143 + t144;
+    const real t146 = H[9] * S[14];
+    const real t147 = t145 + t146;
+    const real t148 = H[13] * S[17];
+    const real t149 = t147 + t148;
+    const real t150 = H[17] * S[19];
+    const real t151 = t149 + t150;
+    const real t152 = H[21] * S[20];
+    const real t153 = t151 + t152;
+    const real t154 = H[21] * t153;
+    const real t155 = t142 + t154;
+    const real t156 = J[1] + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[1] * t10;
+    const real t159 = H[5] * t22;
+    const real t160 = t158 + t159;
+    const real t161 = H[9] * t35;
+    const real t162 = t160 + t161;
+    const real t163 = H[13] * t48;
+    const real t164 = t162 + t163;
+    const real t165 = H[17] * t61;
+    const real t166 = t164 + t165;
+    const real t167 = H[21] * t74;
+    const real t168 = t166 + t167;
+    const real t169 = 1.0 / t77;
+    const real t170 = t168 * t169;
+    const real t171 = t168 * t170;
+    const real t172 = t156 - t171;
+    const real t173 = t157 < t172;
+    if (!(t173 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t174 = H[2] * S[0];
+    const real t175 = H[6] * S[1];
+    const real t176 = t174 + t175;
+    const real t177 = H[10] * S[2];
+    const real t178 = t176 + t177;
+    const real t179 = H[14] * S[3];
+    const real t180 = t178 + t179;
+    const real t181 = H[18] * S[4];
+    const real t182 = t180 + t181;
+    const real t183 = H[22] * S[5];
+    const real t184 = t182 + t183;
+    const real t185 = H[2] * t184;
+    const real t186 = H[2] * S[1];
+    const real t187 = H[6] * S[6];
+    const real t188 = t186 + t187;
+    const real t189 = H[10] * S[7];
+    const real t190 = t188 + t189;
+    const real t191 = H[14] * S[8];
+    const real t192 = t190 + t191;
+    const real t193 = H[18] * S[9];
+    const real t194 = t192 + t193;
+    const real t195 = H[22] * S[10];
+    const real t196 = t194 + t195;
+    const real t197 = H[6] * t196;
+    const real t198 = t185 + t197;
+    const real t199 = H[2] * S[2];
+    const real t200 = H[6] * S[7];
+    const real t201 = t199 + t200;
+    const real t202 = H[10] * S[11];
+    const real t203 = t201 + t202;
+    const real t204 = H[14] * S[12];
+    const real t205 = t203 + t204;
+    const real t206 = H[18] * S[13];
+    const real t207 = t205 + t206;
+    const real t208 = H[22] * S[14];
+    const real t209 = t207 + t208;
+    const real t210 = H[10] * t209;
+    const real t211 = t198 + t210;
+    const real t212 = H[2] * S[3];
+    const real t213 = H[6] * S[8];
+    const real t214 = t212 + t213;
+    const real t215 = H[10] * S[12];
+    const real t216 = t214 + t215;
+    const real t217 = H[14] * S[15];
+    const real t218 = t216 + t217;
+    const real t219 = H[18] * S[16];
+    const real t220 = t218 + t219;
+    const real t221 = H[22] * S[17];
+    const real t222 = t220 + t221;
+    const real t223 = H[14] * t222;
+    const real t224 = t211 + t223;
+    const real t225 = H[2] * S[4];
+    const real t226 = H[6] * S[9];
+    const real t227 = t225 + t226;
+    const real t228 = H[10] * S[13];
+    const real t229 = t227 + t228;
+    const real t230 = H[14] * S[16];
+    const real t231 = t229 + t230;
+    const real t232 = H[18] * S[18];
+    const real t233 = t231 + t232;
+    const real t234 = H[22] * S[19];
+    const real t235 = t233 + t234;
+    const real t236 = H[18] * t235;
+    const real t237 = t224 + t236;
+    const real t238 = H[2] * S[5];
+    const real t239 = H[6] * S[10];
+    const real t240 = t238 + t239;
+    const real t241 = H[10] * S[14];
+    const real t242 = t240 + t241;
+    const real t243 = H[14] * S[17];
+    const real t244 = t242 + t243;
+    const real t245 = H[18] * S[19];
+    const real t246 = t244 + t245;
+    const real t247 = H[22] * S[20];
+    const real t248 = t246 + t247;
+    const real t249 = H[22] * t248;
+    const real t250 = t237 + t249;
+    const real t251 = J[2] + t250;
+    const real t252 = t251 * ((real)1 / (real)10000000000000);
+    const real t253 = H[2] * t10;
+    const real t254 = H[6] * t22;
+    const real t255 = t253 + t254;
+    const real t256 = H[10] * t35;
+    const real t257 = t255 + t256;
+    const real t258 = H[14] * t48;
+    const real t259 = t257 + t258;
+    const real t260 = H[18] * t61;
+    const real t261 = t259 + t260;
+    const real t262 = H[22] * t74;
+    const real t263 = t261 + t262;
+    const real t264 = t263 * t169;
+    const real t265 = t263 * t264;
+    const real t266 = t251 - t265;
+    const real t267 = H[2] * t89;
+    const real t268 = H[6] * t101;
+    const real t269 = t267 + t268;
+    const real t270 = H[10] * t114;
+    const real t271 = t269 + t270;
+    const real t272 = H[14] * t127;
+    const real t273 = t271 + t272;
+    const real t274 = H[18] * t140;
+    const real t275 = t273 + t274;
+    const real t276 = H[22] * t153;
+    const real t277 = t275 + t276;
+    const real t278 = t263 * t170;
+    const real t279 = t277 - t278;
+    const real t280 = 1.0 / t172;
+    const real t281 = t280 * t279;
+    const real t282 = t279 * t281;
+    const real t283 = t266 - t282;
+    const real t284 = t252 < t283;
+    if (!(t284 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t285 = H[3] * S[0];
+    const real t286 = H[7] * S[1];
+    const real t287 = t285 + t286;
+    const real t288 = H[11] * S[2];
+    const real t289 = t287 + t288;
+    const real t290 = H[15] * S[3];
+    const real t291 = t289 + t290;
+    const real t292 = H[19] * S[4];
+    const real t293 = t291 + t292;
+    const real t294 = H[23] * S[5];
+    const real t295 = t293 + t294;
+    const real t296 = H[3] * t295;
+    const real t297 = H[3] * S[1];
+    const real t298 = H[7] * S[6];
+    const real t299 = t297 + t298;
+    const real t300 = H[11] * S[7];
+    const real t301 = t299 + t300;
+    const real t302 = H[15] * S[8];
+    const real t303 = t301 + t302;
+    const real t304 = H[19] * S[9];
+    const real t305 = t303 + t304;
+    const real t306 = H[23] * S[10];
+    const real t307 = t305 + t306;
+    const real t308 = H[7] * t307;
+    const real t309 = t296 + t308;
+    const real t310 = H[3] * S[2];
+    const real t311 = H[7] * S[7];
+    const real t312 = t310 + t311;
+    const real t313 = H[11] * S[11];
+    const real t314 = t312 + t313;
+    const real t315 = H[15] * S[12];
+    const real t316 = t314 + t315;
+    const real t317 = H[19] * S[13];
+    const real t318 = t316 + t317;
+    const real t319 = H[23] * S[14];
+    const real t320 = t318 + t319;
+    const real t321 = H[11] * t320;
+    const real t322 = t309 + t321;
+    const real t323 = H[3] * S[3];
+    const real t324 = H[7] * S[8];
+    const real t325 = t323 + t324;
+    const real t326 = H[11] * S[12];
+    const real t327 = t325 + t326;
+    const real t328 = H[15] * S[15];
+    const real t329 = t327 + t328;
+    const real t330 = H[19] * S[16];
+    const real t331 = t329 + t330;
+    const real t332 = H[23] * S[17];
+    const real t333 = t331 + t332;
+    const real t334 = H[15] * t333;
+    const real t335 = t322 + t334;
+    const real t336 = H[3] * S[4];
+    const real t337 = H[7] * S[9];
+    const real t338 = t336 + t337;
+    const real t339 = H[11] * S[13];
+    const real t340 = t338 + t339;
+    const real t341 = H[15] * S[16];
+    const real t342 = t340 + t341;
+    const real t343 = H[19] * S[18];
+    const real t344 = t342 + t343;
+    const real t345 = H[23] * S[19];
+    const real t346 = t344 + t345;
+    const real t347 = H[19] * t346;
+    const real t348 = t335 + t347;
+    const real t349 = H[3] * S[5];
+    const real t350 = H[7] * S[10];
+    const real t351 = t349 + t350;
+    const real t352 = H[11] * S[14];
+    const real t353 = t351 + t352;
+    const real t354 = H[15] * S[17];
+    const real t355 = t353 + t354;
+    const real t356 = H[19] * S[19];
+    const real t357 = t355 + t356;
+    const real t358 = H[23] * S[20];
+    const real t359 = t357 + t358;
+    const real t360 = H[23] * t359;
+    const real t361 = t348 + t360;
+    const real t362 = J[3] + t361;
+    const real t363 = t362 * ((real)1 / (real)10000000000000);
+    const real t364 = H[3] * t10;
+    const real t365 = H[7] * t22;
+    const real t366 = t364 + t365;
+    const real t367 = H[11] * t35;
+    const real t368 = t366 + t367;
+    const real t369 = H[15] * t48;
+    const real t370 = t368 + t369;
+    const real t371 = H[19] * t61;
+    const real t372 = t370 + t371;
+    const real t373 = H[23] * t74;
+    const real t374 = t372 + t373;
+    const real t375 = t374 * t169;
+    const real t376 = t374 * t375;
+    const real t377 = t362 - t376;
+    const real t378 = H[3] * t89;
+    const real t379 = H[7] * t101;
+    const real t380 = t378 + t379;
+    const real t381 = H[11] * t114;
+    const real t382 = t380 + t381;
+    const real t383 = H[15] * t127;
+    const real t384 = t382 + t383;
+    const real t385 = H[19] * t140;
+    const real t386 = t384 + t385;
+    const real t387 = H[23] * t153;
+    const real t388 = t386 + t387;
+    const real t389 = t374 * t170;
+    const real t390 = t388 - t389;
+    const real t391 = t280 * t390;
+    const real t392 = t390 * t391;
+    const real t393 = t377 - t392;
+    const real t394 = H[3] * t184;
+    const real t395 = H[7] * t196;
+    const real t396 = t394 + t395;
+    const real t397 = H[11] * t209;
+    const real t398 = t396 + t397;
+    const real t399 = H[15] * t222;
+    const real t400 = t398 + t399;
+    const real t401 = H[19] * t235;
+    const real t402 = t400 + t401;
+    const real t403 = H[23] * t248;
+    const real t404 = t402 + t403;
+    const real t405 = t374 * t264;
+    const real t406 = t404 - t405;
+    const real t407 = t281 * t390;
+    const real t408 = t406 - t407;
+    const real t409 = 1.0 / t283;
+    const real t410 = t409 * t408;
+    const real t411 = t408 * t410;
+    const real t412 = t393 - t411;
+    const real t413 = t363 < t412;
+    if (!(t413 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = 0.0;
+    F[4] = t170;
+    F[5] = t280;
+    F[6] = 0.0;
+    F[7] = 0.0;
+    F[8] = t264;
+    F[9] = t281;
+    F[10] = t409;
+    F[11] = 0.0;
+    F[12] = t375;
+    F[13] = t391;
+    F[14] = t410;
+    const real t414 = 1.0 / t412;
+    F[15] = t414;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_factor_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"J", 4, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_factor_outputs[] = {
+    {"F", 16, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
+    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* load of a column carried across a hinge with 4 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][4] motion subspace of the free coordinates
+ * in  G[4][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[4] (N, N*m) the column's efforts on the free coordinates
+ * out y[4] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[4] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[8] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[12] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[16] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[5] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[9] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[13] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[17] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[21] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[6] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[10] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[14] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[18] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[22] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    const real t36 = H[3] * e[0];
+    const real t37 = H[7] * e[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[11] * e[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[15] * e[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[19] * e[4];
+    const real t44 = t42 + t43;
+    const real t45 = H[23] * e[5];
+    const real t46 = t44 + t45;
+    const real t47 = tau[3] - t46;
+    y[3] = t47;
+    const real t48 = G[0] * t11;
+    const real t49 = G[6] * t23;
+    const real t50 = t48 + t49;
+    const real t51 = G[12] * t35;
+    const real t52 = t50 + t51;
+    const real t53 = G[18] * t47;
+    const real t54 = t52 + t53;
+    const real t55 = e[0] + t54;
+    const real t56 = Rc[0] * t55;
+    const real t57 = G[1] * t11;
+    const real t58 = G[7] * t23;
+    const real t59 = t57 + t58;
+    const real t60 = G[13] * t35;
+    const real t61 = t59 + t60;
+    const real t62 = G[19] * t47;
+    const real t63 = t61 + t62;
+    const real t64 = e[1] + t63;
+    const real t65 = Rc[1] * t64;
+    const real t66 = t56 + t65;
+    const real t67 = G[2] * t11;
+    const real t68 = G[8] * t23;
+    const real t69 = t67 + t68;
+    const real t70 = G[14] * t35;
+    const real t71 = t69 + t70;
+    const real t72 = G[20] * t47;
+    const real t73 = t71 + t72;
+    const real t74 = e[2] + t73;
+    const real t75 = Rc[2] * t74;
+    const real t76 = t66 + t75;
+    e_I[0] += t76;
+    const real t77 = Rc[3] * t55;
+    const real t78 = Rc[4] * t64;
+    const real t79 = t77 + t78;
+    const real t80 = Rc[5] * t74;
+    const real t81 = t79 + t80;
+    e_I[1] += t81;
+    const real t82 = Rc[6] * t55;
+    const real t83 = Rc[7] * t64;
+    const real t84 = t82 + t83;
+    const real t85 = Rc[8] * t74;
+    const real t86 = t84 + t85;
+    e_I[2] += t86;
+    const real t87 = G[3] * t11;
+    const real t88 = G[9] * t23;
+    const real t89 = t87 + t88;
+    const real t90 = G[15] * t35;
+    const real t91 = t89 + t90;
+    const real t92 = G[21] * t47;
+    const real t93 = t91 + t92;
+    const real t94 = e[3] + t93;
+    const real t95 = Rc[0] * t94;
+    const real t96 = G[4] * t11;
+    const real t97 = G[10] * t23;
+    const real t98 = t96 + t97;
+    const real t99 = G[16] * t35;
+    const real t100 = t98 + t99;
+    const real t101 = G[22] * t47;
+    const real t102 = t100 + t101;
+    const real t103 = e[4] + t102;
+    const real t104 = Rc[1] * t103;
+    const real t105 = t95 + t104;
+    const real t106 = G[5] * t11;
+    const real t107 = G[11] * t23;
+    const real t108 = t106 + t107;
+    const real t109 = G[17] * t35;
+    const real t110 = t108 + t109;
+    const real t111 = G[23] * t47;
+    const real t112 = t110 + t111;
+    const real t113 = e[5] + t112;
+    const real t114 = Rc[2] * t113;
+    const real t115 = t105 + t114;
+    const real t116 = Rc[6] * r[1];
+    const real t117 = Rc[3] * r[2];
+    const real t118 = t116 - t117;
+    const real t119 = t55 * t118;
+    const real t120 = Rc[7] * r[1];
+    const real t121 = Rc[4] * r[2];
+    const real t122 = t120 - t121;
+    const real t123 = t64 * t122;
+    const real t124 = t119 + t123;
+    const real t125 = Rc[8] * r[1];
+    const real t126 = Rc[5] * r[2];
+    const real t127 = t125 - t126;
+    const real t128 = t74 * t127;
+    const real t129 = t124 + t128;
+    const real t130 = t115 + t129;
+    e_I[3] += t130;
+    const real t131 = Rc[3] * t94;
+    const real t132 = Rc[4] * t103;
+    const real t133 = t131 + t132;
+    const real t134 = Rc[5] * t113;
+    const real t135 = t133 + t134;
+    const real t136 = Rc[0] * r[2];
+    const real t137 = Rc[6] * r[0];
+    const real t138 = t136 - t137;
+    const real t139 = t55 * t138;
+    const real t140 = Rc[1] * r[2];
+    const real t141 = Rc[7] * r[0];
+    const real t142 = t140 - t141;
+    const real t143 = t64 * t142;
+    const real t144 = t139 + t143;
+    const real t145 = Rc[2] * r[2];
+    const real t146 = Rc[8] * r[0];
+    const real t147 = t145 - t146;
+    const real t148 = t74 * t147;
+    const real t149 = t144 + t148;
+    const real t150 = t135 + t149;
+    e_I[4] += t150;
+    const real t151 = Rc[6] * t94;
+    const real t152 = Rc[7] * t103;
+    const real t153 = t151 + t152;
+    const real t154 = Rc[8] * t113;
+    const real t155 = t153 + t154;
+    const real t156 = Rc[3] * r[0];
+    const real t157 = Rc[0] * r[1];
+    const real t158 = t156 - t157;
+    const real t159 = t55 * t158;
+    const real t160 = Rc[4] * r[0];
+    const real t161 = Rc[1] * r[1];
+    const real t162 = t160 - t161;
+    const real t163 = t64 * t162;
+    const real t164 = t159 + t163;
+    const real t165 = Rc[5] * r[0];
+    const real t166 = Rc[2] * r[1];
+    const real t167 = t165 - t166;
+    const real t168 = t74 * t167;
+    const real t169 = t164 + t168;
+    const real t170 = t155 + t169;
+    e_I[5] += t170;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"G", 24, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 4, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_push_outputs[] = {
+    {"y", 4, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with 4 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][4] motion subspace of the free coordinates
+ * in  F[4][4] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[4][6] D^-1 H^T S
+ * in  y[4] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[4] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[4] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[5] * t2;
+    const real t4 = F[8] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[9] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[10] * t7;
+    const real t9 = F[12] * y[0];
+    const real t10 = y[3] - t9;
+    const real t11 = F[13] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = F[14] * t7;
+    const real t14 = t12 - t13;
+    const real t15 = F[15] * t14;
+    const real t16 = F[14] * t15;
+    const real t17 = t8 - t16;
+    const real t18 = F[9] * t17;
+    const real t19 = t3 - t18;
+    const real t20 = F[13] * t15;
+    const real t21 = t19 - t20;
+    const real t22 = F[4] * t21;
+    const real t23 = t0 - t22;
+    const real t24 = F[8] * t17;
+    const real t25 = t23 - t24;
+    const real t26 = F[12] * t15;
+    const real t27 = t25 - t26;
+    const real t28 = r[2] * delta_I[4];
+    const real t29 = r[1] * delta_I[5];
+    const real t30 = t28 - t29;
+    const real t31 = delta_I[0] + t30;
+    const real t32 = Rc[0] * t31;
+    const real t33 = r[0] * delta_I[5];
+    const real t34 = r[2] * delta_I[3];
+    const real t35 = t33 - t34;
+    const real t36 = delta_I[1] + t35;
+    const real t37 = Rc[3] * t36;
+    const real t38 = t32 + t37;
+    const real t39 = r[1] * delta_I[3];
+    const real t40 = r[0] * delta_I[4];
+    const real t41 = t39 - t40;
+    const real t42 = delta_I[2] + t41;
+    const real t43 = Rc[6] * t42;
+    const real t44 = t38 + t43;
+    const real t45 = G[0] * t44;
+    const real t46 = Rc[1] * t31;
+    const real t47 = Rc[4] * t36;
+    const real t48 = t46 + t47;
+    const real t49 = Rc[7] * t42;
+    const real t50 = t48 + t49;
+    const real t51 = G[1] * t50;
+    const real t52 = t45 + t51;
+    const real t53 = Rc[2] * t31;
+    const real t54 = Rc[5] * t36;
+    const real t55 = t53 + t54;
+    const real t56 = Rc[8] * t42;
+    const real t57 = t55 + t56;
+    const real t58 = G[2] * t57;
+    const real t59 = t52 + t58;
+    const real t60 = Rc[0] * delta_I[3];
+    const real t61 = Rc[3] * delta_I[4];
+    const real t62 = t60 + t61;
+    const real t63 = Rc[6] * delta_I[5];
+    const real t64 = t62 + t63;
+    const real t65 = G[3] * t64;
+    const real t66 = t59 + t65;
+    const real t67 = Rc[1] * delta_I[3];
+    const real t68 = Rc[4] * delta_I[4];
+    const real t69 = t67 + t68;
+    const real t70 = Rc[7] * delta_I[5];
+    const real t71 = t69 + t70;
+    const real t72 = G[4] * t71;
+    const real t73 = t66 + t72;
+    const real t74 = Rc[2] * delta_I[3];
+    const real t75 = Rc[5] * delta_I[4];
+    const real t76 = t74 + t75;
+    const real t77 = Rc[8] * delta_I[5];
+    const real t78 = t76 + t77;
+    const real t79 = G[5] * t78;
+    const real t80 = t73 + t79;
+    const real t81 = t27 - t80;
+    udot[0] = t81;
+    const real t82 = G[6] * t44;
+    const real t83 = G[7] * t50;
+    const real t84 = t82 + t83;
+    const real t85 = G[8] * t57;
+    const real t86 = t84 + t85;
+    const real t87 = G[9] * t64;
+    const real t88 = t86 + t87;
+    const real t89 = G[10] * t71;
+    const real t90 = t88 + t89;
+    const real t91 = G[11] * t78;
+    const real t92 = t90 + t91;
+    const real t93 = t21 - t92;
+    udot[1] = t93;
+    const real t94 = G[12] * t44;
+    const real t95 = G[13] * t50;
+    const real t96 = t94 + t95;
+    const real t97 = G[14] * t57;
+    const real t98 = t96 + t97;
+    const real t99 = G[15] * t64;
+    const real t100 = t98 + t99;
+    const real t101 = G[16] * t71;
+    const real t102 = t100 + t101;
+    const real t103 = G[17] * t78;
+    const real t104 = t102 + t103;
+    const real t105 = t17 - t104;
+    udot[2] = t105;
+    const real t106 = G[18] * t44;
+    const real t107 = G[19] * t50;
+    const real t108 = t106 + t107;
+    const real t109 = G[20] * t57;
+    const real t110 = t108 + t109;
+    const real t111 = G[21] * t64;
+    const real t112 = t110 + t111;
+    const real t113 = G[22] * t71;
+    const real t114 = t112 + t113;
+    const real t115 = G[23] * t78;
+    const real t116 = t114 + t115;
+    const real t117 = t15 - t116;
+    udot[3] = t117;
+    const real t118 = H[0] * t81;
+    const real t119 = H[1] * t93;
+    const real t120 = t118 + t119;
+    const real t121 = H[2] * t105;
+    const real t122 = t120 + t121;
+    const real t123 = H[3] * t117;
+    const real t124 = t122 + t123;
+    const real t125 = t44 + t124;
+    delta[0] = t125;
+    const real t126 = H[4] * t81;
+    const real t127 = H[5] * t93;
+    const real t128 = t126 + t127;
+    const real t129 = H[6] * t105;
+    const real t130 = t128 + t129;
+    const real t131 = H[7] * t117;
+    const real t132 = t130 + t131;
+    const real t133 = t50 + t132;
+    delta[1] = t133;
+    const real t134 = H[8] * t81;
+    const real t135 = H[9] * t93;
+    const real t136 = t134 + t135;
+    const real t137 = H[10] * t105;
+    const real t138 = t136 + t137;
+    const real t139 = H[11] * t117;
+    const real t140 = t138 + t139;
+    const real t141 = t57 + t140;
+    delta[2] = t141;
+    const real t142 = H[12] * t81;
+    const real t143 = H[13] * t93;
+    const real t144 = t142 + t143;
+    const real t145 = H[14] * t105;
+    const real t146 = t144 + t145;
+    const real t147 = H[15] * t117;
+    const real t148 = t146 + t147;
+    const real t149 = t64 + t148;
+    delta[3] = t149;
+    const real t150 = H[16] * t81;
+    const real t151 = H[17] * t93;
+    const real t152 = t150 + t151;
+    const real t153 = H[18] * t105;
+    const real t154 = t152 + t153;
+    const real t155 = H[19] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = t71 + t156;
+    delta[4] = t157;
+    const real t158 = H[20] * t81;
+    const real t159 = H[21] * t93;
+    const real t160 = t158 + t159;
+    const real t161 = H[22] * t105;
+    const real t162 = t160 + t161;
+    const real t163 = H[23] * t117;
+    const real t164 = t162 + t163;
+    const real t165 = t78 + t164;
+    delta[5] = t165;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"F", 16, "", 0, 0},
+    {"G", 24, "", 0, 0},
+    {"y", 4, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
+    {"udot", 4, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
     {
         .name = "forward",
@@ -2429,13 +3346,49 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_guards = 4,
         .guards = mstmm_sweep_generic4_project_guards,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic4_factor,
+        .call = mstmm_sweep_generic4_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_factor_inputs,
+        .outputs = mstmm_sweep_generic4_factor_outputs,
+        .ir_hash = "3128f1178387d1226770cbf3277f156c80b0c8230f4d3fff5b271ad14ded8bb3",
+        .n_guards = 4,
+        .guards = mstmm_sweep_generic4_factor_guards,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic4_push,
+        .call = mstmm_sweep_generic4_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic4_push_inputs,
+        .outputs = mstmm_sweep_generic4_push_outputs,
+        .ir_hash = "eeb80af44702dd3d6a4b2c6e17bf458a7d93bfba49148a7662776e3bd6cd881d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic4_answer,
+        .call = mstmm_sweep_generic4_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic4_answer_inputs,
+        .outputs = mstmm_sweep_generic4_answer_outputs,
+        .ir_hash = "175870d92e9ceb8da005ff86d5069fd699e2a7a8493dc7a946c3f35ac6f9a28f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "6a2683b59d885f9f58c88f75e87a155c505d7ee3611789eb85b894971893abf4",
+    .hash = "53d1448a539d47d7fcc9ee50c55ebc72adced2547cb83c2a4307b3e8feaec30c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2445,6 +3398,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic4_kernels,
 };

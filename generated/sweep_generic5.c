@@ -26,6 +26,14 @@ int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
+int mstmm_sweep_generic5_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 /* bias motion behind a hinge with 5 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2891,6 +2899,1142 @@ static const mstmm_guard mstmm_sweep_generic5_project_guards[] = {
     {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
 };
 
+/* factor of D of a hinge with 5 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][5] motion subspace of the free coordinates
+ * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  S[21] f = S a + e of everything outboard, at P
+ * out F[5][5] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ */
+int mstmm_sweep_generic5_factor(const real *restrict H, const real *restrict J,
+    const real *restrict S, real *restrict F)
+{
+    const real t0 = H[0] * S[0];
+    const real t1 = H[5] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[10] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * S[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[20] * S[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[25] * S[5];
+    const real t10 = t8 + t9;
+    const real t11 = H[0] * t10;
+    const real t12 = H[0] * S[1];
+    const real t13 = H[5] * S[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[10] * S[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[15] * S[8];
+    const real t18 = t16 + t17;
+    const real t19 = H[20] * S[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[25] * S[10];
+    const real t22 = t20 + t21;
+    const real t23 = H[5] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = H[0] * S[2];
+    const real t26 = H[5] * S[7];
+    const real t27 = t25 + t26;
+    const real t28 = H[10] * S[11];
+    const real t29 = t27 + t28;
+    const real t30 = H[15] * S[12];
+    const real t31 = t29 + t30;
+    const real t32 = H[20] * S[13];
+    const real t33 = t31 + t32;
+    const real t34 = H[25] * S[14];
+    const real t35 = t33 + t34;
+    const real t36 = H[10] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = H[0] * S[3];
+    const real t39 = H[5] * S[8];
+    const real t40 = t38 + t39;
+    const real t41 = H[10] * S[12];
+    const real t42 = t40 + t41;
+    const real t43 = H[15] * S[15];
+    const real t44 = t42 + t43;
+    const real t45 = H[20] * S[16];
+    const real t46 = t44 + t45;
+    const real t47 = H[25] * S[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[15] * t48;
+    const real t50 = t37 + t49;
+    const real t51 = H[0] * S[4];
+    const real t52 = H[5] * S[9];
+    const real t53 = t51 + t52;
+    const real t54 = H[10] * S[13];
+    const real t55 = t53 + t54;
+    const real t56 = H[15] * S[16];
+    const real t57 = t55 + t56;
+    const real t58 = H[20] * S[18];
+    const real t59 = t57 + t58;
+    const real t60 = H[25] * S[19];
+    const real t61 = t59 + t60;
+    const real t62 = H[20] * t61;
+    const real t63 = t50 + t62;
+    const real t64 = H[0] * S[5];
+    const real t65 = H[5] * S[10];
+    const real t66 = t64 + t65;
+    const real t67 = H[10] * S[14];
+    const real t68 = t66 + t67;
+    const real t69 = H[15] * S[17];
+    const real t70 = t68 + t69;
+    const real t71 = H[20] * S[19];
+    const real t72 = t70 + t71;
+    const real t73 = H[25] * S[20];
+    const real t74 = t72 + t73;
+    const real t75 = H[25] * t74;
+    const real t76 = t63 + t75;
+    const real t77 = J[0] + t76;
+    const real t78 = 0.0 < t77;
+    if (!(t78 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t79 = H[1] * S[0];
+    const real t80 = H[6] * S[1];
+    const real t81 = t79 + t80;
+    const real t82 = H[11] * S[2];
+    const real t83 = t81 + t82;
+    const real t84 = H[16] * S[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[21] * S[4];
+    const real t87 = t85 + t86;
+    const real t88 = H[26] * S[5];
+    const real t89 = t87 + t88;
+    const real t90 = H[1] * t89;
+    const real t91 = H[1] * S[1];
+    const real t92 = H[6] * S[6];
+    const real t93 = t91 + t92;
+    const real t94 = H[11] * S[7];
+    const real t95 = t93 + t94;
+    const real t96 = H[16] * S[8];
+    const real t97 = t95 + t96;
+    const real t98 = H[21] * S[9];
+    const real t99 = t97 + t98;
+    const real t100 = H[26] * S[10];
+    const real t101 = t99 + t100;
+    const real t102 = H[6] * t101;
+    const real t103 = t90 + t102;
+    const real t104 = H[1] * S[2];
+    const real t105 = H[6] * S[7];
+    const real t106 = t104 + t105;
+    const real t107 = H[11] * S[11];
+    const real t108 = t106 + t107;
+    const real t109 = H[16] * S[12];
+    const real t110 = t108 + t109;
+    const real t111 = H[21] * S[13];
+    const real t112 = t110 + t111;
+    const real t113 = H[26] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = H[11] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = H[1] * S[3];
+    const real t118 = H[6] * S[8];
+    const real t119 = t117 + t118;
+    const real t120 = H[11] * S[12];
+    const real t121 = t119 + t120;
+    const real t122 = H[16] * S[15];
+    const real t123 = t121 + t122;
+    const real t124 = H[21] * S[16];
+    const real t125 = t123 + t124;
+    const real t126 = H[26] * S[17];
+    const real t127 = t125 + t126;
+    const real t128 = H[16] * t127;
+    const real t129 = t116 + t128;
+    const real t130 = H[1] * S[4];
+    const real t131 = H[6] * S[9];
+    const real t132 = t130 + t131;
+    const real t133 = H[11] * S[13];
+    const real t134 = t132 + t133;
+    const real t135 = H[16] * S[16];
+    const real t136 = t134 + t135;
+    const real t137 = H[21] * S[18];
+    const real t138 = t136 + t137;
+    const real t139 = H[26] * S[19];
+    const real t140 = t138 + t139;
+    const real t141 = H[21] * t140;
+    const real t142 = t129 + t141;
+    const real t143 = H[1] * S[5];
+    const real t144 = H[6] * S[10];
+    const real t145 = t143 + t144;
+    const real t146 = H[11] * S[14];
+    const real t147 = t145 + t146;
+    const real t148 = H[16] * S[17];
+    const real t149 = t147 + t148;
+    const real t150 = H[21] * S[19];
+    const real t151 = t149 + t150;
+    const real t152 = H[26] * S[20];
+    const real t153 = t151 + t152;
+    const real t154 = H[26] * t153;
+    const real t155 = t142 + t154;
+    const real t156 = J[1] + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[1] * t10;
+    const real t159 = H[6] * t22;
+    const real t160 = t158 + t159;
+    const real t161 = H[11] * t35;
+    const real t162 = t160 + t161;
+    const real t163 = H[16] * t48;
+    const real t164 = t162 + t163;
+    const real t165 = H[21] * t61;
+    const real t166 = t164 + t165;
+    const real t167 = H[26] * t74;
+    const real t168 = t166 + t167;
+    const real t169 = 1.0 / t77;
+    const real t170 = t168 * t169;
+    const real t171 = t168 * t170;
+    const real t172 = t156 - t171;
+    const real t173 = t157 < t172;
+    if (!(t173 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t174 = H[2] * S[0];
+    const real t175 = H[7] * S[1];
+    const real t176 = t174 + t175;
+    const real t177 = H[12] * S[2];
+    const real t178 = t176 + t177;
+    const real t179 = H[17] * S[3];
+    const real t180 = t178 + t179;
+    const real t181 = H[22] * S[4];
+    const real t182 = t180 + t181;
+    const real t183 = H[27] * S[5];
+    const real t184 = t182 + t183;
+    const real t185 = H[2] * t184;
+    const real t186 = H[2] * S[1];
+    const real t187 = H[7] * S[6];
+    const real t188 = t186 + t187;
+    const real t189 = H[12] * S[7];
+    const real t190 = t188 + t189;
+    const real t191 = H[17] * S[8];
+    const real t192 = t190 + t191;
+    const real t193 = H[22] * S[9];
+    const real t194 = t192 + t193;
+    const real t195 = H[27] * S[10];
+    const real t196 = t194 + t195;
+    const real t197 = H[7] * t196;
+    const real t198 = t185 + t197;
+    const real t199 = H[2] * S[2];
+    const real t200 = H[7] * S[7];
+    const real t201 = t199 + t200;
+    const real t202 = H[12] * S[11];
+    const real t203 = t201 + t202;
+    const real t204 = H[17] * S[12];
+    const real t205 = t203 + t204;
+    const real t206 = H[22] * S[13];
+    const real t207 = t205 + t206;
+    const real t208 = H[27] * S[14];
+    const real t209 = t207 + t208;
+    const real t210 = H[12] * t209;
+    const real t211 = t198 + t210;
+    const real t212 = H[2] * S[3];
+    const real t213 = H[7] * S[8];
+    const real t214 = t212 + t213;
+    const real t215 = H[12] * S[12];
+    const real t216 = t214 + t215;
+    const real t217 = H[17] * S[15];
+    const real t218 = t216 + t217;
+    const real t219 = H[22] * S[16];
+    const real t220 = t218 + t219;
+    const real t221 = H[27] * S[17];
+    const real t222 = t220 + t221;
+    const real t223 = H[17] * t222;
+    const real t224 = t211 + t223;
+    const real t225 = H[2] * S[4];
+    const real t226 = H[7] * S[9];
+    const real t227 = t225 + t226;
+    const real t228 = H[12] * S[13];
+    const real t229 = t227 + t228;
+    const real t230 = H[17] * S[16];
+    const real t231 = t229 + t230;
+    const real t232 = H[22] * S[18];
+    const real t233 = t231 + t232;
+    const real t234 = H[27] * S[19];
+    const real t235 = t233 + t234;
+    const real t236 = H[22] * t235;
+    const real t237 = t224 + t236;
+    const real t238 = H[2] * S[5];
+    const real t239 = H[7] * S[10];
+    const real t240 = t238 + t239;
+    const real t241 = H[12] * S[14];
+    const real t242 = t240 + t241;
+    const real t243 = H[17] * S[17];
+    const real t244 = t242 + t243;
+    const real t245 = H[22] * S[19];
+    const real t246 = t244 + t245;
+    const real t247 = H[27] * S[20];
+    const real t248 = t246 + t247;
+    const real t249 = H[27] * t248;
+    const real t250 = t237 + t249;
+    const real t251 = J[2] + t250;
+    const real t252 = t251 * ((real)1 / (real)10000000000000);
+    const real t253 = H[2] * t10;
+    const real t254 = H[7] * t22;
+    const real t255 = t253 + t254;
+    const real t256 = H[12] * t35;
+    const real t257 = t255 + t256;
+    const real t258 = H[17] * t48;
+    const real t259 = t257 + t258;
+    const real t260 = H[22] * t61;
+    const real t261 = t259 + t260;
+    const real t262 = H[27] * t74;
+    const real t263 = t261 + t262;
+    const real t264 = t263 * t169;
+    const real t265 = t263 * t264;
+    const real t266 = t251 - t265;
+    const real t267 = H[2] * t89;
+    const real t268 = H[7] * t101;
+    const real t269 = t267 + t268;
+    const real t270 = H[12] * t114;
+    const real t271 = t269 + t270;
+    const real t272 = H[17] * t127;
+    const real t273 = t271 + t272;
+    const real t274 = H[22] * t140;
+    const real t275 = t273 + t274;
+    const real t276 = H[27] * t153;
+    const real t277 = t275 + t276;
+    const real t278 = t263 * t170;
+    const real t279 = t277 - t278;
+    const real t280 = 1.0 / t172;
+    const real t281 = t280 * t279;
+    const real t282 = t279 * t281;
+    const real t283 = t266 - t282;
+    const real t284 = t252 < t283;
+    if (!(t284 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t285 = H[3] * S[0];
+    const real t286 = H[8] * S[1];
+    const real t287 = t285 + t286;
+    const real t288 = H[13] * S[2];
+    const real t289 = t287 + t288;
+    const real t290 = H[18] * S[3];
+    const real t291 = t289 + t290;
+    const real t292 = H[23] * S[4];
+    const real t293 = t291 + t292;
+    const real t294 = H[28] * S[5];
+    const real t295 = t293 + t294;
+    const real t296 = H[3] * t295;
+    const real t297 = H[3] * S[1];
+    const real t298 = H[8] * S[6];
+    const real t299 = t297 + t298;
+    const real t300 = H[13] * S[7];
+    const real t301 = t299 + t300;
+    const real t302 = H[18] * S[8];
+    const real t303 = t301 + t302;
+    const real t304 = H[23] * S[9];
+    const real t305 = t303 + t304;
+    const real t306 = H[28] * S[10];
+    const real t307 = t305 + t306;
+    const real t308 = H[8] * t307;
+    const real t309 = t296 + t308;
+    const real t310 = H[3] * S[2];
+    const real t311 = H[8] * S[7];
+    const real t312 = t310 + t311;
+    const real t313 = H[13] * S[11];
+    const real t314 = t312 + t313;
+    const real t315 = H[18] * S[12];
+    const real t316 = t314 + t315;
+    const real t317 = H[23] * S[13];
+    const real t318 = t316 + t317;
+    const real t319 = H[28] * S[14];
+    const real t320 = t318 + t319;
+    const real t321 = H[13] * t320;
+    const real t322 = t309 + t321;
+    const real t323 = H[3] * S[3];
+    const real t324 = H[8] * S[8];
+    const real t325 = t323 + t324;
+    const real t326 = H[13] * S[12];
+    const real t327 = t325 + t326;
+    const real t328 = H[18] * S[15];
+    const real t329 = t327 + t328;
+    const real t330 = H[23] * S[16];
+    const real t331 = t329 + t330;
+    const real t332 = H[28] * S[17];
+    const real t333 = t331 + t332;
+    const real t334 = H[18] * t333;
+    const real t335 = t322 + t334;
+    const real t336 = H[3] * S[4];
+    const real t337 = H[8] * S[9];
+    const real t338 = t336 + t337;
+    const real t339 = H[13] * S[13];
+    const real t340 = t338 + t339;
+    const real t341 = H[18] * S[16];
+    const real t342 = t340 + t341;
+    const real t343 = H[23] * S[18];
+    const real t344 = t342 + t343;
+    const real t345 = H[28] * S[19];
+    const real t346 = t344 + t345;
+    const real t347 = H[23] * t346;
+    const real t348 = t335 + t347;
+    const real t349 = H[3] * S[5];
+    const real t350 = H[8] * S[10];
+    const real t351 = t349 + t350;
+    const real t352 = H[13] * S[14];
+    const real t353 = t351 + t352;
+    const real t354 = H[18] * S[17];
+    const real t355 = t353 + t354;
+    const real t356 = H[23] * S[19];
+    const real t357 = t355 + t356;
+    const real t358 = H[28] * S[20];
+    const real t359 = t357 + t358;
+    const real t360 = H[28] * t359;
+    const real t361 = t348 + t360;
+    const real t362 = J[3] + t361;
+    const real t363 = t362 * ((real)1 / (real)10000000000000);
+    const real t364 = H[3] * t10;
+    const real t365 = H[8] * t22;
+    const real t366 = t364 + t365;
+    const real t367 = H[13] * t35;
+    const real t368 = t366 + t367;
+    const real t369 = H[18] * t48;
+    const real t370 = t368 + t369;
+    const real t371 = H[23] * t61;
+    const real t372 = t370 + t371;
+    const real t373 = H[28] * t74;
+    const real t374 = t372 + t373;
+    const real t375 = t374 * t169;
+    const real t376 = t374 * t375;
+    const real t377 = t362 - t376;
+    const real t378 = H[3] * t89;
+    const real t379 = H[8] * t101;
+    const real t380 = t378 + t379;
+    const real t381 = H[13] * t114;
+    const real t382 = t380 + t381;
+    const real t383 = H[18] * t127;
+    const real t384 = t382 + t383;
+    const real t385 = H[23] * t140;
+    const real t386 = t384 + t385;
+    const real t387 = H[28] * t153;
+    const real t388 = t386 + t387;
+    const real t389 = t374 * t170;
+    const real t390 = t388 - t389;
+    const real t391 = t280 * t390;
+    const real t392 = t390 * t391;
+    const real t393 = t377 - t392;
+    const real t394 = H[3] * t184;
+    const real t395 = H[8] * t196;
+    const real t396 = t394 + t395;
+    const real t397 = H[13] * t209;
+    const real t398 = t396 + t397;
+    const real t399 = H[18] * t222;
+    const real t400 = t398 + t399;
+    const real t401 = H[23] * t235;
+    const real t402 = t400 + t401;
+    const real t403 = H[28] * t248;
+    const real t404 = t402 + t403;
+    const real t405 = t374 * t264;
+    const real t406 = t404 - t405;
+    const real t407 = t281 * t390;
+    const real t408 = t406 - t407;
+    const real t409 = 1.0 / t283;
+    const real t410 = t409 * t408;
+    const real t411 = t408 * t410;
+    const real t412 = t393 - t411;
+    const real t413 = t363 < t412;
+    if (!(t413 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t414 = H[4] * S[0];
+    const real t415 = H[9] * S[1];
+    const real t416 = t414 + t415;
+    const real t417 = H[14] * S[2];
+    const real t418 = t416 + t417;
+    const real t419 = H[19] * S[3];
+    const real t420 = t418 + t419;
+    const real t421 = H[24] * S[4];
+    const real t422 = t420 + t421;
+    const real t423 = H[29] * S[5];
+    const real t424 = t422 + t423;
+    const real t425 = H[4] * t424;
+    const real t426 = H[4] * S[1];
+    const real t427 = H[9] * S[6];
+    const real t428 = t426 + t427;
+    const real t429 = H[14] * S[7];
+    const real t430 = t428 + t429;
+    const real t431 = H[19] * S[8];
+    const real t432 = t430 + t431;
+    const real t433 = H[24] * S[9];
+    const real t434 = t432 + t433;
+    const real t435 = H[29] * S[10];
+    const real t436 = t434 + t435;
+    const real t437 = H[9] * t436;
+    const real t438 = t425 + t437;
+    const real t439 = H[4] * S[2];
+    const real t440 = H[9] * S[7];
+    const real t441 = t439 + t440;
+    const real t442 = H[14] * S[11];
+    const real t443 = t441 + t442;
+    const real t444 = H[19] * S[12];
+    const real t445 = t443 + t444;
+    const real t446 = H[24] * S[13];
+    const real t447 = t445 + t446;
+    const real t448 = H[29] * S[14];
+    const real t449 = t447 + t448;
+    const real t450 = H[14] * t449;
+    const real t451 = t438 + t450;
+    const real t452 = H[4] * S[3];
+    const real t453 = H[9] * S[8];
+    const real t454 = t452 + t453;
+    const real t455 = H[14] * S[12];
+    const real t456 = t454 + t455;
+    const real t457 = H[19] * S[15];
+    const real t458 = t456 + t457;
+    const real t459 = H[24] * S[16];
+    const real t460 = t458 + t459;
+    const real t461 = H[29] * S[17];
+    const real t462 = t460 + t461;
+    const real t463 = H[19] * t462;
+    const real t464 = t451 + t463;
+    const real t465 = H[4] * S[4];
+    const real t466 = H[9] * S[9];
+    const real t467 = t465 + t466;
+    const real t468 = H[14] * S[13];
+    const real t469 = t467 + t468;
+    const real t470 = H[19] * S[16];
+    const real t471 = t469 + t470;
+    const real t472 = H[24] * S[18];
+    const real t473 = t471 + t472;
+    const real t474 = H[29] * S[19];
+    const real t475 = t473 + t474;
+    const real t476 = H[24] * t475;
+    const real t477 = t464 + t476;
+    const real t478 = H[4] * S[5];
+    const real t479 = H[9] * S[10];
+    const real t480 = t478 + t479;
+    const real t481 = H[14] * S[14];
+    const real t482 = t480 + t481;
+    const real t483 = H[19] * S[17];
+    const real t484 = t482 + t483;
+    const real t485 = H[24] * S[19];
+    const real t486 = t484 + t485;
+    const real t487 = H[29] * S[20];
+    const real t488 = t486 + t487;
+    const real t489 = H[29] * t488;
+    const real t490 = t477 + t489;
+    const real t491 = J[4] + t490;
+    const real t492 = t491 * ((real)1 / (real)10000000000000);
+    const real t493 = H[4] * t10;
+    const real t494 = H[9] * t22;
+    const real t495 = t493 + t494;
+    const real t496 = H[14] * t35;
+    const real t497 = t495 + t496;
+    const real t498 = H[19] * t48;
+    const real t499 = t497 + t498;
+    const real t500 = H[24] * t61;
+    const real t501 = t499 + t500;
+    const real t502 = H[29] * t74;
+    const real t503 = t501 + t502;
+    const real t504 = t503 * t169;
+    const real t505 = t503 * t504;
+    const real t506 = t491 - t505;
+    const real t507 = H[4] * t89;
+    const real t508 = H[9] * t101;
+    const real t509 = t507 + t508;
+    const real t510 = H[14] * t114;
+    const real t511 = t509 + t510;
+    const real t512 = H[19] * t127;
+    const real t513 = t511 + t512;
+    const real t514 = H[24] * t140;
+    const real t515 = t513 + t514;
+    const real t516 = H[29] * t153;
+    const real t517 = t515 + t516;
+    const real t518 = t503 * t170;
+    const real t519 = t517 - t518;
+    const real t520 = t280 * t519;
+    const real t521 = t519 * t520;
+    const real t522 = t506 - t521;
+    const real t523 = H[4] * t184;
+    const real t524 = H[9] * t196;
+    const real t525 = t523 + t524;
+    const real t526 = H[14] * t209;
+    const real t527 = t525 + t526;
+    const real t528 = H[19] * t222;
+    const real t529 = t527 + t528;
+    const real t530 = H[24] * t235;
+    const real t531 = t529 + t530;
+    const real t532 = H[29] * t248;
+    const real t533 = t531 + t532;
+    const real t534 = t503 * t264;
+    const real t535 = t533 - t534;
+    const real t536 = t281 * t519;
+    const real t537 = t535 - t536;
+    const real t538 = t409 * t537;
+    const real t539 = t537 * t538;
+    const real t540 = t522 - t539;
+    const real t541 = H[4] * t295;
+    const real t542 = H[9] * t307;
+    const real t543 = t541 + t542;
+    const real t544 = H[14] * t320;
+    const real t545 = t543 + t544;
+    const real t546 = H[19] * t333;
+    const real t547 = t545 + t546;
+    const real t548 = H[24] * t346;
+    const real t549 = t547 + t548;
+    const real t550 = H[29] * t359;
+    const real t551 = t549 + t550;
+    const real t552 = t503 * t375;
+    const real t553 = t551 - t552;
+    const real t554 = t391 * t519;
+    const real t555 = t553 - t554;
+    const real t556 = t410 * t537;
+    const real t557 = t555 - t556;
+    const real t558 = 1.0 / t412;
+    const real t559 = t558 * t557;
+    const real t560 = t557 * t559;
+    const real t561 = t540 - t560;
+    const real t562 = t492 < t561;
+    if (!(t562 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+    F[0] = t169;
+    F[1] = 0.0;
+    F[2] = 0.0;
+    F[3] = 0.0;
+    F[4] = 0.0;
+    F[5] = t170;
+    F[6] = t280;
+    F[7] = 0.0;
+    F[8] = 0.0;
+    F[9] = 0.0;
+    F[10] = t264;
+    F[11] = t281;
+    F[12] = t409;
+    F[13] = 0.0;
+    F[14] = 0.0;
+    F[15] = t375;
+    F[16] = t391;
+    F[17] = t410;
+    F[18] = t558;
+    F[19] = 0.0;
+    F[20] = t504;
+    F[21] = t520;
+    F[22] = t538;
+    F[23] = t559;
+    const real t563 = 1.0 / t561;
+    F[24] = t563;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_factor_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_factor(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_factor_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"J", 5, "kg*m2 or kg", 0, 0},
+    {"S", 21, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_factor_outputs[] = {
+    {"F", 25, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
+    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* load of a column carried across a hinge with 5 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][5] motion subspace of the free coordinates
+ * in  G[5][6] D^-1 H^T S
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[5] (N, N*m) the column's efforts on the free coordinates
+ * out y[5] (N, N*m) tau - H^T e
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict G, const real *restrict e,
+    const real *restrict tau, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[5] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[10] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[20] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[25] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[6] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[11] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[16] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[21] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[26] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[7] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[12] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[17] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[22] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[27] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    const real t36 = H[3] * e[0];
+    const real t37 = H[8] * e[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[13] * e[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[18] * e[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[23] * e[4];
+    const real t44 = t42 + t43;
+    const real t45 = H[28] * e[5];
+    const real t46 = t44 + t45;
+    const real t47 = tau[3] - t46;
+    y[3] = t47;
+    const real t48 = H[4] * e[0];
+    const real t49 = H[9] * e[1];
+    const real t50 = t48 + t49;
+    const real t51 = H[14] * e[2];
+    const real t52 = t50 + t51;
+    const real t53 = H[19] * e[3];
+    const real t54 = t52 + t53;
+    const real t55 = H[24] * e[4];
+    const real t56 = t54 + t55;
+    const real t57 = H[29] * e[5];
+    const real t58 = t56 + t57;
+    const real t59 = tau[4] - t58;
+    y[4] = t59;
+    const real t60 = G[0] * t11;
+    const real t61 = G[6] * t23;
+    const real t62 = t60 + t61;
+    const real t63 = G[12] * t35;
+    const real t64 = t62 + t63;
+    const real t65 = G[18] * t47;
+    const real t66 = t64 + t65;
+    const real t67 = G[24] * t59;
+    const real t68 = t66 + t67;
+    const real t69 = e[0] + t68;
+    const real t70 = Rc[0] * t69;
+    const real t71 = G[1] * t11;
+    const real t72 = G[7] * t23;
+    const real t73 = t71 + t72;
+    const real t74 = G[13] * t35;
+    const real t75 = t73 + t74;
+    const real t76 = G[19] * t47;
+    const real t77 = t75 + t76;
+    const real t78 = G[25] * t59;
+    const real t79 = t77 + t78;
+    const real t80 = e[1] + t79;
+    const real t81 = Rc[1] * t80;
+    const real t82 = t70 + t81;
+    const real t83 = G[2] * t11;
+    const real t84 = G[8] * t23;
+    const real t85 = t83 + t84;
+    const real t86 = G[14] * t35;
+    const real t87 = t85 + t86;
+    const real t88 = G[20] * t47;
+    const real t89 = t87 + t88;
+    const real t90 = G[26] * t59;
+    const real t91 = t89 + t90;
+    const real t92 = e[2] + t91;
+    const real t93 = Rc[2] * t92;
+    const real t94 = t82 + t93;
+    e_I[0] += t94;
+    const real t95 = Rc[3] * t69;
+    const real t96 = Rc[4] * t80;
+    const real t97 = t95 + t96;
+    const real t98 = Rc[5] * t92;
+    const real t99 = t97 + t98;
+    e_I[1] += t99;
+    const real t100 = Rc[6] * t69;
+    const real t101 = Rc[7] * t80;
+    const real t102 = t100 + t101;
+    const real t103 = Rc[8] * t92;
+    const real t104 = t102 + t103;
+    e_I[2] += t104;
+    const real t105 = G[3] * t11;
+    const real t106 = G[9] * t23;
+    const real t107 = t105 + t106;
+    const real t108 = G[15] * t35;
+    const real t109 = t107 + t108;
+    const real t110 = G[21] * t47;
+    const real t111 = t109 + t110;
+    const real t112 = G[27] * t59;
+    const real t113 = t111 + t112;
+    const real t114 = e[3] + t113;
+    const real t115 = Rc[0] * t114;
+    const real t116 = G[4] * t11;
+    const real t117 = G[10] * t23;
+    const real t118 = t116 + t117;
+    const real t119 = G[16] * t35;
+    const real t120 = t118 + t119;
+    const real t121 = G[22] * t47;
+    const real t122 = t120 + t121;
+    const real t123 = G[28] * t59;
+    const real t124 = t122 + t123;
+    const real t125 = e[4] + t124;
+    const real t126 = Rc[1] * t125;
+    const real t127 = t115 + t126;
+    const real t128 = G[5] * t11;
+    const real t129 = G[11] * t23;
+    const real t130 = t128 + t129;
+    const real t131 = G[17] * t35;
+    const real t132 = t130 + t131;
+    const real t133 = G[23] * t47;
+    const real t134 = t132 + t133;
+    const real t135 = G[29] * t59;
+    const real t136 = t134 + t135;
+    const real t137 = e[5] + t136;
+    const real t138 = Rc[2] * t137;
+    const real t139 = t127 + t138;
+    const real t140 = Rc[6] * r[1];
+    const real t141 = Rc[3] * r[2];
+    const real t142 = t140 - t141;
+    const real t143 = t69 * t142;
+    const real t144 = Rc[7] * r[1];
+    const real t145 = Rc[4] * r[2];
+    const real t146 = t144 - t145;
+    const real t147 = t80 * t146;
+    const real t148 = t143 + t147;
+    const real t149 = Rc[8] * r[1];
+    const real t150 = Rc[5] * r[2];
+    const real t151 = t149 - t150;
+    const real t152 = t92 * t151;
+    const real t153 = t148 + t152;
+    const real t154 = t139 + t153;
+    e_I[3] += t154;
+    const real t155 = Rc[3] * t114;
+    const real t156 = Rc[4] * t125;
+    const real t157 = t155 + t156;
+    const real t158 = Rc[5] * t137;
+    const real t159 = t157 + t158;
+    const real t160 = Rc[0] * r[2];
+    const real t161 = Rc[6] * r[0];
+    const real t162 = t160 - t161;
+    const real t163 = t69 * t162;
+    const real t164 = Rc[1] * r[2];
+    const real t165 = Rc[7] * r[0];
+    const real t166 = t164 - t165;
+    const real t167 = t80 * t166;
+    const real t168 = t163 + t167;
+    const real t169 = Rc[2] * r[2];
+    const real t170 = Rc[8] * r[0];
+    const real t171 = t169 - t170;
+    const real t172 = t92 * t171;
+    const real t173 = t168 + t172;
+    const real t174 = t159 + t173;
+    e_I[4] += t174;
+    const real t175 = Rc[6] * t114;
+    const real t176 = Rc[7] * t125;
+    const real t177 = t175 + t176;
+    const real t178 = Rc[8] * t137;
+    const real t179 = t177 + t178;
+    const real t180 = Rc[3] * r[0];
+    const real t181 = Rc[0] * r[1];
+    const real t182 = t180 - t181;
+    const real t183 = t69 * t182;
+    const real t184 = Rc[4] * r[0];
+    const real t185 = Rc[1] * r[1];
+    const real t186 = t184 - t185;
+    const real t187 = t80 * t186;
+    const real t188 = t183 + t187;
+    const real t189 = Rc[5] * r[0];
+    const real t190 = Rc[2] * r[1];
+    const real t191 = t189 - t190;
+    const real t192 = t92 * t191;
+    const real t193 = t188 + t192;
+    const real t194 = t179 + t193;
+    e_I[5] += t194;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"G", 30, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 5, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_push_outputs[] = {
+    {"y", 5, "N, N*m", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* accelerations that answer a column, across a hinge with 5 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][5] motion subspace of the free coordinates
+ * in  F[5][5] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  G[5][6] D^-1 H^T S
+ * in  y[5] (N, N*m) tau - H^T e
+ * in  delta_I[6] deviation of the parent's acceleration
+ * out udot[5] accelerations of the free coordinates
+ * out delta[6] deviation of the body's acceleration, at P
+ */
+int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[5] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[6] * t2;
+    const real t4 = F[10] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[11] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[12] * t7;
+    const real t9 = F[15] * y[0];
+    const real t10 = y[3] - t9;
+    const real t11 = F[16] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = F[17] * t7;
+    const real t14 = t12 - t13;
+    const real t15 = F[18] * t14;
+    const real t16 = F[20] * y[0];
+    const real t17 = y[4] - t16;
+    const real t18 = F[21] * t2;
+    const real t19 = t17 - t18;
+    const real t20 = F[22] * t7;
+    const real t21 = t19 - t20;
+    const real t22 = F[23] * t14;
+    const real t23 = t21 - t22;
+    const real t24 = F[24] * t23;
+    const real t25 = F[23] * t24;
+    const real t26 = t15 - t25;
+    const real t27 = F[17] * t26;
+    const real t28 = t8 - t27;
+    const real t29 = F[22] * t24;
+    const real t30 = t28 - t29;
+    const real t31 = F[11] * t30;
+    const real t32 = t3 - t31;
+    const real t33 = F[16] * t26;
+    const real t34 = t32 - t33;
+    const real t35 = F[21] * t24;
+    const real t36 = t34 - t35;
+    const real t37 = F[5] * t36;
+    const real t38 = t0 - t37;
+    const real t39 = F[10] * t30;
+    const real t40 = t38 - t39;
+    const real t41 = F[15] * t26;
+    const real t42 = t40 - t41;
+    const real t43 = F[20] * t24;
+    const real t44 = t42 - t43;
+    const real t45 = r[2] * delta_I[4];
+    const real t46 = r[1] * delta_I[5];
+    const real t47 = t45 - t46;
+    const real t48 = delta_I[0] + t47;
+    const real t49 = Rc[0] * t48;
+    const real t50 = r[0] * delta_I[5];
+    const real t51 = r[2] * delta_I[3];
+    const real t52 = t50 - t51;
+    const real t53 = delta_I[1] + t52;
+    const real t54 = Rc[3] * t53;
+    const real t55 = t49 + t54;
+    const real t56 = r[1] * delta_I[3];
+    const real t57 = r[0] * delta_I[4];
+    const real t58 = t56 - t57;
+    const real t59 = delta_I[2] + t58;
+    const real t60 = Rc[6] * t59;
+    const real t61 = t55 + t60;
+    const real t62 = G[0] * t61;
+    const real t63 = Rc[1] * t48;
+    const real t64 = Rc[4] * t53;
+    const real t65 = t63 + t64;
+    const real t66 = Rc[7] * t59;
+    const real t67 = t65 + t66;
+    const real t68 = G[1] * t67;
+    const real t69 = t62 + t68;
+    const real t70 = Rc[2] * t48;
+    const real t71 = Rc[5] * t53;
+    const real t72 = t70 + t71;
+    const real t73 = Rc[8] * t59;
+    const real t74 = t72 + t73;
+    const real t75 = G[2] * t74;
+    const real t76 = t69 + t75;
+    const real t77 = Rc[0] * delta_I[3];
+    const real t78 = Rc[3] * delta_I[4];
+    const real t79 = t77 + t78;
+    const real t80 = Rc[6] * delta_I[5];
+    const real t81 = t79 + t80;
+    const real t82 = G[3] * t81;
+    const real t83 = t76 + t82;
+    const real t84 = Rc[1] * delta_I[3];
+    const real t85 = Rc[4] * delta_I[4];
+    const real t86 = t84 + t85;
+    const real t87 = Rc[7] * delta_I[5];
+    const real t88 = t86 + t87;
+    const real t89 = G[4] * t88;
+    const real t90 = t83 + t89;
+    const real t91 = Rc[2] * delta_I[3];
+    const real t92 = Rc[5] * delta_I[4];
+    const real t93 = t91 + t92;
+    const real t94 = Rc[8] * delta_I[5];
+    const real t95 = t93 + t94;
+    const real t96 = G[5] * t95;
+    const real t97 = t90 + t96;
+    const real t98 = t44 - t97;
+    udot[0] = t98;
+    const real t99 = G[6] * t61;
+    const real t100 = G[7] * t67;
+    const real t101 = t99 + t100;
+    const real t102 = G[8] * t74;
+    const real t103 = t101 + t102;
+    const real t104 = G[9] * t81;
+    const real t105 = t103 + t104;
+    const real t106 = G[10] * t88;
+    const real t107 = t105 + t106;
+    const real t108 = G[11] * t95;
+    const real t109 = t107 + t108;
+    const real t110 = t36 - t109;
+    udot[1] = t110;
+    const real t111 = G[12] * t61;
+    const real t112 = G[13] * t67;
+    const real t113 = t111 + t112;
+    const real t114 = G[14] * t74;
+    const real t115 = t113 + t114;
+    const real t116 = G[15] * t81;
+    const real t117 = t115 + t116;
+    const real t118 = G[16] * t88;
+    const real t119 = t117 + t118;
+    const real t120 = G[17] * t95;
+    const real t121 = t119 + t120;
+    const real t122 = t30 - t121;
+    udot[2] = t122;
+    const real t123 = G[18] * t61;
+    const real t124 = G[19] * t67;
+    const real t125 = t123 + t124;
+    const real t126 = G[20] * t74;
+    const real t127 = t125 + t126;
+    const real t128 = G[21] * t81;
+    const real t129 = t127 + t128;
+    const real t130 = G[22] * t88;
+    const real t131 = t129 + t130;
+    const real t132 = G[23] * t95;
+    const real t133 = t131 + t132;
+    const real t134 = t26 - t133;
+    udot[3] = t134;
+    const real t135 = G[24] * t61;
+    const real t136 = G[25] * t67;
+    const real t137 = t135 + t136;
+    const real t138 = G[26] * t74;
+    const real t139 = t137 + t138;
+    const real t140 = G[27] * t81;
+    const real t141 = t139 + t140;
+    const real t142 = G[28] * t88;
+    const real t143 = t141 + t142;
+    const real t144 = G[29] * t95;
+    const real t145 = t143 + t144;
+    const real t146 = t24 - t145;
+    udot[4] = t146;
+    const real t147 = H[0] * t98;
+    const real t148 = H[1] * t110;
+    const real t149 = t147 + t148;
+    const real t150 = H[2] * t122;
+    const real t151 = t149 + t150;
+    const real t152 = H[3] * t134;
+    const real t153 = t151 + t152;
+    const real t154 = H[4] * t146;
+    const real t155 = t153 + t154;
+    const real t156 = t61 + t155;
+    delta[0] = t156;
+    const real t157 = H[5] * t98;
+    const real t158 = H[6] * t110;
+    const real t159 = t157 + t158;
+    const real t160 = H[7] * t122;
+    const real t161 = t159 + t160;
+    const real t162 = H[8] * t134;
+    const real t163 = t161 + t162;
+    const real t164 = H[9] * t146;
+    const real t165 = t163 + t164;
+    const real t166 = t67 + t165;
+    delta[1] = t166;
+    const real t167 = H[10] * t98;
+    const real t168 = H[11] * t110;
+    const real t169 = t167 + t168;
+    const real t170 = H[12] * t122;
+    const real t171 = t169 + t170;
+    const real t172 = H[13] * t134;
+    const real t173 = t171 + t172;
+    const real t174 = H[14] * t146;
+    const real t175 = t173 + t174;
+    const real t176 = t74 + t175;
+    delta[2] = t176;
+    const real t177 = H[15] * t98;
+    const real t178 = H[16] * t110;
+    const real t179 = t177 + t178;
+    const real t180 = H[17] * t122;
+    const real t181 = t179 + t180;
+    const real t182 = H[18] * t134;
+    const real t183 = t181 + t182;
+    const real t184 = H[19] * t146;
+    const real t185 = t183 + t184;
+    const real t186 = t81 + t185;
+    delta[3] = t186;
+    const real t187 = H[20] * t98;
+    const real t188 = H[21] * t110;
+    const real t189 = t187 + t188;
+    const real t190 = H[22] * t122;
+    const real t191 = t189 + t190;
+    const real t192 = H[23] * t134;
+    const real t193 = t191 + t192;
+    const real t194 = H[24] * t146;
+    const real t195 = t193 + t194;
+    const real t196 = t88 + t195;
+    delta[4] = t196;
+    const real t197 = H[25] * t98;
+    const real t198 = H[26] * t110;
+    const real t199 = t197 + t198;
+    const real t200 = H[27] * t122;
+    const real t201 = t199 + t200;
+    const real t202 = H[28] * t134;
+    const real t203 = t201 + t202;
+    const real t204 = H[29] * t146;
+    const real t205 = t203 + t204;
+    const real t206 = t95 + t205;
+    delta[5] = t206;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"F", 25, "", 0, 0},
+    {"G", 30, "", 0, 0},
+    {"y", 5, "N, N*m", 0, 0},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
+    {"udot", 5, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
     {
         .name = "forward",
@@ -2952,13 +4096,49 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_guards = 5,
         .guards = mstmm_sweep_generic5_project_guards,
     },
+    {
+        .name = "factor",
+        .function = (void (*)(void))mstmm_sweep_generic5_factor,
+        .call = mstmm_sweep_generic5_factor_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_factor_inputs,
+        .outputs = mstmm_sweep_generic5_factor_outputs,
+        .ir_hash = "4822c39595d375aeaf58945ef9f5077c3db847fa2e8f5894c8cd3792d8e21b03",
+        .n_guards = 5,
+        .guards = mstmm_sweep_generic5_factor_guards,
+    },
+    {
+        .name = "push",
+        .function = (void (*)(void))mstmm_sweep_generic5_push,
+        .call = mstmm_sweep_generic5_push_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic5_push_inputs,
+        .outputs = mstmm_sweep_generic5_push_outputs,
+        .ir_hash = "305f45223d60edde188b4113c8f35e354a15f69d770f0c398039d9468631c766",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_generic5_answer,
+        .call = mstmm_sweep_generic5_answer_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic5_answer_inputs,
+        .outputs = mstmm_sweep_generic5_answer_outputs,
+        .ir_hash = "77ca19417e9831f899d9061916cef696ffcd5fa68ccd5a438a8b4cba858fb247",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "eaa009775e5b8fb91317a0cbf312040d231c5db28834267d3a145df7f6880fec",
+    .hash = "70b46a5fc0f322590333b7ec523f5d10cfe41cf5c215c15ba686be4c4bb1ed79",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2968,6 +4148,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 8,
     .kernels = mstmm_sweep_generic5_kernels,
 };

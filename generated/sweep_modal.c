@@ -64,6 +64,11 @@ int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *r
     const real *restrict s, real *restrict e, real *restrict e_f);
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau);
+int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+    const real *restrict e_f, real *restrict e_c);
+int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
+    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
+    real *restrict work);
 
 #ifndef MSTMM_SOLVE_LDL
 #define MSTMM_SOLVE_LDL
@@ -3940,6 +3945,162 @@ static const mstmm_port mstmm_sweep_modal_modal_effort_outputs[] = {
     {"tau", 1, "", 0, 1},
 };
 
+/* load of a flexible body condensed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Gg[n][7] etadd = g - G a: columns of G, then -g
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[n] load that the modes need
+ * out e_c[6] (N, N*m) e without modes
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_pushed_sized(int n, const real *restrict Gg, const real *restrict e,
+    const real *restrict e_f, real *restrict e_c)
+{
+    real t1 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = Gg[7 * k] * e_f[k];
+        t1 += t0;
+    }
+    const real t2 = e[0] - t1;
+    e_c[0] = t2;
+    real t4 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t3 = e_f[k] * Gg[7 * k + 1];
+        t4 += t3;
+    }
+    const real t5 = e[1] - t4;
+    e_c[1] = t5;
+    real t7 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t6 = e_f[k] * Gg[7 * k + 2];
+        t7 += t6;
+    }
+    const real t8 = e[2] - t7;
+    e_c[2] = t8;
+    real t10 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t9 = e_f[k] * Gg[7 * k + 3];
+        t10 += t9;
+    }
+    const real t11 = e[3] - t10;
+    e_c[3] = t11;
+    real t13 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t12 = e_f[k] * Gg[7 * k + 4];
+        t13 += t12;
+    }
+    const real t14 = e[4] - t13;
+    e_c[4] = t14;
+    real t16 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t15 = e_f[k] * Gg[7 * k + 5];
+        t16 += t15;
+    }
+    const real t17 = e[5] - t16;
+    e_c[5] = t17;
+    return 0;
+}
+
+int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+    const real *restrict e_f, real *restrict e_c)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_pushed_sized(1, Gg, e, e_f, e_c);
+    case 2: return mstmm_sweep_modal_pushed_sized(2, Gg, e, e_f, e_c);
+    case 3: return mstmm_sweep_modal_pushed_sized(3, Gg, e, e_f, e_c);
+    case 4: return mstmm_sweep_modal_pushed_sized(4, Gg, e, e_f, e_c);
+    default: return mstmm_sweep_modal_pushed_sized(n, Gg, e, e_f, e_c);
+    }
+}
+
+static int mstmm_sweep_modal_pushed_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_pushed(n, in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_pushed_inputs[] = {
+    {"Gg", 7, "", 0, 1},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_pushed_outputs[] = {
+    {"e_c", 6, "N, N*m", 0, 0},
+};
+
+/* modal accelerations that answer a load
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  S_ff[n][n] rows and columns of the modes
+ * in  e_f[n] load that the modes need
+ * in  Gg[n][7] etadd = g - G a: columns of G, then -g
+ * in  delta_I[6] deviation of the frame without the modes' part
+ * out y[n] S_ff^-1 e_f
+ * out etadd[n] modal accelerations
+ * out work[n][n] factor L, D of solve
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_answer_sized(int n, const real *restrict S_ff, const real *restrict e_f,
+    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
+    real *restrict work)
+{
+    /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
+    if (mstmm_solve_ldl(n, 1, S_ff, e_f, y, work, 1e-13)) return 1;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = delta_I[0] * Gg[7 * k];
+        const real t1 = delta_I[1] * Gg[7 * k + 1];
+        const real t2 = t0 + t1;
+        const real t3 = delta_I[2] * Gg[7 * k + 2];
+        const real t4 = t2 + t3;
+        const real t5 = delta_I[3] * Gg[7 * k + 3];
+        const real t6 = t4 + t5;
+        const real t7 = delta_I[4] * Gg[7 * k + 4];
+        const real t8 = t6 + t7;
+        const real t9 = delta_I[5] * Gg[7 * k + 5];
+        const real t10 = t8 + t9;
+        const real t11 = y[k] + t10;
+        const real t12 = -t11;
+        etadd[k] = t12;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
+    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
+    real *restrict work)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_answer_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 2: return mstmm_sweep_modal_answer_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 3: return mstmm_sweep_modal_answer_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 4: return mstmm_sweep_modal_answer_sized(4, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    default: return mstmm_sweep_modal_answer_sized(n, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    }
+}
+
+static int mstmm_sweep_modal_answer_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_answer(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_modal_answer_inputs[] = {
+    {"S_ff", 1, "", 0, 2},
+    {"e_f", 1, "", 0, 1},
+    {"Gg", 7, "", 0, 1},
+    {"delta_I", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_answer_outputs[] = {
+    {"y", 1, "", 0, 1},
+    {"etadd", 1, "", 0, 1},
+    {"work", 1, "", 0, 2},
+};
+
+static const mstmm_guard mstmm_sweep_modal_answer_guards[] = {
+    {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
+};
+
 static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     {
         .name = "residual",
@@ -4121,13 +4282,37 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "pushed",
+        .function = (void (*)(void))mstmm_sweep_modal_pushed,
+        .call = mstmm_sweep_modal_pushed_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_pushed_inputs,
+        .outputs = mstmm_sweep_modal_pushed_outputs,
+        .ir_hash = "a71ac90b4bd1cbe9edbd385aad0fc340ef6d2f6ad1e378c9ef7a9ecfb528da77",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answer",
+        .function = (void (*)(void))mstmm_sweep_modal_answer,
+        .call = mstmm_sweep_modal_answer_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_modal_answer_inputs,
+        .outputs = mstmm_sweep_modal_answer_outputs,
+        .ir_hash = "eaf9285dc3124c21a1fd0d8fc3024d7b8bc4de7e96138bfb06efc72e6b427af3",
+        .n_guards = 1,
+        .guards = mstmm_sweep_modal_answer_guards,
+    },
 };
 
 const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "af96c67e0cd30804959c667359aad973c0064305ac243e684f958da5ae9586a5",
+    .hash = "b91c9660aa47badf34525676f1f18db7e3dd890d71bfe4aca8a488b39efee333",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4137,6 +4322,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 17,
     .kernels = mstmm_sweep_modal_kernels,
 };

@@ -96,6 +96,21 @@ def one(name: str, value: ArrayLike, width: int, instead: str) -> Array:
     return array
 
 
+def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
+    """(whether it is one vector, its columns as rows (..., n, width)).
+
+    As `numpy.linalg.solve` has it: (width,) is a vector, (..., width, n) holds n columns.
+    """
+    array = _row(numbers(name, value), width)
+    if array.shape == (width,):
+        return True, array[None]
+    if array.ndim < 2 or array.shape[-2] != width:
+        raise SceneError(
+            f"{name} has shape {array.shape}, expected ({width},) or (..., {width}, columns)"
+        )
+    return False, np.ascontiguousarray(np.swapaxes(array, -1, -2))
+
+
 def batch(*given: tuple[str, ArrayLike, int | None]) -> tuple[tuple[int, ...], list[Array]]:
     """Leading axes, and for each (name, value, width) a contiguous copy (n, width) over all states.
 

@@ -13,8 +13,8 @@ from mstmm.ir import KernelIR
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
+from ..equations import columns, frames, laws, link, screw, sweep
 from ..equations import force as force_kernels
-from ..equations import frames, laws, link, screw, sweep
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from ..flexible import beam_fields, beam_second_order, modal, modal_sweep, section
@@ -31,7 +31,8 @@ FRAME_DERIVATIONS = (
     frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.carried_momentum,
     frames.gravity_energy,
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
-    frames.length, frames.turned, frames.classical_body, frames.state_deviation,
+    frames.driven_effort, frames.speed_power, frames.length, frames.turned,
+    frames.classical_body, frames.state_deviation,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
@@ -109,6 +110,9 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("recover", sweep.recover(nu)),
         Kernel("effort", sweep.effort(nu)),
         Kernel("project", sweep.project(nu)),
+        Kernel("factor", columns.factor(nu)),
+        Kernel("push", columns.push(nu)),
+        Kernel("answer", columns.answer(nu)),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )

@@ -75,11 +75,11 @@ def eliminate_factored(
         Equation("diagonal of D", pivots.symbol, diagonal(pivot)),
         Equation("L and 1 / d of D = L diag(d) L^T", factor.symbol, Factor(pivot)),
         Equation("Y = L^-1 U^T", full, Triangular(factor.symbol, push.T)),
-        Equation("diag(d)^-1 Y", scaled, _divided(full, factor.symbol)),
+        Equation("diag(d)^-1 Y", scaled, divided(full, factor.symbol)),
         Equation("Z, without unit directions", gain.symbol, _without_columns(scaled, units)),
         Equation("unit directions", through.symbol, _through(nu, units)),
         Equation("y = L^-1 (tau - H^T e)", surplus, Triangular(factor.symbol, right)),
-        Equation("diag(d)^-1 y", offset.symbol, _divided(surplus, factor.symbol)),
+        Equation("diag(d)^-1 y", offset.symbol, divided(surplus, factor.symbol)),
         Equation("S_Q = S - Y^T Z", REDUCED_S.symbol, S.symbol - full.T * scaled, zeros=zeros),
         Equation("e + Z^T y", e_full, E.symbol + scaled.T * surplus),
         Equation("e_Q", REDUCED_E.symbol, replace_rows(e_full, tau.symbol, units)),
@@ -126,7 +126,7 @@ def recover_factored(nu: int) -> Derivation:
     )
 
 
-def _divided(full: sp.MatrixSymbol, factor: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+def divided(full: sp.MatrixSymbol, factor: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     """diag(d)^-1 times `full`."""
     return sp.ImmutableDenseMatrix(
         int(full.rows), int(full.cols), lambda i, j: full[i, j] * factor[i, i]

@@ -344,6 +344,37 @@ def rotor_energy() -> Derivation:
     )
 
 
+def driven_effort() -> Derivation:
+    """Effort on one speed beyond a given one: tau_d = felt + J udot - tau."""
+    felt, inertia, rate, given, effort = (
+        symbol(name, 1) for name in ("felt", "J", "udot", "tau", "tau_d")
+    )
+    return Derivation(
+        "frames",
+        "effort that a prescribed acceleration needs",
+        (
+            Quantity(felt, "N, N*m", "effort along the speed of the load at P, H^T f"),
+            Quantity(inertia, "kg or kg*m2", "rotor inertia reflected to the speed"),
+            Quantity(rate, "", "acceleration"),
+            Quantity(given, "N, N*m", "effort that is there already"),
+        ),
+        (Quantity(effort, "N, N*m", "what is missing"),),
+        (Equation("tau_d", effort, felt + inertia * rate - given),),
+    )
+
+
+def speed_power() -> Derivation:
+    """Power of an effort along one speed."""
+    effort, speed, power = symbol("tau", 1), symbol("u", 1), symbol("P", 1)
+    return Derivation(
+        "frames",
+        "power of an effort",
+        (Quantity(effort, "N, N*m", "effort"), Quantity(speed, "m/s, rad/s", "speed")),
+        (Quantity(power, "W", "power"),),
+        (Equation("P", power, effort * speed),),
+    )
+
+
 def length() -> Derivation:
     """Distance of two points and its rate."""
     x_f, v_f, x_t, v_t = (symbol(n, 3) for n in ("x_F", "v_F", "x_T", "v_T"))

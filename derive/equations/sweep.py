@@ -148,7 +148,7 @@ def forward_generic(nu: int) -> Derivation:
     )
 
 
-def _transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
+def transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
     """X^T f: the load at P, felt at P of the parent, parent axes."""
     push = R.symbol * part(force, 0)
     return stack(push, R.symbol * part(force, 3) + tilde(column(SHIFT.symbol)) * push)
@@ -255,7 +255,7 @@ def condense(
     equations += [
         *steps,
         Equation("X^T S_Q X", PARENT_S.symbol, transported),
-        Equation("X^T e_Q", PARENT_E.symbol, _transport(load)),
+        Equation("X^T e_Q", PARENT_E.symbol, transport(load)),
     ]
     given = inputs if specialised else (h_given, rotor)
     return Derivation(

@@ -153,4 +153,37 @@ def modal_effort() -> Derivation:
     )
 
 
-STEPS = (absorb, rebase, condense, recover, displaced, prescribed, modal_effort)
+def pushed() -> Derivation:
+    """Load of a flexible body without its modes, once S is condensed: e - G^T e_f."""
+    load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
+    gain = GAIN.symbol[:, :6]
+    return Derivation(
+        "modal",
+        "load of a flexible body condensed",
+        (GAIN, E, E_F),
+        (load,),
+        (Equation("e - G^T e_f", load.symbol, E.symbol - gain.T * E_F.symbol),),
+        sources=SOURCES,
+    )
+
+
+def answer() -> Derivation:
+    """Modal accelerations that answer a load on the modes and the deviation of the frame."""
+    loaded = column("y", "S_ff^-1 e_f")
+    gain = GAIN.symbol[:, :6]
+    return Derivation(
+        "modal",
+        "modal accelerations that answer a load",
+        (S_FF, E_F, GAIN, FRAME_DELTA),
+        (loaded, RATES),
+        (
+            Equation("S_ff^-1 e_f", loaded.symbol, Solve(S_FF.symbol, E_F.symbol, True)),
+            Equation("etadd", RATES.symbol, -loaded.symbol - gain * FRAME_DELTA.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+STEPS = (
+    absorb, rebase, condense, recover, displaced, prescribed, modal_effort, pushed, answer,
+)  # fmt: skip

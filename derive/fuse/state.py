@@ -1,41 +1,21 @@
-"""What is known while the sweep of one scene is replayed, and the tools that replay its kernels."""
+"""What is known while the sweep of one scene is replayed: the graph, its inputs, its failures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from mstmm.ir import KernelIR
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.structure import Entries, ExpressionStructure, Key, Structure
 
 from .inline import Inliner, Nodes
-from .transport import Stage
 
 #: (element, kernel name) -> its IR.
 Kernels = Callable[[Key, str], KernelIR]
 
 
-@dataclass
-class BodyNodes:
-    """What is known of a body while the sweep runs."""
-
-    stages: tuple[Stage, ...]
-    axial: bool
-    hinge: dict[str, Nodes]
-    s: Nodes
-    motion: Nodes
-    inertia: Nodes
-    load: Nodes
-    own: Nodes
-    tau: Nodes
-    eliminated: dict[str, Nodes]
-    delta: Nodes
-    udot: Nodes
-
-
 class FusionState:
-    """Graph, numbers and bodies of a scene that is being fused."""
+    """Graph, numbers and inputs of a scene that is being fused."""
 
     def __init__(
         self, structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
@@ -50,8 +30,6 @@ class FusionState:
         self.u = self.graph.vector("u", structure.nu)
         self.efforts = self.graph.vector("efforts", structure.nu)
         self.memory = self.graph.vector("memory", structure.n_memory)
-        self.bodies: list[BodyNodes] = []
-        self.power, self.potential = self.zero, self.zero
 
     def entries(self, entries: Entries) -> Nodes:
         """Nodes of structural constants and of places in p."""
@@ -72,18 +50,6 @@ class FusionState:
         given |= more
         inputs = {port.name: given[port.name] for port in found.kernel.inputs}
         return next(iter(self.inline.run(found.kernel, inputs).values()))
-
-    def sweep(self, nu: int, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A step of the sweep for any hinge with `nu` speeds."""
-        return self.inline.run(self.kernels(("sweep", f"generic{nu}"), name), inputs)
-
-    def screw(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A step across an axial screw."""
-        return self.inline.run(self.kernels(("sweep", "screw"), name), inputs)
-
-    def frames(self, name: str, **inputs: Sequence[Node]) -> dict[str, Nodes]:
-        """A kernel of poses, points and loads."""
-        return self.inline.run(self.kernels(("sweep", "frames"), name), inputs)
 
     def fail_unless(self, condition: Node, reason: int, element: int, code: int) -> None:
         """Guard of the fused kernel that stands for a failure of the looped engine."""

@@ -24,7 +24,10 @@ from mstmm.ir.spec import ElementSpec, Param
 from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
+from .callers import calls_header
 from .kernel import C_OPERATIONS, KernelText, comment, string
+from .storage import layout_header
+from .sweep import sweep_files
 
 #: Run-time sizes for which the compiler unrolls the loops of a kernel.
 _OWN_SIZES = (1, 2, 3, 4)
@@ -115,11 +118,23 @@ def generated_files(
             files[f"{stem}.c"] = element_source(spec)
         files[f"{stem}.json"] = element_to_json(spec)
     files["registry.c"] = registry_source(ordered)
+    if ("sweep", "frames") in {(spec.kind, spec.name) for spec in ordered}:
+        files |= _engine_files(ordered)
     if hinges:
         files["hinges.json"] = json.dumps([facts_to_data(h) for h in hinges], indent=1) + "\n"
     files["catalogue.json"] = catalogue(sorted((*ordered, *on_demand), key=_kind_and_name))
     files["manifest.json"] = manifest(ordered, files)
     return files
+
+
+def _engine_files(specs: Sequence[ElementSpec]) -> dict[str, str]:
+    """What the looped engine's own C is printed from: kernels by their ports' names, the passes."""
+    known = {(spec.kind, spec.name): spec for spec in specs}
+    return {
+        "kernel_calls.h": calls_header(known),
+        "layout.h": layout_header(),
+        **sweep_files(known),
+    }
 
 
 def _kind_and_name(spec: ElementSpec) -> tuple[str, str]:

@@ -46,7 +46,7 @@ _MODES_PER_BODY = 24
 #: What decides the text besides structure and kernels: the folders that print it.
 PRINTERS = {
     "mstmm": ("border", "ir"),
-    "mstmm.derive": ("fuse", "print"),
+    "mstmm.derive": ("fuse", "print", "schedule"),
 }
 
 
@@ -193,6 +193,18 @@ class Fusion:
         if not build and find(recipe) is None:
             return None
         return opened(recipe, open_columns)[0]
+
+    def solution(self, build: bool) -> ColumnsLibrary | None:
+        """The library that solves with the scene's mass matrix; errors as for `columns`."""
+        if self.obstacle:
+            return None
+
+        def kernels() -> Sequence[KernelIR]:
+            from ..derive.fuse.scene import fuse_solution
+
+            return [fuse_solution(self.structure, kernels_of(self._definitions))]
+
+        return self.columns(self.structure, kernels, "solution", build)
 
     def fused(self, structure: Structure) -> Fused:
         """The IR of a structure whose elements this scene has; no compiler, no cache."""

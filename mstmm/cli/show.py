@@ -34,7 +34,8 @@ def show(
         str,
         typer.Argument(
             metavar="ELEMENT",
-            help="Name of an element (mstmm list), or the Python file that defines your own."
+            help="Name of an element (mstmm list), the Python file that defines your own, or "
+            "sweep: the schedule of the sweep.",
         ),
     ],
     at: Annotated[
@@ -60,7 +61,10 @@ def show(
     from .output import emit_json, note, put
 
     target = None if output is None else output_file(output, ())
-    pages = {view.name: _page(view, at, format) for view in _views(element, at)}
+    if element == "sweep":
+        pages = {element: _schedule(at, format)}
+    else:
+        pages = {view.name: _page(view, at, format) for view in _views(element, at)}
     text = "\n".join(pages.values())
     if target is not None:
         target.write_text(text, encoding="utf-8")
@@ -71,6 +75,14 @@ def show(
         put(text.rstrip("\n"))
     else:
         note(f"wrote {target}")
+
+
+def _schedule(at: str, format: str) -> str:
+    from mstmm.derive.show.sweep import sweep_page
+
+    from . import stored
+
+    return sweep_page(at, format, stored.specs)
 
 
 def _page(view: ElementView, at: str, format: str) -> str:

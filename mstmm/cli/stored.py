@@ -66,3 +66,11 @@ def text(full_name: str, ending: str) -> str | None:
         return None
     file = files("mstmm.generated").joinpath(full_name + ending)
     return file.read_text(encoding="utf-8") if file.is_file() else None
+
+
+def specs() -> dict[tuple[str, str], ElementSpec]:
+    """Every element that is generated, its kernels with it, by (kind, name)."""
+    from mstmm.ir.stored import element_from_json
+
+    found = {(e.kind, e.name): text(f"{e.kind}_{e.name}", ".json") for e in _catalogue()}
+    return {key: element_from_json(data) for key, data in found.items() if data is not None}

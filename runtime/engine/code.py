@@ -39,6 +39,7 @@ class Fusing(Protocol):
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
     ) -> ColumnsLibrary | None: ...
+    def solution(self, build: bool) -> ColumnsLibrary | None: ...
 
 
 @dataclass
@@ -72,4 +73,7 @@ class NotFused:
         return self.build()
 
     def columns(self, structure: Any, kernels: Callable[[], Any], what: str, build: bool) -> None:
+        return None
+
+    def solution(self, build: bool) -> None:
         return None

@@ -83,6 +83,23 @@ class Engine(Calls):
         matrix = np.array(columns).reshape(self.nu, self.nu).T
         return np.asarray((matrix + matrix.T) / 2)
 
+    def solve(self, q: Array, columns: Array) -> Array:
+        """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
+        the others.  q (nq,) of one state; S is factored once, each column is O(bodies)."""
+        engine = self.inertia_alone
+        answers, memory = np.empty(columns.shape), engine.start_memory()
+        failure = self.ffi.new("mstmm_failure *")
+        code = self.lib.mstmm_solve(
+            engine.packed.model, engine.workspace(), len(columns), self.pointer(q),
+            self.pointer(memory), self.pointer(columns), self.pointer(answers), failure,
+        )  # fmt: skip
+        if code:
+            raise self.failed(failure, 0.0, q, np.zeros(self.nu))
+        if not np.isfinite(answers).all():
+            name = self.packed.layout.u_name(int(np.nonzero(~np.isfinite(answers))[1][0]))
+            raise self.not_finite(f"the answer of {name}", 0.0, q, np.zeros(self.nu))
+        return answers
+
     def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:
         """qdot (nq,) of one state: kinematics alone, so that no inertia has to be positive."""
         self.inverse_dynamics(t, q, u, np.zeros(self.nu), memory)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array, batch, one, pair, real
+from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
@@ -23,6 +24,7 @@ from ..pack.layout import refuse_dense
 from ..pack.packed import Packed
 
 if TYPE_CHECKING:
+    from ..engine.solver import Solver
     from ..result.result import Result
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
@@ -117,6 +119,32 @@ class Model(Compiled):
         lead, (states,) = batch(("q", q, self.nq))
         matrices = [self.looped.mass_matrix(one_state) for one_state in states]
         return np.array(matrices).reshape(*lead, self.nu, self.nu)
+
+    def solve(self, q: ArrayLike, rhs: ArrayLike) -> Array:
+        """M(q)^-1 rhs: accelerations (..., nu) or (..., nu, k) that efforts rhs alone give.
+
+        q (..., nq); rhs (nu,), one column for all states, or (..., nu, k), k columns (N, N*m), as
+        `numpy.linalg.solve` has it.  M is never formed: the tree is factored once per state, and
+        each column is O(bodies).  Speeds that a drive or a hold imposes stay unaccelerated: their
+        rows of rhs are not read and their answers are zero.
+
+        Raises SceneError for a shape that does not fit, NumericalFailure naming the hinge whose
+        motion is undetermined.
+        """
+        alone, columns = columns_of("rhs", rhs, self.nu)
+        k = columns.shape[-2]
+        lead, (states, rows) = batch(
+            ("q", q, self.nq), ("rhs", columns.reshape(*columns.shape[:-2], -1), k * self.nu)
+        )
+        answers = self._solver.solve(states, rows.reshape(len(states), k, self.nu))
+        found = np.swapaxes(answers.reshape(*lead, k, self.nu), -1, -2)
+        return np.ascontiguousarray(found[..., 0] if alone else found)
+
+    @cached_property
+    def _solver(self) -> Solver:
+        from ..engine.solver import Solver
+
+        return Solver(self.looped, self.fusion)
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10

@@ -102,3 +102,29 @@ def test_listed_matrices_can_be_shown(mstmm: Command) -> None:
 def test_refused(mstmm: Command, arguments: tuple[str, ...], said: str) -> None:
     done = mstmm("show", *arguments)
     assert done.code == 2 and said in done.err
+
+
+def test_the_schedule_of_the_sweep(mstmm: Command) -> None:
+    done = mstmm("show", "sweep")
+    assert done.code == 0
+    for heading in ("sweep accelerations", "sweep solution", "pass forward", "Conditions", "Slots"):
+        assert f"\n{heading}\n{'-' * len(heading)}\n" in done.out
+    assert "for every body, tips to root, passing by where idle" in done.out
+    assert "frames.pose(A_I=parent.A, x_I=parent.x, Rc=body.R, r=body.r) -> A=body.A" in done.out
+    assert max(map(len, done.out.splitlines())) <= 102
+
+
+def test_the_schedule_in_other_formats(mstmm: Command) -> None:
+    page = mstmm("show", "sweep", "--format", "html").out
+    ElementTree.fromstring(page.partition("\n")[2] if page.startswith("<!") else page)
+    assert r"\begin{verbatim}" in mstmm("show", "sweep", "--format", "latex").out
+    pages = json.loads(mstmm("show", "sweep", "--json").out)["pages"]
+    assert list(pages) == ["sweep"]
+
+
+def test_the_c_that_is_printed_from_the_schedule(mstmm: Command) -> None:
+    shown = mstmm("show", "sweep", "--at", "c").out
+    source = Path(__file__).parents[2] / "generated" / "sweep_steps.c"
+    assert source.read_text().strip() in shown
+    done = mstmm("show", "sweep", "--at", "ir")
+    assert done.code == 2 and "sweep_generic2" in done.err

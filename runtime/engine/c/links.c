@@ -3,7 +3,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "links.h"
+#include "link_steps.h"
+#include "sweep_steps.h"
 
 #define MSTMM_INLINE static inline __attribute__((always_inline, unused))
 #define MSTMM_RARE static __attribute__((noinline, cold, unused))
@@ -20,18 +21,6 @@ MSTMM_INLINE int two_sincos_near(two_t x)
     return (near[0] & near[1]) != 0;
 }
 MSTMM_SINCOS(two_t, two_bits_t, 2, two_sincos)
-
-typedef int (*angle_kernel)(const real *link, const real *q, real *angle);
-typedef int (*forward_kernel)(const real *link, const real *turn, const real *b, const real *p,
-                              const real *q, const real *u, const real *parent, real *shift,
-                              real *motion, real *load, real *qdot);
-typedef int (*condense_kernel)(const real *link, const real *turn, const real *shift,
-                               const real *b, const real *p, const real *outer_inertia,
-                               const real *outer_load, const real *load, const real *tau,
-                               real *gain, real *offset, real *inertia_out, real *load_out);
-typedef int (*recover_kernel)(const real *link, const real *turn, const real *shift,
-                              const real *p, const real *gain, const real *offset,
-                              const real *parent, real *udot, real *deviation);
 
 /* Numbers of S and e side by side, as they travel from link to link. */
 #define CARRIED 27
@@ -126,20 +115,41 @@ static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, 
                : mstmm_block(state->model, state->workspace, run->parent) + in_block;
 }
 
+/* Link k of a run.  Inlined, so that what a pass does not read is not computed. */
+MSTMM_INLINE mstmm_link_at link_at(mstmm_state *state, const mstmm_branch *run, int k)
+{
+    return (mstmm_link_at){
+        .state = state, .index = run->first + k, .nu = run->nu, .angle = run->angle,
+        .forward = run->forward, .condense = run->condense, .recover = run->recover,
+        .link = state->workspace + run->place + k * link_size(run),
+        .q = state->q + run->q + (int64_t)k * run->nq,
+        .u = state->u + run->u + (int64_t)k * run->nu,
+        .qdot = state->qdot + run->q + (int64_t)k * run->nq,
+        .udot = state->udot + run->u + (int64_t)k * run->nu,
+    };
+}
+
 /* Turn of every link: all angles of a run first, so that they can share their sines. */
 static void turn_links(mstmm_state *state, const mstmm_branch *run)
 {
     const int64_t size = link_size(run);
-    const angle_kernel angle = (angle_kernel)run->angle;
-    const real *q = state->q + run->q;
-    real *turn = state->workspace + run->place + MSTMM_LINK_TURN;
-    for (int k = 0; k < run->count; k += 2, turn += 2 * size, q += 2 * run->nq) {
+    mstmm_link_at at = link_at(state, run, 0);
+    for (int k = 0; k < run->count; k += 2, at.link += 2 * size) {
         const int both = k + 1 < run->count;
+        real *turn = at.link + MSTMM_LINK_TURN;
         two_t x = {0, 0};
-        angle(run->numbers[k], q, turn);
-        if (both) angle(run->numbers[k + 1], q + run->nq, turn + size);
+        at.numbers = run->numbers[k];
+        mstmm_at_link_angle(at);
+        at.q += run->nq;
         x[0] = turn[0];
-        if (both) x[1] = turn[size];
+        if (both) {
+            mstmm_link_at next = at;
+            next.numbers = run->numbers[k + 1];
+            next.link += size;
+            mstmm_at_link_angle(next);
+            at.q += run->nq;
+            x[1] = turn[size];
+        }
         const two_sincos_t pair = two_sincos(x);
         turn[0] = pair.cosine[0];
         turn[1] = pair.sine[0];
@@ -149,26 +159,21 @@ static void turn_links(mstmm_state *state, const mstmm_branch *run)
     }
 }
 
-static int forward_links(mstmm_state *state, const mstmm_branch *run, real *qdot)
+static int forward_links(mstmm_state *state, const mstmm_branch *run)
 {
     turn_links(state, run);
     const int64_t size = link_size(run);
-    const forward_kernel forward = (forward_kernel)run->forward;
-    const real *parent = of_parent(state, run, MSTMM_BLOCK_MOTION);
-    const real *q = state->q + run->q, *u = state->u + run->u;
-    real *link = state->workspace + run->place;
-    qdot += run->q;
-    for (int k = 0; k < run->count; k++) {
-        const real *numbers = run->numbers[k];
-        int code = forward(numbers, link + MSTMM_LINK_TURN, numbers + 5, numbers + 15, q, u,
-                           parent, link + MSTMM_LINK_SHIFT, link + MSTMM_LINK_MOTION,
-                           link + MSTMM_LINK_LOAD, qdot);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, run->first + k, code);
-        parent = link + MSTMM_LINK_MOTION;
-        link += size;
-        q += run->nq;
-        u += run->nu;
-        qdot += run->nq;
+    mstmm_link_at at = link_at(state, run, 0);
+    at.outer_motion = of_parent(state, run, MSTMM_BLOCK_MOTION);
+    for (int k = 0; k < run->count; k++, at.index++) {
+        at.numbers = run->numbers[k];
+        const int code = mstmm_at_link_forward(at);
+        if (code) return code;
+        at.outer_motion = at.link + MSTMM_LINK_MOTION;
+        at.link += size;
+        at.q += run->nq;
+        at.u += run->nu;
+        at.qdot += run->nq;
     }
     if (run->open) {
         real *block = mstmm_block(state->model, state->workspace, run->first + run->count - 1);
@@ -177,19 +182,19 @@ static int forward_links(mstmm_state *state, const mstmm_branch *run, real *qdot
     return 0;
 }
 
-int mstmm_linked_forward(mstmm_state *state, real *qdot)
+int mstmm_hook_links_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int k = 0; k < model->n_runs; k++) {
         const mstmm_branch *run = &model->runs[k];
         if (run->numbers) {
-            int code = forward_links(state, run, qdot);
+            const int code = forward_links(state, run);
             if (code) return code;
             continue;
         }
         const real *parent = of_parent(state, run, MSTMM_BLOCK_MOTION);
         for (int i = run->first; i < run->first + run->count; i++) {
-            int code = mstmm_forward_body(state, i, parent, qdot);
+            const int code = mstmm_at_forward(state, i, parent);
             if (code) return code;
             parent = state->workspace + model->bodies[i].block + MSTMM_BLOCK_MOTION;
         }
@@ -200,76 +205,74 @@ int mstmm_linked_forward(mstmm_state *state, real *qdot)
 /* Efforts on the hinge of a run's body k. */
 static const real *efforts_of(const mstmm_state *state, const mstmm_branch *run, int k)
 {
-    static const real none[6] = {0};
     const mstmm_model *model = state->model;
     if (model->n_laws)
-        return mstmm_tau(mstmm_block(model, state->workspace, run->first + k), run->nu);
-    return state->efforts ? state->efforts + run->u + (int64_t)k * run->nu : none;
+        return mstmm_of_speeds(mstmm_block(model, state->workspace, run->first + k), run->nu,
+                               MSTMM_SPEED_TAU);
+    return state->efforts ? state->efforts + run->u + (int64_t)k * run->nu : mstmm_zeros;
 }
 
 static int condense_links(mstmm_state *state, const mstmm_branch *run)
 {
-    static const real nothing[CARRIED] = {0};
     const int64_t size = link_size(run);
-    const condense_kernel condense = (condense_kernel)run->condense;
     const int last = run->first + run->count - 1;
-    real carried[2][CARRIED], *out = carried[0];
-    const real *outer = run->open ? mstmm_block(state->model, state->workspace, last) +
-                                        MSTMM_BLOCK_S
-                                  : nothing;
-    real *link = state->workspace + run->place + (run->count - 1) * size;
-    for (int k = run->count - 1; k >= 0; k--, link -= size) {
-        const real *numbers = run->numbers[k];
-        out = carried[k & 1];
-        int code = condense(numbers, link + MSTMM_LINK_TURN, link + MSTMM_LINK_SHIFT, numbers + 5,
-                            numbers + 15, outer, outer + 21, link + MSTMM_LINK_LOAD,
-                            efforts_of(state, run, k), link + MSTMM_LINK_FIXED + run->nu,
-                            link + MSTMM_LINK_FIXED, out, out + 21);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, run->first + k, code);
-        outer = out;
+    real carried[2][CARRIED];
+    mstmm_link_at at = link_at(state, run, run->count - 1);
+    at.inner = run->open ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
+                         : mstmm_zeros;
+    for (int k = run->count - 1; k >= 0; k--, at.link -= size, at.index--) {
+        at.numbers = run->numbers[k];
+        at.outer = carried[k & 1];
+        at.tau = efforts_of(state, run, k);
+        const int code = mstmm_at_link_condense(at);
+        if (code) return code;
+        at.inner = at.outer;
     }
     real *parent = mstmm_block(state->model, state->workspace, run->parent) + MSTMM_BLOCK_S;
-    for (int j = 0; j < CARRIED; j++) parent[j] += out[j];
+    for (int j = 0; j < CARRIED; j++) parent[j] += at.outer[j];
     return 0;
 }
 
-static void recover_links(mstmm_state *state, const mstmm_branch *run, real *udot)
-{
-    const int64_t size = link_size(run);
-    const recover_kernel recover = (recover_kernel)run->recover;
-    const real *parent = of_parent(state, run, MSTMM_BLOCK_DELTA);
-    real *link = state->workspace + run->place;
-    udot += run->u;
-    for (int k = 0; k < run->count; k++) {
-        const real *numbers = run->numbers[k];
-        recover(numbers, link + MSTMM_LINK_TURN, link + MSTMM_LINK_SHIFT, numbers + 15,
-                link + MSTMM_LINK_FIXED + run->nu, link + MSTMM_LINK_FIXED, parent, udot,
-                link + MSTMM_LINK_MOTION);
-        parent = link + MSTMM_LINK_MOTION;
-        link += size;
-        udot += run->nu;
-    }
-}
-
-int mstmm_linked_sweep(mstmm_state *state, real *udot)
+int mstmm_hook_links_condense(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int k = model->n_runs - 1; k >= 0; k--) {
         const mstmm_branch *run = &model->runs[k];
         int code = run->numbers ? condense_links(state, run) : 0;
         for (int i = run->first + run->count - 1; !code && !run->numbers && i >= run->first; i--)
-            code = mstmm_condense_body(state, i);
+            code = mstmm_at_condense(state, i);
         if (code) return code;
     }
+    return 0;
+}
+
+static void recover_links(mstmm_state *state, const mstmm_branch *run)
+{
+    const int64_t size = link_size(run);
+    mstmm_link_at at = link_at(state, run, 0);
+    at.outer_delta = of_parent(state, run, MSTMM_BLOCK_DELTA);
+    for (int k = 0; k < run->count; k++) {
+        at.numbers = run->numbers[k];
+        mstmm_at_link_recover(at);
+        at.outer_delta = at.link + MSTMM_LINK_MOTION;
+        at.link += size;
+        at.udot += run->nu;
+    }
+}
+
+int mstmm_hook_links_recover(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
     for (int k = 0; k < model->n_runs; k++) {
         const mstmm_branch *run = &model->runs[k];
         if (run->numbers) {
-            recover_links(state, run, udot);
+            recover_links(state, run);
             continue;
         }
         const real *parent = of_parent(state, run, MSTMM_BLOCK_DELTA);
         for (int i = run->first; i < run->first + run->count; i++) {
-            mstmm_recover_body(state, i, parent, udot);
+            const int code = mstmm_at_recover(state, i, parent);
+            if (code) return code;
             parent = state->workspace + model->bodies[i].block + MSTMM_BLOCK_DELTA;
         }
     }

@@ -26,7 +26,13 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
                     real *gathered, int64_t place, int64_t *size);
 /* cdef end */
 
-int mstmm_linked_forward(mstmm_state *state, real *qdot);
-int mstmm_linked_sweep(mstmm_state *state, real *udot);
+/* Where one link finds its kernels and its numbers, and those of its neighbours. */
+typedef struct {
+    mstmm_state *state;
+    int index, nu;
+    void (*angle)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+    const real *numbers, *q, *u, *tau, *outer_motion, *outer_delta, *inner;
+    real *link, *qdot, *udot, *outer;
+} mstmm_link_at;
 
 #endif

@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "elements.h"
-#include "sweep.h"
+#include "kernel_calls.h"
+#include "sweep_steps.h"
 
 #define N 13
 #define BODY 0        /* transfer matrix of the body */
@@ -74,21 +74,27 @@ static int solve_boundary(int rows, real *system, real *x)
     return 0;
 }
 
+static const real *tau_of(const mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    return mstmm_of_speeds(state->workspace + body->block, body->nu, MSTMM_SPEED_TAU);
+}
+
 /* Efforts of a hinge as a force and a moment, inertial axes. */
 static void efforts_of(const mstmm_state *state, int index, real *force, real *moment)
 {
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
-    const real *tau = mstmm_tau(block, body->nu), *axes = block + MSTMM_BLOCK_A;
-    if (body->nu == 6) mstmm_sweep_frames_turned(axes, tau, force);
-    mstmm_sweep_frames_turned(axes, tau + body->nu - 3, moment);
+    const real *tau = tau_of(state, index), *axes = block + MSTMM_BLOCK_A;
+    if (body->nu == 6) mstmm_frames_turned(.A = axes, .b = tau, .b_0 = force);
+    mstmm_frames_turned(.A = axes, .b = tau + body->nu - 3, .b_0 = moment);
 }
 
 static void axis_of(const mstmm_state *state, int index, real *axis)
 {
     static const real z[3] = {0, 0, 1};
     const real *block = state->workspace + state->model->bodies[index].block;
-    mstmm_sweep_frames_turned(block + MSTMM_BLOCK_A, z, axis);
+    mstmm_frames_turned(.A = block + MSTMM_BLOCK_A, .b = z, .b_0 = axis);
 }
 
 /* Offset of P from Q of a hinge, inertial axes; zero for pins and balls. */
@@ -99,7 +105,7 @@ static void offset_of(const mstmm_state *state, int index, real *offset)
     const real *parent = mstmm_block(state->model, state->workspace, body->parent);
     real gap[3];
     for (int i = 0; i < 3; i++) gap[i] = block[MSTMM_BLOCK_SHIFT + i] - body->connection[9 + i];
-    mstmm_sweep_frames_turned(parent + MSTMM_BLOCK_A, gap, offset);
+    mstmm_frames_turned(.A = parent + MSTMM_BLOCK_A, .b = gap, .b_0 = offset);
 }
 
 static void body_matrix(const mstmm_state *state, int index, const real *applied, real *store)
@@ -111,11 +117,13 @@ static void body_matrix(const mstmm_state *state, int index, const real *applied
     const int last = index + 1 == model->n_bodies;
     const real *output = last ? nowhere : model->bodies[index + 1].connection + 9;
     real mass[1], r_io[3], r_ic[3], inertia[6], omega[3], force[3], moment[3];
-    mstmm_sweep_frames_classical_body(block + MSTMM_BLOCK_A, body->body_p,
-                                      block + MSTMM_BLOCK_MOTION, applied, output, mass, r_io,
-                                      r_ic, inertia, omega, force, moment);
-    mstmm_classical_body_spatial_transfer(mass, r_io, r_ic, inertia, omega, force, moment,
-                                          store + BODY, store + SCALE);
+    mstmm_frames_classical_body(.A = block + MSTMM_BLOCK_A, .p = body->body_p,
+                                .motion = block + MSTMM_BLOCK_MOTION, .load = applied,
+                                .ro_n = output, .M = mass, .r_IO = r_io, .r_IC = r_ic,
+                                .J_I = inertia, .omega = omega, .f_C = force, .m_C = moment);
+    mstmm_classical_body_transfer(.M = mass, .r_IO = r_io, .r_IC = r_ic, .J_I = inertia,
+                                  .omega = omega, .f_C = force, .m_C = moment, .U = store + BODY,
+                                  .F_scale = store + SCALE);
 }
 
 static int hinge_matrix(const mstmm_state *state, int index, real *store)
@@ -130,23 +138,27 @@ static int hinge_matrix(const mstmm_state *state, int index, real *store)
         axis_of(state, index, axis);
         axis_of(state, next < 0 ? index : next, next_axis);
         if (next >= 0)
-            tau[0] = *mstmm_tau(state->workspace + model->bodies[next].block, 1);
-        mstmm_sweep_frames_turned(parent + MSTMM_BLOCK_A, parent + MSTMM_BLOCK_MOTION, omega);
-        return mstmm_classical_pin_spatial_transfer(store + BODY, store + SCALE, axis,
-                                                    state->u + body->u, omega, next_axis, tau,
-                                                    store + HINGE, &margin);
+            tau[0] = *tau_of(state, next);
+        mstmm_frames_turned(.A = parent + MSTMM_BLOCK_A, .b = parent + MSTMM_BLOCK_MOTION,
+                            .b_0 = omega);
+        return mstmm_classical_pin_transfer(
+            .U = store + BODY, .F_scale = store + SCALE, .a = axis, .u = state->u + body->u,
+            .omega_I = omega, .a_n = next_axis, .tau_n = tau, .U_h = store + HINGE,
+            .margin = &margin);
     case MSTMM_PRODUCT_BALL:
         if (next >= 0) efforts_of(state, next, NULL, tau);
-        return mstmm_classical_ball_transfer(store + BODY, store + SCALE, tau, store + HINGE,
-                                             &margin);
+        return mstmm_classical_ball_transfer(.U = store + BODY, .F_scale = store + SCALE,
+                                             .tau_n = tau, .U_h = store + HINGE,
+                                             .margin = &margin);
     default:
         offset_of(state, index, offset);
         if (next >= 0) {
             offset_of(state, next, next_offset);
             efforts_of(state, next, tau, tau + 3);
         }
-        return mstmm_classical_acceleration_transfer(store + BODY, store + SCALE, offset,
-                                                     next_offset, tau, store + HINGE, &margin);
+        return mstmm_classical_acceleration_transfer(
+            .U = store + BODY, .F_scale = store + SCALE, .d = offset, .d_n = next_offset,
+            .tau_n = tau, .U_h = store + HINGE, .margin = &margin);
     }
 }
 
@@ -157,7 +169,7 @@ static int root_condition(const mstmm_state *state, real *system)
     memset(system, 0, 6 * 7 * sizeof(real));
     if (state->model->product->kind == MSTMM_PRODUCT_PIN) {
         axis_of(state, 0, system);
-        system[6] = *mstmm_tau(state->workspace + state->model->bodies[0].block, 1);
+        system[6] = *tau_of(state, 0);
         return 1;
     }
     efforts_of(state, 0, force, moment);
@@ -205,15 +217,44 @@ static int boundary(const mstmm_state *state, const real *overall, real *root)
     return 0;
 }
 
-int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot)
+/* Numbers of the product in the workspace: per body matrices, then applied loads; accelerations. */
+static real *applied_loads(const mstmm_state *state)
+{
+    return state->workspace + state->model->product->place +
+           (size_t)PER_BODY * state->model->n_bodies;
+}
+
+static real *product_accelerations(const mstmm_state *state)
+{
+    return state->workspace + state->model->product->place +
+           (size_t)MSTMM_PRODUCT_PER_BODY * state->model->n_bodies;
+}
+
+static real *load_of(const mstmm_state *state, int index)
+{
+    return state->workspace + state->model->bodies[index].block + MSTMM_BLOCK_E;
+}
+
+/* Applied loads alone, per body (6 numbers, body axes), are what the load passes take from e. */
+int mstmm_hook_product_before_loads(mstmm_state *state)
+{
+    real *applied = applied_loads(state);
+    for (int i = 0; i < state->model->n_bodies; i++)
+        memcpy(applied + 6 * i, load_of(state, i), 6 * sizeof(real));
+    return 0;
+}
+
+int mstmm_hook_product(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     real overall[N * N], step[N * N], z[N], next[N];
-    real *numbers = state->workspace + model->product->place;
+    real *numbers = state->workspace + model->product->place, *applied = applied_loads(state);
+    real *udot = product_accelerations(state);
     memset(overall, 0, sizeof overall);
     for (int i = 0; i < N; i++) overall[(N + 1) * i] = 1;
     for (int i = 0; i < model->n_bodies; i++) {
         real *store = numbers + (size_t)PER_BODY * i;
+        for (int j = 0; j < 6; j++) applied[6 * i + j] -= load_of(state, i)[j];
         body_matrix(state, i, applied + 6 * i, store);
         int code = hinge_matrix(state, i, store);
         if (code) return mstmm_fail(state, MSTMM_FAILED_PRODUCT_PIVOT, i, code);
@@ -221,19 +262,42 @@ int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot)
         multiply(store + BODY, step, overall);
     }
     if (boundary(state, overall, z)) return mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, 0, 1);
-    const real still[6] = {0};
-    const real *parent = still;
+    const real *parent = mstmm_zeros;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         real *store = numbers + (size_t)PER_BODY * i;
         real *block = state->workspace + body->block;
         apply(store + HINGE, z, next);
-        mstmm_sweep_frames_state_deviation(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_MOTION, next,
-                                           store + STATE);
-        mstmm_project(body->nu, block, block + MSTMM_BLOCK_SHIFT, mstmm_h(block, body->nu),
-                      store + STATE, parent, udot + body->u);
+        mstmm_frames_state_deviation(.A = block + MSTMM_BLOCK_A,
+                                     .motion = block + MSTMM_BLOCK_MOTION, .z = next,
+                                     .delta = store + STATE);
+        mstmm_generic_project(body->nu, .Rc = block + MSTMM_BLOCK_R,
+                              .r = block + MSTMM_BLOCK_SHIFT,
+                              .H = mstmm_of_speeds(block, body->nu, MSTMM_SPEED_H),
+                              .delta = store + STATE, .delta_I = parent, .udot = udot + body->u);
         parent = store + STATE;
         apply(store + BODY, next, z);
     }
     return 0;
+}
+
+/* Largest deviation of the product from the Riccati sweep; keeps the product's values. */
+int mstmm_hook_product_compared(mstmm_state *state)
+{
+    const real *product = product_accelerations(state);
+    real *udot = state->udot, gap = 0, size = 0;
+    int worst = 0;
+    for (int i = 0; i < state->model->nu; i++) {
+        real here = fabs(product[i] - udot[i]);
+        if (!(here <= gap)) {
+            gap = here;
+            worst = i;
+        }
+        if (fabs(udot[i]) > size) size = fabs(udot[i]);
+        udot[i] = product[i];
+    }
+    real relative = size > 0 ? gap / size : gap;
+    return relative <= state->model->product->accuracy
+               ? 0
+               : mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, worst, MSTMM_FAILED_PRODUCT_ERROR);
 }

@@ -3,15 +3,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "elements.h"
 #include "compiled.h"
-#include "modal.h"
-
-typedef int (*energy_kernel)(const real *p, const real *v, const real *w, real *energy);
-typedef int (*inertia_kernel)(const real *p, real *inertia);
-typedef int (*quaternion_law)(const real *p, const real *q, const real *u, const real *axes,
-                              const real *effort, const real *reference, real *tau,
-                              real *potential, real *power, real *twist);
+#include "kernel_calls.h"
+#include "sweep_steps.h"
 
 static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, const real *memory,
                             mstmm_failure *failure)
@@ -20,38 +14,35 @@ static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, c
                          .observed = 1, .failure = failure};
 }
 
-/* State as `mstmm_accelerations` left it: coordinates filled, hinges known, poses computed. */
+/* State as `mstmm_accelerations_kept` left it: coordinates filled, hinges known, poses computed. */
 static int complete(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;
-    const real *scratch = state->workspace + model->scratch;
-    state->q = model->n_drives ? scratch : q;
-    state->u = model->n_drives ? scratch + model->nq : u;
-    state->values = state->workspace + model->scratch + model->nq + model->nu;
-    state->slots = state->values + model->n_values + 3 * model->n_drives;
-    real *qdot = state->slots + model->tape_slots;
+    state->q = model->n_drives ? state->filled_q : q;
+    state->u = model->n_drives ? state->filled_u : u;
+    state->qdot = state->spare_qdot;
     for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        int code = body->section ? mstmm_section_motion(state, i)
-                                 : mstmm_hinge_motion(state, i, qdot + body->q);
+        int code = model->bodies[i].section ? mstmm_at_section_motion(state, i)
+                                            : mstmm_at_hinge_motion(state, i);
         if (code) return code;
     }
-    mstmm_pose_pass(state, 1);
-    return 0;
+    state->hinges_known = 1;
+    return mstmm_run_posed(state);
 }
 
 static void observe_probe(const mstmm_state *state, const mstmm_probe *probe, real *out)
 {
     const real *block = mstmm_block(state->model, state->workspace, probe->body);
-    static const real rest[9] = {0};
-    const real *motion = probe->body < 0 ? rest : block + MSTMM_BLOCK_MOTION;
-    const real *gravity = probe->body < 0 ? rest : state->model->gravity;
-    mstmm_sweep_frames_point(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_X, block + MSTMM_BLOCK_V,
-                             motion, block + MSTMM_BLOCK_DELTA, probe->offset, gravity, out,
-                             out + 3, out + 6);
-    mstmm_sweep_frames_turning(block + MSTMM_BLOCK_A, motion, block + MSTMM_BLOCK_DELTA, out + 9,
-                               out + 12);
-    mstmm_sweep_frames_end_frame(block + MSTMM_BLOCK_A, probe->axes, out + 15);
+    const int moves = probe->body >= 0;
+    const real *a = block + MSTMM_BLOCK_A, *delta = block + MSTMM_BLOCK_DELTA;
+    const real *motion = moves ? block + MSTMM_BLOCK_MOTION : mstmm_zeros;
+    mstmm_frames_point(.A = a, .x = block + MSTMM_BLOCK_X, .v = block + MSTMM_BLOCK_V,
+                       .motion = motion, .delta = delta, .offset = probe->offset,
+                       .gravity = moves ? state->model->gravity : mstmm_zeros, .x_K = out,
+                       .v_K = out + 3, .a_K = out + 6);
+    mstmm_frames_turning(.A = a, .motion = motion, .delta = delta, .w_K = out + 9,
+                         .alpha_K = out + 12);
+    mstmm_frames_end_frame(.A = a, .R_end = probe->axes, .A_end = out + 15);
 }
 
 static void observe_hinges(const mstmm_state *state, const real *udot,
@@ -62,22 +53,24 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
         const mstmm_body *body = &model->bodies[i];
         real *block = state->workspace + body->block;
         real load[6], force[3], moment[3];
-        mstmm_sweep_frames_reaction(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E,
-                                    block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_A, load, force,
-                                    moment);
+        mstmm_frames_reaction(.S = block + MSTMM_BLOCK_S, .e = block + MSTMM_BLOCK_E,
+                              .delta = block + MSTMM_BLOCK_DELTA, .A = block + MSTMM_BLOCK_A,
+                              .f = load, .force = force, .moment = moment);
         if (wanted->loads) {
-            mstmm_sweep_frames_moment_at(block + MSTMM_BLOCK_A, body->held, load, moment);
+            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->held, .f = load,
+                                   .moment = moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
         }
         if (!wanted->efforts) continue;
         real *efforts = wanted->efforts + body->u;
-        mstmm_effort(body->nu, mstmm_h(block, body->nu), load, efforts);
+        mstmm_generic_effort(body->nu, .H = mstmm_of_speeds(block, body->nu, MSTMM_SPEED_H),
+                             .f = load, .tau = efforts);
         for (int j = 0; j < body->nu; j++) efforts[j] += body->rotor[j] * udot[body->u + j];
     }
 }
 
-static void observe_sums(const mstmm_state *state, const mstmm_balance *balance, real *sums)
+static void observe_sums(mstmm_state *state, const mstmm_balance *balance, real *sums)
 {
     const mstmm_model *model = state->model;
     memset(sums, 0, MSTMM_SUM_NUMBERS * sizeof(real));
@@ -88,19 +81,23 @@ static void observe_sums(const mstmm_state *state, const mstmm_balance *balance,
         const real *v = block + MSTMM_BLOCK_V, *w = block + MSTMM_BLOCK_MOTION;
         real inertia[21], momentum[6], energy;
         if (body->modal) {
-            mstmm_modal_momentum(state, i, inertia, momentum, &energy);
-            mstmm_sweep_frames_carried_momentum(a, x, momentum, sums + 4, sums + 7);
+            mstmm_at_momentum(state, i, inertia, momentum, &energy);
+            mstmm_frames_carried_momentum(.A = a, .x = x, .h = momentum, .p = sums + 4,
+                                          .L = sums + 7);
         } else {
-            ((inertia_kernel)body->inertia)(body->body_p, inertia);
-            ((energy_kernel)body->energy)(body->body_p, v, w, &energy);
-            mstmm_sweep_frames_momentum(inertia, a, x, v, w, sums + 4, sums + 7);
+            mstmm_body_inertia(body->inertia, .p = body->body_p, .S = inertia);
+            mstmm_body_energy(body->energy, .p = body->body_p, .v = v, .w = w, .T = &energy);
+            mstmm_frames_momentum(.S = inertia, .A = a, .x = x, .v = v, .w = w, .L = sums + 4,
+                                  .K = sums + 7);
         }
         sums[0] += energy;
         for (int j = 0; j < body->nu; j++) {
-            mstmm_sweep_frames_rotor_energy(body->rotor + j, state->u + body->u + j, &energy);
+            mstmm_frames_rotor_energy(.J = body->rotor + j, .u = state->u + body->u + j,
+                                      .T = &energy);
             sums[0] += energy;
         }
-        mstmm_sweep_frames_gravity_energy(inertia, a, x, model->gravity, &energy);
+        mstmm_frames_gravity_energy(.S = inertia, .A = a, .x = x, .gravity = model->gravity,
+                                    .V = &energy);
         sums[1] += energy;
     }
     sums[2] = balance->potential;
@@ -112,9 +109,8 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
 {
     mstmm_state state = state_of(model, workspace, t, memory, failure);
     mstmm_balance balance;
-    real *slots = workspace + model->scratch + model->nq + model->nu + model->n_values +
-                  3 * model->n_drives;
-    real *qdot = slots + model->tape_slots, *udot = qdot + model->nq;
+    mstmm_lay_out(&state);
+    real *qdot = state.spare_qdot, *udot = state.spare_udot;
     int code =
         mstmm_accelerations_kept(model, workspace, t, q, u, memory, qdot, udot, &balance, failure);
     if (!code) code = complete(&state, q, u);
@@ -181,16 +177,16 @@ static int scene_rhs(void *context, double t, const double *y, double *dy)
 /* Twist memory of the quaternion laws: the turn the last accepted step ended in. */
 static void remember_twists(mstmm_scene_run *run, const real *y)
 {
-    static const real zero[6] = {0};
     const mstmm_model *model = run->model;
     for (int k = 0; k < model->n_laws; k++) {
         const mstmm_law *law = &model->laws[k];
         if (law->twist < 0) continue;
         const mstmm_body *body = &model->bodies[law->body];
         real tau[6], potential, power, twist;
-        ((quaternion_law)law->evaluate)(law->p, y + body->q + law->coordinate, zero, law->axes,
-                                        zero, run->memory + law->twist, tau, &potential, &power,
-                                        &twist);
+        mstmm_law_quaternion(law->evaluate, .p = law->p, .q = y + body->q + law->coordinate,
+                             .u = mstmm_zeros, .B = law->axes, .effort = mstmm_zeros,
+                             .twist_ref = run->memory + law->twist, .tau = tau, .V = &potential,
+                             .P = &power, .twist = &twist);
         run->memory[law->twist] = twist;
     }
 }
@@ -206,7 +202,7 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
     }
     if (model->n_drives) {
         mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-        int code = mstmm_state_begin(&state, y, y + model->nq);
+        int code = mstmm_begin(&state, y, y + model->nq);
         if (code) return code;
         memcpy(y, state.q, (size_t)model->nq * sizeof(real));
         memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
@@ -240,15 +236,14 @@ static int scene_events(void *context, double t, const double *y, double *g)
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     const real *u = y + model->nq;
-    real *slots = run->workspace + model->scratch + model->nq + model->nu + model->n_values +
-                  3 * model->n_drives;
+    mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
+    mstmm_lay_out(&state);
     if (run->n_probes) {
-        mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-        real *qdot = slots + model->tape_slots, *one = run->probe_values + 6 * run->n_probes;
-        int code = mstmm_state_begin(&state, y, u);
-        if (!code) code = mstmm_forward_pass(&state, qdot);
+        real *one = run->probe_values + 6 * run->n_probes;
+        state.qdot = state.spare_qdot;
+        int code = mstmm_begin(&state, y, u);
+        if (!code) code = mstmm_run_motion(&state);
         if (code) return code;
-        mstmm_pose_pass(&state, 0);
         for (int k = 0; k < run->n_probes; k++) {
             observe_probe(&state, &run->probes[k], one);
             memcpy(run->probe_values + 6 * k, one, 6 * sizeof(real));
@@ -256,7 +251,7 @@ static int scene_events(void *context, double t, const double *y, double *g)
     }
     const real *inputs[] = {&t, y, u, run->probe_values};
     real *outputs[] = {g};
-    return mstmm_tape_run(run->event_tape, inputs, slots, outputs)
+    return mstmm_tape_run(run->event_tape, inputs, state.slots, outputs)
                ? MSTMM_FAILED_EXPRESSION
                : 0;
 }

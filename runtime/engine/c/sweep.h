@@ -6,30 +6,11 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "tape.h"
+#include "layout.h"
 #include "mstmm.h"
+#include "tape.h"
 
 /* cdef begin */
-/* Numbers of a body's block in the workspace; the ground's block comes first. */
-#define MSTMM_BLOCK_R 0
-#define MSTMM_BLOCK_SHIFT 9
-#define MSTMM_BLOCK_MOTION 12
-#define MSTMM_BLOCK_S 21
-#define MSTMM_BLOCK_E 42
-#define MSTMM_BLOCK_DELTA 48
-#define MSTMM_BLOCK_A 54
-#define MSTMM_BLOCK_X 63
-#define MSTMM_BLOCK_V 66
-#define MSTMM_BLOCK_HINGE_R 69
-#define MSTMM_BLOCK_HINGE_D 78
-#define MSTMM_BLOCK_HINGE_V 81
-#define MSTMM_BLOCK_HINGE_W 84
-#define MSTMM_BLOCK_HINGE_C 87
-#define MSTMM_BLOCK_FLOOR 93
-#define MSTMM_BLOCK_FIXED 95
-/* behind them, per speed: s, tau, g, udot of the free speeds, G (6), H (6), H of the free speeds (6) */
-#define MSTMM_BLOCK_PER_SPEED 22
-
 /* Reasons of a failure. */
 #define MSTMM_FAILED_UNDETERMINED 1
 #define MSTMM_FAILED_FORCE 2
@@ -195,6 +176,10 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
                            const real *u, const real *memory, const real *udot, real *efforts,
                            mstmm_failure *failure);
+/* M^-1 times `n` columns of efforts, one behind the other (nu each), on the speeds that nobody
+ * imposes; zero on the others. */
+int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real *q,
+                const real *memory, const real *columns, real *answers, mstmm_failure *failure);
 /* Numbers that a flexible body of n modes, and one of its sections, keep in the workspace. */
 int64_t mstmm_modal_numbers(int n);
 int64_t mstmm_section_numbers(int n);
@@ -213,44 +198,68 @@ static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
     return body->release < 0 || !(fabs(memory[body->release]) > 0) ? body->n_imposed : 0;
 }
 
-/* Places behind the fixed part of a block. */
-static inline real *mstmm_s(real *block, int nu) { (void)nu; return block + MSTMM_BLOCK_FIXED; }
-static inline real *mstmm_tau(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + nu; }
-static inline real *mstmm_g(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 2 * nu; }
-static inline real *mstmm_free(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 3 * nu; }
-static inline real *mstmm_gain(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 4 * nu; }
-static inline real *mstmm_h(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 10 * nu; }
-static inline real *mstmm_h_free(real *block, int nu) { return block + MSTMM_BLOCK_FIXED + 16 * nu; }
+static inline real *mstmm_of_speeds(real *block, int nu, int which)
+{
+    return block + MSTMM_BLOCK_FIXED + which * nu;
+}
 
+/* What a sweep is at. */
 typedef struct mstmm_state {
     const mstmm_model *model;
     real *workspace;
     real t;
-    const real *q, *u, *memory; /* q and u with driven coordinates filled in */
-    real *values, *slots;
-    int imposed_all; /* every speed follows `udot` (inverse dynamics) */
-    int linked;      /* runs with numbers are swept as links */
-    int observed;    /* idle ends are swept too */
-    const real *udot, *efforts;
+    const real *q, *u, *memory;   /* q and u with driven coordinates filled in */
+    const real *given;            /* prescribed accelerations (inverse dynamics), or NULL */
+    const real *efforts, *column; /* of the caller; NULL: none */
+    real *qdot, *udot, *required, *answer;
+    mstmm_balance *balance; /* NULL: not wanted */
     mstmm_failure *failure;
+    int linked;       /* runs with numbers are swept as links */
+    int observed;     /* idle ends are swept too */
+    int hinges_known; /* hinges have their motion already */
+    /* Parts of the workspace. */
+    real *filled_q, *filled_u, *values, *drive_values, *slots, *spare_qdot, *spare_udot;
 } mstmm_state;
 
-/* Fills driven coordinates and expression values, resets the ground. */
-int mstmm_state_begin(mstmm_state *state, const real *q, const real *u);
-int mstmm_forward_pass(mstmm_state *state, real *qdot);
-int mstmm_forward_body(mstmm_state *state, int body, const real *parent_motion, real *qdot);
-int mstmm_condense_body(mstmm_state *state, int body);
-void mstmm_recover_body(mstmm_state *state, int body, const real *parent_delta, real *udot);
-void mstmm_pose_pass(mstmm_state *state, int hinges_known);
-int mstmm_hinge_motion(mstmm_state *state, int body, real *qdot);
-int mstmm_law_pass(mstmm_state *state, mstmm_balance *balance);
-int mstmm_load_pass(mstmm_state *state, mstmm_balance *balance);
-/* tau = H^T f for any number of speeds. */
-void mstmm_effort(int nu, const real *subspace, const real *load, real *tau);
-/* Accelerations by the product of classical matrices, before the Riccati sweep of the same state. */
-int mstmm_product_pass(mstmm_state *state, const real *applied, real *udot);
-int mstmm_project(int nu, const real *rotation, const real *shift, const real *subspace,
-                  const real *deviation, const real *parent, real *udot);
+/* Places of a state's numbers in its workspace. */
+void mstmm_lay_out(mstmm_state *state);
+/* Ground, driven coordinates and expression values of a state. */
+int mstmm_begin(mstmm_state *state, const real *q, const real *u);
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);
+
+/* Is there nothing to do for this body in this sweep? */
+static inline int mstmm_idle(const mstmm_state *state, const mstmm_body *body)
+{
+    return body->idle && !state->observed;
+}
+
+/* The modes that a body or its section belongs to; NULL: none. */
+static inline const mstmm_modal *mstmm_modal_of(const mstmm_body *body)
+{
+    return body->modal ? body->modal : body->section ? body->section->modal : NULL;
+}
+
+static inline int mstmm_modes_of(const mstmm_modal *modal) { return modal ? modal->n : 0; }
+
+/* Number of the speeds of a hinge that nobody imposes, and which they are. */
+static inline int mstmm_free_speeds(const mstmm_state *state, const mstmm_body *body, int *columns)
+{
+    const int imposed = mstmm_imposed(body, state->memory);
+    int n = 0;
+    for (int j = 0; j < body->nu; j++)
+        if (!imposed || !body->imposed_mask[j]) columns[n++] = j;
+    return n;
+}
+
+static inline real mstmm_value_at(const mstmm_state *state, int place)
+{
+    return place < 0 ? 0 : state->values[place];
+}
+
+/* Given effort of a force element, by the distance of its ends and its rate. */
+int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length, real *value);
+
+static const real mstmm_zeros[42] = {0};
+static const real mstmm_identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 #endif

@@ -1,0 +1,35 @@
+"""Conditions of the schedule in the looped engine's C."""
+
+from __future__ import annotations
+
+from .storage import VARIABLES, reads
+
+#: C conditions of the traits.
+_TRAITS = {
+    "own": "!body->generic", "parts": "body->generic", "section": "body->section",
+    "outward": "body->section && !body->section->inward", "modal": "body->modal",
+    "imposed": "mstmm_imposed(body, state->memory)", "idle": "mstmm_idle(state, body)",
+    "drag": "body->modal && body->modal->drag", "inverse": "state->given",
+    "balance": "state->balance", "efforts": "state->efforts", "known": "state->hinges_known",
+    "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",
+    "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
+    "product": "model->product", "coordinate": "law->kind == 0", "effort": "force->effort",
+}  # fmt: skip
+
+
+def condition(when: str) -> str:
+    """C expression of a condition."""
+    words = []
+    for word in when.split():
+        text = _TRAITS[word.lstrip("!")]
+        simple = "&&" not in text and "==" not in text
+        if word.startswith("!"):
+            text = f"!{text}" if simple and not text.startswith("!") else f"!({text})"
+        words.append(text)
+    return " && ".join(words)
+
+
+def condition_needs(when: str) -> set[str]:
+    """Variables that it reads."""
+    texts = [_TRAITS[word.lstrip("!")] for word in when.split()]
+    return {name for name in VARIABLES for text in texts if reads(text, name)}

@@ -1,0 +1,207 @@
+"""Where the slots of the schedule lie in the looped engine's memory, as C expressions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from ..schedule.words import ROLES, SLOTS
+
+#: Numbers of a body's block in the workspace, in their order: slot -> name in C.
+BLOCK = {
+    "body.R": "R", "body.r": "SHIFT", "body.motion": "MOTION", "body.S": "S", "body.e": "E",
+    "body.delta": "DELTA", "body.A": "A", "body.x": "X", "body.v": "V", "hinge.R": "HINGE_R",
+    "hinge.d": "HINGE_D", "hinge.v": "HINGE_V", "hinge.w": "HINGE_W", "hinge.c": "HINGE_C",
+    "body.floor": "FLOOR",
+}  # fmt: skip
+#: Behind them, so many numbers per speed.
+PER_SPEED = {
+    "body.s": ("S", 1), "body.tau": ("TAU", 1), "hinge.g": ("OFFSET", 1),
+    "hinge.rates": ("RATES", 1), "hinge.G": ("GAIN", 6), "hinge.H": ("H", 6),
+    "hinge.H_free": ("H_FREE", 6),
+}  # fmt: skip
+#: Numbers of a flexible body in the workspace: slot -> (per mode, per pair of modes).
+MODES = {
+    "modes.S_rf": (6, 0), "modes.based": (6, 0), "modes.A": (6, 0), "modes.right": (7, 0),
+    "modes.gain": (7, 0), "modes.S_ff": (0, 1), "modes.work": (0, 1), "modes.e_f": (1, 0),
+    "modes.etadd": (1, 0),
+}  # fmt: skip
+#: Numbers of a section in the workspace: slot -> (per mode, others).
+SECTION = {
+    "section.Phi": (6, 0), "section.H": (6, 0), "section.push": (6, 0), "section.H6": (0, 36),
+    "section.x": (0, 3), "section.Psi": (0, 3), "section.xd": (0, 3), "section.Psid": (0, 3),
+    "section.xdd": (0, 3), "section.Psidd": (0, 3),
+}  # fmt: skip
+#: Slots that lie where another does, which is not wanted any more by then.
+SHARED = {"hinge.F": "hinge.H", "modes.felt": "modes.right"}
+
+_MOMENTS = {
+    "p": "rigid", "C": "c", "P": "p", "B": "b",
+    **{f"Z_{ab}": f"z[{k}]" for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))},
+    **{f"Y_{a}": f"y[{k}]" for k, a in enumerate("xyz")},
+    **{f"G_{a}": f"g[{k}]" for k, a in enumerate("xyz")}, "M": "m",
+}  # fmt: skip
+_STATE = {"given": "given", "efforts": "efforts", "udot": "udot", "required": "required",
+          "column": "column", "answer": "answer"}  # fmt: skip
+
+#: What the scene gives, and where results go.
+_PLACES = {
+    "body.p": "body->body_p", "body.rotor": "body->rotor", "hinge.p": "body->hinge_p",
+    "connection.R": "body->connection", "connection.r": "body->connection + 9",
+    "body.q": "state->q + body->q", "body.u": "state->u + body->u",
+    "body.qdot": "state->qdot + body->q", "body.w": "block + MSTMM_BLOCK_MOTION",
+    **{f"body.{name}": f"state->{to} + body->u" for name, to in _STATE.items()},
+    "modes.eta": "state->q + modal->q", "modes.etad": "state->u + modal->u",
+    "modes.qdot": "state->qdot + modal->q",
+    **{f"modes.{name}": f"state->{to} + modal->u" for name, to in _STATE.items()},
+    "modes.K": "modal->stiffness", "modes.D": "modal->damping",
+    **{f"moments.{name}": f"modal->moments.{to}" for name, to in _MOMENTS.items()},
+    **{f"drag.{name}": f"modal->drag->{to}" for name, to in _MOMENTS.items()},
+    "section.r": "section->point", "section.phi": "section->phi",
+    "section.theta": "section->theta", "section.end": "section->end",
+    **{f"section.g_{a}": f"section->drawn[{k}]" for k, a in enumerate("xyz")},
+    **{f"section.h_{a}": f"section->turned[{k}]" for k, a in enumerate("xyz")},
+    "drive.value": "state->drive_values + 3 * index",
+    "drive.rate": "state->drive_values + 3 * index + 1",
+    "drive.acceleration": "state->drive_values + 3 * index + 2",
+    "drive.q": "state->filled_q + body->q + drive->coordinate",
+    "drive.u": "state->filled_u + body->u + drive->speed",
+    "drive.s": "block + MSTMM_BLOCK_FIXED + drive->speed",
+    "speed.effort": "state->efforts + index", "speed.u": "state->u + index",
+    "law.p": "law->p", "law.q": "state->q + body->q + law->coordinate",
+    "law.u": "state->u + body->u + law->speed", "law.effort": "law->effort",
+    "law.axes": "law->axes", "law.turn": "state->memory + law->twist",
+    "law.tau": "block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed",
+    "load.axes_own": "load->axes_own", "load.offset": "load->offset", "load.force": "load->force",
+    "load.moment": "load->moment", "force.p": "force->p",
+    "force.offset_F": "force->offset_f", "force.offset_T": "force->offset_t",
+    "force.axes_F": "force->axes_f", "force.axes_T": "force->axes_t",
+    "scene.t": "&state->t", "sums.power": "&state->balance->power",
+    "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
+    "zero": "mstmm_zeros", "none": "mstmm_zeros",
+    "link.numbers": "at.numbers", "link.b": "at.numbers + 5", "link.p": "at.numbers + 15",
+    "link.q": "at.q", "link.u": "at.u", "link.qdot": "at.qdot", "link.udot": "at.udot",
+    "link.tau": "at.tau", "link.turn": "at.link + MSTMM_LINK_TURN",
+    "link.shift": "at.link + MSTMM_LINK_SHIFT", "link.motion": "at.link + MSTMM_LINK_MOTION",
+    "link.load": "at.link + MSTMM_LINK_LOAD", "link.g": "at.link + MSTMM_LINK_FIXED",
+    "link.G": "at.link + MSTMM_LINK_FIXED + at.nu", "outer.motion": "at.outer_motion",
+    "outer.delta": "at.outer_delta", "outer.S": "at.outer", "outer.e": "at.outer + 21",
+    "inner.S": "at.inner", "inner.e": "at.inner + 21",
+}  # fmt: skip
+
+#: Variables of the printed functions: name -> (declaration, variables it needs).
+VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "law": ("const mstmm_law *law = &state->model->laws[index];", ()),
+    "load": ("const mstmm_load *load = &state->model->loads[index];", ()),
+    "force": ("const mstmm_force *force = &state->model->forces[index];", ()),
+    "drive": ("const mstmm_drive *drive = &state->model->drives[index];", ()),
+    "body": ("const mstmm_body *body = &state->model->bodies[{body}];", ()),
+    "block": ("real *block = state->workspace + body->block;", ("body",)),
+    "parent": ("real *parent = mstmm_block(state->model, state->workspace, body->parent);",
+               ("body",)),
+    "on": ("real *on = mstmm_block(state->model, state->workspace, load->body);", ("load",)),
+    "axes": ("real *axes = mstmm_block(state->model, state->workspace, load->axes);", ("load",)),
+    "from": ("real *from = mstmm_block(state->model, state->workspace, force->body_f);",
+             ("force",)),
+    "to": ("real *to = mstmm_block(state->model, state->workspace, force->body_t);", ("force",)),
+    "nu": ("const int nu = body->nu;", ("body",)),
+    "modal": ("const mstmm_modal *modal = mstmm_modal_of(body);", ("body",)),
+    "n": ("const int n = mstmm_modes_of(modal);", ("modal",)),
+    "modes": ("real *modes = modal ? state->workspace + modal->place : NULL;", ("modal",)),
+    "section": ("const mstmm_section *section = body->section;", ("body",)),
+    "laid": ("real *laid = section ? state->workspace + section->place : NULL;", ("section",)),
+    "columns": ("int columns[6];", ()),
+    "speeds": ("const int speeds = mstmm_free_speeds(state, body, columns);",
+               ("body", "columns")),
+}  # fmt: skip
+#: Which body the subject of a pass is about.
+BODY_OF = {"body": "index", "law": "law->body", "drive": "drive->body"}
+
+
+@dataclass
+class Place:
+    """C expression of a slot, and the variables it reads."""
+
+    text: str
+    needs: set[str] = field(default_factory=set)
+
+
+def place(slot: str) -> Place | None:
+    """Where a slot lies; None for one that is local to a function."""
+    name, _, picked = slot.partition("[")
+    slot = SHARED.get(name, name)
+    found = _PLACES.get(slot) or _stored(slot)
+    if found is None:
+        return None
+    text = f"{found} + {picked.rstrip(']')}" if picked else found
+    return Place(text, {word for word in VARIABLES if reads(text, word)})
+
+
+def _stored(slot: str) -> str | None:
+    owner, _, name = slot.partition(".")
+    if owner in ROLES:
+        inner = f"body.{'motion' if name == 'w' else name}"
+        return f"{owner} + MSTMM_BLOCK_{BLOCK[inner]}" if inner in BLOCK else None
+    if slot in BLOCK:
+        return f"block + MSTMM_BLOCK_{BLOCK[slot]}"
+    if slot in PER_SPEED:
+        return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{PER_SPEED[slot][0]})"
+    for layout, start in ((MODES, "modes"), (SECTION, "laid")):
+        if slot in layout:
+            return f"{start} + {_macro(slot)}(n)"
+    return None
+
+
+def _macro(slot: str) -> str:
+    return f"MSTMM_{slot.replace('.', '_').upper()}"
+
+
+def _offsets(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
+    """Macros of where the slots of a layout begin, by the number of modes."""
+    lines, counts = [], [0, 0]
+    for slot, sizes in layout.items():
+        lines.append(f"#define {_macro(slot)}(n) ({counts[0]} * (size_t)(n) + {counts[1]}{second})")
+        counts = [a + b for a, b in zip(counts, sizes, strict=True)]
+    return lines
+
+
+def reads(text: str, word: str) -> bool:
+    """Whether a C expression names a variable (no member of a record)."""
+    return re.search(rf"(?<![\w>.]){word}\b", text) is not None
+
+
+def size_of(slot: str) -> str:
+    """C expression of the length of a slot that is copied or added to."""
+    name, _, picked = slot.partition("[")
+    if picked:
+        return "1"
+    if name.startswith("law."):
+        return "law->n"
+    words = SLOTS[name].size.split()
+    return " * ".join({"nu": "nu", "n": "n"}.get(word, word) for word in words)
+
+
+def layout_header() -> str:
+    """`layout.h`: where the numbers of a body lie in the workspace."""
+    lines, at = [], 0
+    for slot, name in BLOCK.items():
+        lines.append(f"#define MSTMM_BLOCK_{name} {at}")
+        at += int(SLOTS[slot].size)
+    lines.append(f"#define MSTMM_BLOCK_FIXED {at}")
+    per, rows = 0, []
+    for name, count in PER_SPEED.values():
+        rows.append(f"#define MSTMM_SPEED_{name} {per}")
+        per += count
+    rows.append(f"#define MSTMM_BLOCK_PER_SPEED {per}")
+    return (
+        "/* Generated by mstmm; do not edit.  Numbers of a body's block in the workspace; the\n"
+        " * ground's block comes first. */\n"
+        "#ifndef MSTMM_LAYOUT_H\n#define MSTMM_LAYOUT_H\n\n/* cdef begin */\n"
+        + "\n".join(lines)
+        + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
+        + "\n".join(rows)
+        + "\n/* cdef end */\n\n"
+        + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
+        + "\n".join([*_offsets(MODES, " * (size_t)(n) * (n)"), *_offsets(SECTION, "")])
+        + "\n\n#endif\n"
+    )

@@ -1,0 +1,119 @@
+"""Flexible bodies: sections passed, modal rows made, condensed and recovered."""
+
+from __future__ import annotations
+
+from .steps import ROOT_TO_TIPS, Add, Copy, Pass, call
+
+_FIELDS = (
+    "p", "C", "P", "B", "Z_xx", "Z_xy", "Z_xz", "Z_yy", "Z_yz", "Z_zz", "Y_x", "Y_y", "Y_z",
+    "G_x", "G_y", "G_z", "M",
+)  # fmt: skip
+_MOMENTS = {name: f"moments.{name}" for name in _FIELDS}
+_DRAG = {name: f"drag.{name}" for name in _FIELDS}
+_NUMBERS = {
+    name: f"section.{name}"
+    for name in ("r", "phi", "theta", "g_x", "g_y", "g_z", "h_x", "h_y", "h_z")
+}
+_STATE = {"eta": "modes.eta", "etad": "modes.etad"}
+_LAID = {name: f"section.{name}" for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
+_ACROSS = {
+    "R": "hinge.R", "d": "hinge.d", "H6": "section.H6", "v": "hinge.v", "w": "hinge.w",
+    "c": "hinge.c",
+}  # fmt: skip
+
+SECTION_MOTION = Pass(
+    "section_motion", "body", "Relative motion across a section of a flexible body.",
+    (
+        call("modal.section", **_NUMBERS, **_STATE, Phi="section.Phi", **_LAID),
+        call("modal.outward", when="outward", fails="section", R_end="section.end", **_LAID,
+             **_ACROSS),
+        call("modal.inward", when="!outward", fails="section", R_end="section.end", **_LAID,
+             **_ACROSS),
+        call("modal.subspace", H6="section.H6", Phi="section.Phi", H="section.H"),
+        call("modal.imposed", when="inverse", H="section.H", s="modes.given", c="hinge.c",
+             c_s="local.c"),
+        Copy(to="hinge.c", source="local.c", when="inverse"),
+    ),
+)  # fmt: skip
+
+MODAL_OWN = Pass(
+    "modal_own", "body", "S, e and the modal rows of a flexible body at its bias motion.",
+    (
+        call("modal.residual", **_MOMENTS, K="modes.K", D="modes.D", **_STATE,
+             motion="body.motion", S="body.S", S_rf="modes.S_rf", A="modes.A", S_ff="modes.S_ff",
+             e="body.e", e_f="modes.e_f"),
+        Copy(to="modes.qdot", source="modes.etad"),
+        call("modal.prescribed", when="inverse", S_rf="modes.S_rf", S_ff="modes.S_ff",
+             s="modes.given", e="body.e", e_f="modes.e_f"),
+    ),
+)  # fmt: skip
+
+#: Modes eliminated from S and e of the body, before its hinge is passed.
+_CONDENSED = {"S_c": "local.S_c", "e_c": "local.e_c", "Gg": "modes.gain", "right": "modes.right"}
+MODAL_CONDENSE = Pass(
+    "modal_condense", "body", "Modes eliminated from S and e of a flexible body.",
+    (
+        Add(to="modes.e_f", source="modes.efforts", times=-1, when="efforts"),
+        call("modal.rebase", when="section", H="section.H", S="body.S", e="body.e",
+             S_rf="modes.S_rf", S_rf_I="modes.based", S_ff="modes.S_ff", e_f="modes.e_f"),
+        call("modal.condense", when="section", fails="modes", S="body.S", e="body.e",
+             S_rf="modes.based", S_ff="modes.S_ff", e_f="modes.e_f", work="modes.work",
+             **_CONDENSED),
+        call("modal.condense", when="!section", fails="modes", S="body.S", e="body.e",
+             S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f", work="modes.work",
+             **_CONDENSED),
+        Copy(to="body.S", source="local.S_c"),
+        Copy(to="body.e", source="local.e_c"),
+    ),
+)  # fmt: skip
+
+#: What hangs on an end, seen by the modes of the body that it belongs to.
+ABSORBED = call(
+    "modal.absorb", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
+    U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
+)  # fmt: skip
+
+#: The modes' part of the deviation behind a section.
+DISPLACED = (
+    call("modal.displaced", H="section.H", etadd="modes.etadd", delta_I="body.delta",
+         delta="local.delta"),
+    Copy(to="body.delta", source="local.delta"),
+)  # fmt: skip
+
+#: What is felt on a section, on the modes.
+FELT = (
+    call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.felt"),
+    Copy(to="modes.e_f", source="modes.felt"),
+)
+
+STRAIN = Pass(
+    "strain", "body", "Strain energy and damping of flexible bodies.",
+    (
+        call("modal.strain_energy", K="modes.K", D="modes.D", **_STATE, V="local.V",
+             W_d="local.P"),
+        Add(to="sums.potential", source="local.V"),
+        Add(to="sums.power", source="local.P", times=-1),
+    ),
+    skip="!modal",
+)  # fmt: skip
+
+DRAG = Pass(
+    "drag", "body", "Viscous drag of flexible bodies: momentum under the density of the drag.",
+    (
+        call("modal.momentum", **_DRAG, **_STATE, v="body.v", w="body.w", S="local.S",
+             S_rf="modes.based", A="modes.A", h="local.h", h_f="modes.felt", T="local.T"),
+        Add(to="body.e", source="local.h"),
+        Add(to="modes.e_f", source="modes.felt"),
+        Add(to="sums.power", source="local.T", times=-2, when="balance"),
+    ),
+    order=ROOT_TO_TIPS, skip="!drag",
+)  # fmt: skip
+
+MOMENTUM = Pass(
+    "momentum", "body", "Mass matrix of the frame, momentum and energy of a flexible body.",
+    (
+        call("modal.momentum", **_MOMENTS, **_STATE, v="body.v", w="body.w", S="given.S",
+             S_rf="modes.based", A="modes.A", h="given.h", h_f="modes.felt", T="given.T"),
+    ),
+    given=("given.S", "given.h", "given.T"),
+)  # fmt: skip

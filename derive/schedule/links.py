@@ -1,0 +1,44 @@
+"""Links: a rigid body behind a hinge that moves about and along z, one kernel a pass.
+
+Bodies in a row that are links are swept without touching their blocks: between the passes there is
+no more in memory than the next pass reads, and S and e stay at hand from link to link.
+"""
+
+from __future__ import annotations
+
+from .steps import TIPS_TO_ROOT, Pass, call
+
+_LINK = {"link": "link.numbers", "turn": "link.turn"}
+_BODY = {"b": "link.b", "p": "link.p"}
+
+LINK_ANGLE = Pass(
+    "link_angle", "link", "Angle about z; its sine and cosine are taken for two links at a time.",
+    (call("link.angle", link="link.numbers", q="link.q", theta="link.turn"),),
+)  # fmt: skip
+
+LINK_FORWARD = Pass(
+    "link_forward", "link", "Bias motion and own load of a link.",
+    (
+        call("link.forward", fails="hinge", **_LINK, **_BODY, q="link.q", u="link.u",
+             motion_I="outer.motion", d="link.shift", motion="link.motion", e_B="link.load",
+             qdot="link.qdot"),
+    ),
+)  # fmt: skip
+
+LINK_CONDENSE = Pass(
+    "link_condense", "link", "S and e of what hangs on a link, and of the link itself, carried on.",
+    (
+        call("link.condense", fails="undetermined", **_LINK, d="link.shift", **_BODY,
+             S_K="inner.S", e_K="inner.e", e_B="link.load", tau="link.tau", G="link.G",
+             g="link.g", S_I="outer.S", e_I="outer.e"),
+    ),
+    order=TIPS_TO_ROOT,
+)  # fmt: skip
+
+LINK_RECOVER = Pass(
+    "link_recover", "link", "Acceleration of a link, and its deviation in place of its motion.",
+    (
+        call("link.recover", **_LINK, d="link.shift", p="link.p", G="link.G", g="link.g",
+             delta_I="outer.delta", udot="link.udot", delta="link.motion"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,64 @@
+"""M^-1 times columns: S factored once, then one load from tips to root and back for each column."""
+
+from __future__ import annotations
+
+from .flexible import ABSORBED, DISPLACED, FELT, MODAL_CONDENSE
+from .motion import HINGE_MOTION
+from .riccati import BODY, FREE, FREE_EFFORTS
+from .steps import TIPS_TO_ROOT, Add, Copy, Do, Pass, Spread, call, only
+
+FACTORISE = Pass(
+    "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
+    (
+        Do(whole=HINGE_MOTION, when="own"),
+        Do(whole=MODAL_CONDENSE, when="modal"),
+        *only("outward", ABSORBED),
+        *FREE,
+        call("generic{free}.factor", H="hinge.H_free", J="hinge.J_free", S="body.S", F="hinge.F"),
+        # Loads are carried along unread: columns start from none.
+        call("generic{free}.condense", fails="undetermined", **BODY, H="hinge.H_free",
+             J="hinge.J_free", floor="body.floor", S="body.S", e="body.e", tau="zero",
+             G="hinge.G", g="hinge.g", S_I="parent.S", e_I="parent.e"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+COLUMN = Pass(
+    "column", "body", "One column as efforts, and no load yet.",
+    (
+        Copy(to="body.e"),
+        Copy(to="body.tau", source="body.column"),
+        *only("modal", Copy(to="modes.e_f"),
+              Add(to="modes.e_f", source="modes.column", times=-1)),
+    ),
+)  # fmt: skip
+
+COLUMN_CARRIED = Pass(
+    "column_carried", "body", "The column's load carried across the hinge to the parent.",
+    (
+        *only("modal section", *FELT),
+        *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
+                            e_c="local.e_c"),
+              Copy(to="body.e", source="local.e_c")),
+        *only("outward", *FELT),
+        FREE_EFFORTS,
+        call("generic{free}.push", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
+             tau="hinge.tau_free", y="hinge.g", e_I="parent.e"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+COLUMN_ANSWERED = Pass(
+    "column_answered", "body", "Accelerations that answer the column.",
+    (
+        call("generic{free}.answer", **BODY, H="hinge.H_free", F="hinge.F", G="hinge.G",
+             y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        Spread(to="body.answer", free="hinge.rates"),
+        *only("modal", call("modal.answer", S_ff="modes.S_ff", e_f="modes.e_f", Gg="modes.gain",
+                            delta_I="body.delta", y="modes.felt", etadd="modes.etadd",
+                            work="modes.work"),
+              Copy(to="modes.answer", source="modes.etadd")),
+        *only("section", *DISPLACED),
+    ),
+    skip="idle",
+)  # fmt: skip

@@ -1,0 +1,86 @@
+"""Which passes make accelerations, efforts or a solution, in their order."""
+
+from __future__ import annotations
+
+from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
+from .inverse import REQUIRED
+from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
+from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
+from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
+from .riccati import CONDENSE, RECOVER
+from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
+from .steps import Pass, Run, Sweep
+
+GIVEN = Sweep(
+    "given", "Driven coordinates, and the values of the scene's expressions.",
+    (
+        Run(whole=PRESCRIBED),
+        Run(hook="drive_values", when="driven"),
+        Run(whole=DRIVES, when="driven"),
+        Run(hook="expression_values"),
+    ),
+)  # fmt: skip
+_APPLIED = (
+    Run(whole=DRAG, when="posed flexible"),
+    Run(whole=LOADS, when="posed"),
+    Run(whole=FORCES, when="posed"),
+)
+
+ACCELERATIONS = Sweep(
+    "accelerations", "Rates of the coordinates and accelerations.",
+    (
+        Run(hook="links_forward", when="linked"),
+        Run(whole=FORWARD, when="!linked"),
+        Run(whole=EFFORTS_POWER, when="balance efforts"),
+        Run(whole=EFFORTS),
+        Run(whole=LAWS),
+        Run(whole=STRAIN, when="balance flexible"),
+        Run(whole=POSES, when="posed"),
+        Run(hook="product_before_loads", when="product"),
+        *_APPLIED,
+        Run(hook="product", when="product"),
+        Run(hook="links_condense", when="linked"),
+        Run(hook="links_recover", when="linked"),
+        Run(whole=CONDENSE, when="!linked"),
+        Run(whole=RECOVER, when="!linked"),
+        Run(whole=DRIVE_POWER, when="balance"),
+        Run(hook="product_compared", when="product"),
+    ),
+)  # fmt: skip
+
+INVERSE_DYNAMICS = Sweep(
+    "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
+    (
+        Run(whole=FORWARD),
+        Run(whole=EFFORTS),
+        Run(whole=LAWS),
+        Run(whole=POSES, when="posed"),
+        *_APPLIED,
+        Run(whole=REQUIRED),
+    ),
+)  # fmt: skip
+
+MOTION = Sweep(
+    "motion", "Poses and velocities of all bodies.", (Run(whole=FORWARD), Run(whole=POSES)),
+)  # fmt: skip
+POSED = Sweep("posed", "Poses alone, behind a sweep.", (Run(whole=POSES),))
+
+FACTORISATION = Sweep(
+    "factorisation",
+    "The mass matrix of the tree factored, at rest and without loads.",
+    (Run(whole=PRESCRIBED), Run(whole=FORWARD), Run(whole=FACTORISE)),
+)
+SOLUTION = Sweep(
+    "solution",
+    "One column: accelerations that given efforts alone produce.",
+    (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
+)
+
+SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, MOTION, POSED, FACTORISATION, SOLUTION)
+
+#: Passes that the looped engine's own C does for one subject at a time: links and what lies between
+#: their runs, observations.
+SINGLY: tuple[Pass, ...] = (
+    FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM,
+    LINK_ANGLE, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,
+)  # fmt: skip

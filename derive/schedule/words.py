@@ -1,0 +1,220 @@
+"""The words of the schedule: what each slot holds and what each trait asks.
+
+A slot is "owner.name".  `parent`, `on`, `axes`, `from` and `to` stand for the body that is meant,
+`modes` for the flexible body that a section belongs to; `local` lives for one subject of one pass.
+"[4 7]" behind a slot picks entries, "[k]" the entry of the speed at hand.  Sizes: numbers, nu and
+free (speeds of the hinge, those nobody imposes), n (modes), nq.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Constants that any port may read; as long as the port.
+CONSTANTS = {"identity": "axes without a turn", "zero": "zeros", "none": "no numbers at all"}
+
+#: Owners that stand for a body by its role.
+ROLES = ("parent", "on", "axes", "from", "to")
+
+
+@dataclass(frozen=True)
+class Slot:
+    """What a slot holds; `size` is a product of numbers and names."""
+
+    name: str
+    size: str
+    meaning: str
+
+
+_BODY = """
+R | 9 | rotation, body axes to parent axes
+r | 3 | P of the body from P of the parent, parent axes
+motion | 9 | bias motion w, wd, rdd of P, own axes
+S | 21 | f = S a + e of everything outboard, at P
+e | 6 | force part of f = S a + e, at P
+delta | 6 | deviation of the acceleration from the bias motion
+A | 9 | axes, body to inertial
+x | 3 | P, inertial axes
+v | 3 | velocity of P, own axes
+floor | 2 | least inertia along and about an axis that is not rounding
+s | nu | prescribed part of the accelerations
+tau | nu | efforts on the speeds
+chosen | nu | accelerations that stop the bias motion along free directions
+own | 21 | S of the body alone
+w | 3 | angular velocity, own axes: the first of `motion`
+p | np | numbers of the body's kernels
+q | nq | coordinates of the hinge
+u | nu | speeds of the hinge
+rotor | nu | inertia of rotors reflected to the speeds
+given | nu | accelerations that inverse dynamics is asked for
+efforts | nu | efforts of the caller
+qdot | nq | rates of the coordinates
+udot | nu | accelerations
+required | nu | efforts that given accelerations need
+column | nu | right-hand side of a solution
+answer | nu | accelerations that answer it
+"""
+_HINGE = """
+R | 9 | rotation across the hinge, outboard to inboard hinge axes
+d | 3 | P from Q, inboard hinge axes
+H | 6 nu | motion subspace
+v | 3 | relative velocity, outboard axes
+w | 3 | relative angular velocity, outboard axes
+c | 6 | acceleration at rest in the speeds
+p | np | numbers of the hinge's kernels
+G | 6 nu | udot = g - G a
+g | nu | udot = g - G a
+rates | nu | accelerations of the free speeds
+H_free | 6 free | columns of H that nobody imposes
+J_free | free | rotor inertia of the free speeds
+tau_free | free | efforts on the free speeds
+F | free free | D = L diag(d) L^T: L, and 1 / d on the diagonal
+Z | 6 free | diag(d)^-1 L^-1 U^T
+z | free | diag(d)^-1 L^-1 (tau - H^T e)
+W | 6 free | unit columns of H, transposed
+"""
+_CONNECTION = """
+R | 9 | inboard hinge axes to parent axes
+r | 3 | Q in the parent
+motion | 9 | bias motion of the inboard hinge frame
+w | 3 | its angular velocity
+"""
+_MODES = """
+eta | n | modal coordinates
+etad | n | modal rates
+qdot | n | rates of the modal coordinates
+udot | n | modal accelerations
+etadd | n | modal accelerations, kept
+given | n | modal accelerations that inverse dynamics is asked for
+efforts | n | efforts of the caller on the modes
+required | n | efforts that given modal accelerations need
+column | n | right-hand side of a solution
+answer | n | modal accelerations that answer it
+K | n n | stiffness
+D | n n | damping
+S_rf | 6 n | frame rows, modal columns
+based | 6 n | the same seen from the section that is held
+A | 6 n | acceleration of second order by modal rates
+S_ff | n n | modal rows and columns
+e_f | n | force part of the modal rows
+right | 7 n | right-hand sides of the modal elimination
+gain | 7 n | etadd = g - G a: columns of G, then -g
+work | n n | factor of S_ff
+felt | n | efforts on the modes
+"""
+_SECTION = """
+Phi | 6 n | shapes at the section
+x | 3 | place of the section in the frame
+Psi | 3 | rotation vector of the section
+xd | 3 | its rate of place
+Psid | 3 | its rate of rotation
+xdd | 3 | bias of place
+Psidd | 3 | bias of rotation
+H6 | 36 | motion of the end by motion of the section
+H | 6 n | motion subspace of the modes
+push | 6 n | S H of what hangs on the section
+end | 9 | axes of the end in the section
+"""
+_OTHERS = """
+link.numbers | 5 | screws about x and z from link to link
+link.b | 10 | numbers of the rigid body
+link.p | 1 | number of the hinge
+link.q | nq | coordinates; of a turned hinge with its constant angle
+link.u | nu | speeds
+link.qdot | nq | rates of the coordinates
+link.udot | nu | accelerations
+link.tau | nu | efforts
+link.turn | 2 | angle, then its cosine and sine
+link.shift | 1 | along z
+link.lift | 3 | constant shift of the hinge's own screw
+link.motion | 9 | bias motion; after recovery the deviation
+link.load | 6 | e of the body alone
+link.G | 6 nu | udot = g - G a
+link.g | nu | udot = g - G a
+outer.motion | 9 | bias motion of what the link hangs on
+outer.delta | 6 | deviation of what the link hangs on
+outer.S | 21 | S handed on to what the link hangs on
+outer.e | 6 | e handed on
+inner.S | 21 | S of what hangs on the link
+inner.e | 6 | e of what hangs on the link
+drive.value | 1 | value of the drive
+drive.rate | 1 | its rate
+drive.acceleration | 1 | its acceleration
+drive.q | 1 | the coordinate
+drive.u | 1 | the speed
+drive.s | 1 | the prescribed acceleration
+speed.effort | 1 | effort of the caller
+speed.u | 1 | speed
+law.p | np | numbers of the law
+law.q | nq | coordinates that it reads
+law.u | nu | speeds that it reads
+law.effort | nu | its given efforts, places among the expression values
+law.axes | 9 | axes of springs
+law.turn | 1 | turns counted so far
+law.tau | nu | efforts on its speeds
+load.axes_own | 9 | axes of the components in the body that they belong to
+load.offset | 3 | point, body axes
+load.force | 3 | places among the expression values
+load.moment | 3 | places among the expression values
+force.p | np | numbers of the element
+force.effort | 1 | its given effort, an expression
+force.offset_F | 3 | end F, body axes
+force.offset_T | 3 | end T, body axes
+force.axes_F | 9 | axes of end F
+force.axes_T | 9 | axes of end T
+scene.t | 1 | time
+sums.power | 1 | power of everything that is not stored
+sums.potential | 1 | potential of springs, laws and strain
+given.S | 21 | mass matrix asked for
+given.h | 6 | momentum asked for
+given.T | 1 | energy asked for
+"""
+
+
+def _rows(owner: str, text: str) -> list[Slot]:
+    rows = [[word.strip() for word in line.split("|")] for line in text.strip().split("\n")]
+    return [Slot(f"{owner}.{name}" if owner else name, size, said) for name, size, said in rows]
+
+
+#: Every slot but the local ones, whose size is that of the port that fills them.
+SLOTS: dict[str, Slot] = {
+    slot.name: slot
+    for slot in (
+        *_rows("body", _BODY), *_rows("hinge", _HINGE), *_rows("connection", _CONNECTION),
+        *_rows("modes", _MODES), *_rows("section", _SECTION), *_rows("", _OTHERS),
+    )
+}  # fmt: skip
+
+#: Numbers of fields, by the names of the ports that read them.
+FIELDS = ("moments", "drag", "section")
+
+#: trait -> what it asks.
+TRAITS: dict[str, str] = {
+    "own": "the hinge's own kernels sweep across it, one a pass",
+    "parts": "the hinge's motion is known; the steps for any hinge sweep across it",
+    "staged": "by parts, and stage by stage: code for one scene, in which what is known folds",
+    "axial": "the hinge is a screw about z that leaves its H as it is",
+    "special": "every speed is free and without rotor, and the hinge has its own elimination",
+    "free": "some speed is not imposed",
+    "imposed": "some speed is driven, or held until its release",
+    "hung": "the parent is a body, not the ground",
+    "link": "the connection is a screw about x, with a constant part of the hinge's own screw",
+    "turned": "that constant part turns",
+    "idle": "an end that nothing hangs on or acts on, and nobody observes",
+    "modal": "the floating frame of a flexible body",
+    "section": "the connection passes a section of a flexible body",
+    "outward": "from the frame out to an end",
+    "drag": "a flexible body with viscous drag",
+    "known": "hinges have their motion already",
+    "coordinate": "a law on one coordinate (otherwise on a quaternion and its turns)",
+    "effort": "the element has a given effort",
+    "efforts": "the caller adds efforts",
+    "balance": "power and potential are wanted",
+    "inverse": "accelerations are given",
+    "linked": "runs of links are swept as such",
+    "laws": "there are laws",
+    "driven": "there are drives",
+    "flexible": "there are flexible bodies",
+    "posed": "loads or force elements need poses",
+    "product": "the product of classical matrices is asked for too",
+}

@@ -1,0 +1,81 @@
+"""M^-1 times columns: by the looped engine, or by code compiled for the scene where that pays."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import EnvironmentFailure
+
+from .code import Fusing
+from .engine import Engine
+
+if TYPE_CHECKING:
+    from ..kernels.columns import ColumnsLibrary
+
+#: Numbers of right-hand sides that are worth a compiler run: what it takes, by what one saves.
+WORTH_COMPILING = 300_000
+
+
+class Solver:
+    """Solutions of one scene.  Safe to call from several threads."""
+
+    def __init__(self, engine: Engine, fusion: Fusing) -> None:
+        self._engine, self._fusion = engine, fusion
+        self._lock = threading.Lock()
+        self._expected = 0
+        self._library: ColumnsLibrary | None = None
+        self._looked = False
+        self._obstacle = ""
+
+    def solve(self, q: Array, columns: Array) -> Array:
+        """Answers (n, k, nu) to columns (n, k, nu) of n states q (n, nq).
+
+        Raises NumericalFailure naming a motion that no inertia determines.
+        """
+        if not columns.size:
+            return columns.copy()
+        library = self._expect(len(q) * columns.shape[1])
+        if library is not None:
+            answers = self._fused(library, q, columns)
+            if answers is not None:
+                return answers
+        rows = [self._engine.solve(a, b) for a, b in zip(q, columns, strict=True)]
+        return np.array(rows).reshape(columns.shape)
+
+    def build(self) -> None:
+        """Compile the scene's own code now.  EnvironmentFailure if that cannot be."""
+        with self._lock:
+            self._library = self._fusion.solution(build=True)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether code of the scene's own is in use."""
+        return self._library is not None
+
+    def _expect(self, columns: int) -> ColumnsLibrary | None:
+        """The compiled code once it is there or as many columns have come as it takes to pay."""
+        with self._lock:
+            self._expected += columns * self._engine.nu
+            worth = self._expected > WORTH_COMPILING
+            if self._library is None and not self._obstacle and (worth or not self._looked):
+                self._looked = True
+                try:
+                    self._library = self._fusion.solution(build=worth)
+                except EnvironmentFailure as error:
+                    self._obstacle = str(error)
+            return self._library
+
+    def _fused(self, library: ColumnsLibrary, q: Array, columns: Array) -> Array | None:
+        """None where a guard fails: the looped engine names what and where."""
+        numbers, nu = self._fusion.numbers, self._engine.nu
+        still = np.zeros((1, nu))
+        memory = self._engine.start_memory()[None]
+        inputs = [numbers[None], np.zeros((1, 1)), q, still, memory, still]
+        found = library.run(0, inputs, columns)
+        if not found[..., nu].all() or not np.isfinite(found).all():
+            return None
+        return np.ascontiguousarray(found[..., :nu])
