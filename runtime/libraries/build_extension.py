@@ -28,8 +28,11 @@ MODULE = "mstmm.generated._kernels"
 
 # -ffp-contract=off: a * b + c is rounded twice on every machine, so results do not depend on
 # whether it has fused multiply-add, and the error bounds of the checks (one rounding per operation
-# of the IR) hold.  -fno-math-errno: sqrt is one instruction; no value changes.
-COMPILE_ARGS = ("-std=c17", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden")
+# of the IR) hold.  -fno-math-errno: sqrt is one instruction; no value changes.  -g0: what a Python
+# was built with asks for debugging information, which is nine tenths of the module's size.
+COMPILE_ARGS = (
+    "-std=c17", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-g0",
+)  # fmt: skip
 WARNING_ARGS = ("-Wall", "-Wextra", "-Wno-unused-parameter")
 
 #: The string in the module that tells the C text it was compiled from.
