@@ -114,11 +114,11 @@ static int mstmm_at_drives(mstmm_state *state, int index)
     const mstmm_drive *drive = &state->model->drives[index];
     const mstmm_body *body = &state->model->bodies[drive->body];
     if (!mstmm_imposed(body, state->memory)) return 0;
-    (state->filled_q + body->q + drive->coordinate)[0] = (state->drive_values + 3 * index)[0];
-    (state->filled_u + body->u + drive->speed)[0] = (state->drive_values + 3 * index + 1)[0];
+    (mstmm_filled_q(state) + body->q + drive->coordinate)[0] = (mstmm_drive_values(state) + 3 * index)[0];
+    (mstmm_filled_u(state) + body->u + drive->speed)[0] = (mstmm_drive_values(state) + 3 * index + 1)[0];
     if (!state->given) {
         real *block = state->workspace + body->block;
-        (block + MSTMM_BLOCK_FIXED + drive->speed)[0] = (state->drive_values + 3 * index + 2)[0];
+        (block + MSTMM_BLOCK_FIXED + drive->speed)[0] = (mstmm_drive_values(state) + 3 * index + 2)[0];
     }
     return 0;
 }
@@ -1187,8 +1187,10 @@ int mstmm_run_given(mstmm_state *state)
         code = mstmm_pass_drives(state);
         if (code) return code;
     }
-    code = mstmm_hook_expression_values(state);
-    if (code) return code;
+    if (model->n_values) {
+        code = mstmm_hook_expression_values(state);
+        if (code) return code;
+    }
     return 0;
 }
 
@@ -1197,6 +1199,20 @@ int mstmm_run_accelerations(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
+    code = mstmm_pass_prescribed(state);
+    if (code) return code;
+    if (model->n_drives) {
+        code = mstmm_hook_drive_values(state);
+        if (code) return code;
+    }
+    if (model->n_drives) {
+        code = mstmm_pass_drives(state);
+        if (code) return code;
+    }
+    if (model->n_values) {
+        code = mstmm_hook_expression_values(state);
+        if (code) return code;
+    }
     if (state->linked) {
         code = mstmm_hook_links_forward(state);
         if (code) return code;
@@ -1273,6 +1289,20 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
+    code = mstmm_pass_prescribed(state);
+    if (code) return code;
+    if (model->n_drives) {
+        code = mstmm_hook_drive_values(state);
+        if (code) return code;
+    }
+    if (model->n_drives) {
+        code = mstmm_pass_drives(state);
+        if (code) return code;
+    }
+    if (model->n_values) {
+        code = mstmm_hook_expression_values(state);
+        if (code) return code;
+    }
     code = mstmm_pass_forward(state);
     if (code) return code;
     code = mstmm_pass_efforts(state);
@@ -1303,7 +1333,22 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
 /* Poses and velocities of all bodies. */
 int mstmm_run_motion(mstmm_state *state)
 {
+    const mstmm_model *model = state->model;
     int code;
+    code = mstmm_pass_prescribed(state);
+    if (code) return code;
+    if (model->n_drives) {
+        code = mstmm_hook_drive_values(state);
+        if (code) return code;
+    }
+    if (model->n_drives) {
+        code = mstmm_pass_drives(state);
+        if (code) return code;
+    }
+    if (model->n_values) {
+        code = mstmm_hook_expression_values(state);
+        if (code) return code;
+    }
     code = mstmm_pass_forward(state);
     if (code) return code;
     code = mstmm_pass_poses(state);

@@ -120,7 +120,8 @@ class Replay(Slots):
 
     def _expression_values(self) -> None:
         values = self.state.structure.values
-        self._values = [] if values is None else self.state.expression(values)
+        assert values is not None
+        self._values = self.state.expression(values)
 
     # --- traits ---------------------------------------------------------------------------------
 
@@ -133,7 +134,7 @@ class Replay(Slots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "balance": True, "efforts": True, "inverse": False,
-            "laws": bool(s.laws), "driven": s.drives is not None, "posed": bool(self._posed),
+            "laws": bool(s.laws), "driven": s.drives is not None, "valued": s.values is not None, "posed": bool(self._posed),
             "flexible": any(body.modal for body in s.bodies),
         }  # fmt: skip
         return known[trait]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.structure import Structure
 
-from ..schedule.sweeps import ACCELERATIONS, FACTORISATION, GIVEN, SOLUTION
+from ..schedule.sweeps import ACCELERATIONS, FACTORISATION, SOLUTION
 from .inline import Nodes
 from .passes.balance import balance
 from .replay import Replay
@@ -46,7 +46,6 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     """
     state, s = FusionState(structure, kernels, numbers), structure
     replay = Replay(state)
-    replay.sweep(GIVEN)
     replay.sweep(ACCELERATIONS)
     outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
     sums = [Port("power", (1,)), Port("potential", (1,))]

@@ -12,6 +12,7 @@ _TRAITS = {
     "drag": "body->modal && body->modal->drag", "inverse": "state->given",
     "balance": "state->balance", "efforts": "state->efforts", "known": "state->hinges_known",
     "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",
+    "valued": "model->n_values",
     "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
     "product": "model->product", "coordinate": "law->kind == 0", "effort": "force->effort",
 }  # fmt: skip

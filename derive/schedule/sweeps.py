@@ -11,15 +11,13 @@ from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .steps import Pass, Run, Sweep
 
-GIVEN = Sweep(
-    "given", "Driven coordinates, and the values of the scene's expressions.",
-    (
-        Run(whole=PRESCRIBED),
-        Run(hook="drive_values", when="driven"),
-        Run(whole=DRIVES, when="driven"),
-        Run(hook="expression_values"),
-    ),
-)  # fmt: skip
+_GIVEN = (
+    Run(whole=PRESCRIBED),
+    Run(hook="drive_values", when="driven"),
+    Run(whole=DRIVES, when="driven"),
+    Run(hook="expression_values", when="valued"),
+)
+GIVEN = Sweep("given", "Driven coordinates, and the values of the scene's expressions.", _GIVEN)
 _APPLIED = (
     Run(whole=DRAG, when="posed flexible"),
     Run(whole=LOADS, when="posed"),
@@ -29,6 +27,7 @@ _APPLIED = (
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
+        *_GIVEN,
         Run(hook="links_forward", when="linked"),
         Run(whole=FORWARD, when="!linked"),
         Run(whole=EFFORTS_POWER, when="balance efforts"),
@@ -51,6 +50,7 @@ ACCELERATIONS = Sweep(
 INVERSE_DYNAMICS = Sweep(
     "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
     (
+        *_GIVEN,
         Run(whole=FORWARD),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
@@ -61,7 +61,8 @@ INVERSE_DYNAMICS = Sweep(
 )  # fmt: skip
 
 MOTION = Sweep(
-    "motion", "Poses and velocities of all bodies.", (Run(whole=FORWARD), Run(whole=POSES)),
+    "motion", "Poses and velocities of all bodies.",
+    (*_GIVEN, Run(whole=FORWARD), Run(whole=POSES)),
 )  # fmt: skip
 POSED = Sweep("posed", "Poses alone, behind a sweep.", (Run(whole=POSES),))
 

@@ -214,6 +214,7 @@ TRAITS: dict[str, str] = {
     "linked": "runs of links are swept as such",
     "laws": "there are laws",
     "driven": "there are drives",
+    "valued": "efforts or loads are expressions",
     "flexible": "there are flexible bodies",
     "posed": "loads or force elements need poses",
     "product": "the product of classical matrices is asked for too",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from flexible.engine_scenes import dressed
 from numpy.random import Generator
+from numpy.typing import NDArray
 from reference import newton_euler as dense
 from reference.compare import fresh
 from reference.jets import Array
@@ -32,13 +33,13 @@ def built(scene: dict[str, Any]) -> mstmm.Model:
     return model
 
 
-def free_speeds(scene: dict[str, Any]) -> Array:
+def free_speeds(scene: dict[str, Any]) -> NDArray[np.bool_]:
     """Which speeds no drive prescribes."""
     free = [text == "free" for hinge in read(scene).hinges for text in hinge.drive]
     return np.array(free, dtype=bool)
 
 
-def check(matrix: Array, columns: Array, answers: Array, free: Array) -> None:
+def check(matrix: Array, columns: Array, answers: Array, free: NDArray[np.bool_]) -> None:
     """Answers solve the free part of the system, and are zero on what is prescribed."""
     assert np.all(answers[~free] == 0)
     if not free.any():

@@ -18,9 +18,9 @@ static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, c
 static int complete(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;
-    state->q = model->n_drives ? state->filled_q : q;
-    state->u = model->n_drives ? state->filled_u : u;
-    state->qdot = state->spare_qdot;
+    state->q = model->n_drives ? mstmm_filled_q(state) : q;
+    state->u = model->n_drives ? mstmm_filled_u(state) : u;
+    state->qdot = mstmm_spare_qdot(state);
     for (int i = 0; i < model->n_bodies; i++) {
         int code = model->bodies[i].section ? mstmm_at_section_motion(state, i)
                                             : mstmm_at_hinge_motion(state, i);
@@ -109,8 +109,7 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
 {
     mstmm_state state = state_of(model, workspace, t, memory, failure);
     mstmm_balance balance;
-    mstmm_lay_out(&state);
-    real *qdot = state.spare_qdot, *udot = state.spare_udot;
+    real *qdot = mstmm_spare_qdot(&state), *udot = mstmm_spare_udot(&state);
     int code =
         mstmm_accelerations_kept(model, workspace, t, q, u, memory, qdot, udot, &balance, failure);
     if (!code) code = complete(&state, q, u);
@@ -202,7 +201,9 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
     }
     if (model->n_drives) {
         mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-        int code = mstmm_begin(&state, y, y + model->nq);
+        state.q = y;
+        state.u = y + model->nq;
+        const int code = mstmm_run_given(&state);
         if (code) return code;
         memcpy(y, state.q, (size_t)model->nq * sizeof(real));
         memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
@@ -237,12 +238,13 @@ static int scene_events(void *context, double t, const double *y, double *g)
     const mstmm_model *model = run->model;
     const real *u = y + model->nq;
     mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-    mstmm_lay_out(&state);
     if (run->n_probes) {
         real *one = run->probe_values + 6 * run->n_probes;
-        state.qdot = state.spare_qdot;
-        int code = mstmm_begin(&state, y, u);
-        if (!code) code = mstmm_run_motion(&state);
+        state.q = y;
+        state.u = u;
+        state.qdot = mstmm_spare_qdot(&state);
+        mstmm_ground(&state);
+        const int code = mstmm_run_motion(&state);
         if (code) return code;
         for (int k = 0; k < run->n_probes; k++) {
             observe_probe(&state, &run->probes[k], one);
@@ -251,7 +253,7 @@ static int scene_events(void *context, double t, const double *y, double *g)
     }
     const real *inputs[] = {&t, y, u, run->probe_values};
     real *outputs[] = {g};
-    return mstmm_tape_run(run->event_tape, inputs, state.slots, outputs)
+    return mstmm_tape_run(run->event_tape, inputs, mstmm_slots(&state), outputs)
                ? MSTMM_FAILED_EXPRESSION
                : 0;
 }
