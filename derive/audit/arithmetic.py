@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 import mpmath
 
-from mstmm.ir import Constant
-from mstmm.ir.floats import Operation, shared, true
+from mstmm.ir import OPERATIONS, Constant
+from mstmm.ir.operations import true
 
-#: Operations that mpmath calls by the same name.
-_MPMATH_NAMES = (
-    "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp",
-)  # fmt: skip
+Function = Callable[..., Any]
 
 
 @lru_cache(maxsize=16)
@@ -31,7 +29,7 @@ class PreciseArithmetic:
     def __init__(self, digits: int) -> None:
         self._context = context = _context(digits)
 
-        def real(function: Operation) -> Operation:
+        def real(function: Function) -> Function:
             """NaN where the value is complex, an infinity of the right sign at a pole."""
 
             def call(*operands: Any) -> Any:
@@ -60,9 +58,10 @@ class PreciseArithmetic:
                 a, b = context.sign(a), context.sign(b)
             return real(context.atan2)(a, b)
 
-        self.operations: dict[str, Operation] = {
-            **shared(context.mpf, context.isnan),
-            **{name: real(getattr(context, name)) for name in _MPMATH_NAMES},
+        library = [name for name, row in OPERATIONS.items() if row.of_the_library]
+        self.operations: dict[str, Function] = {
+            **{name: row.value for name, row in OPERATIONS.items()},
+            **{name: real(getattr(context, name)) for name in library},
             "div": divide,
             "pow": power,
             "atan2": angle,

@@ -13,8 +13,8 @@ from typing import Any
 
 import mpmath
 
-from mstmm.ir import Constant, KernelIR
-from mstmm.ir.floats import Operation
+from mstmm.ir import OPERATIONS, Constant, KernelIR
+from mstmm.ir.operations import Slope
 from mstmm.ir.replay import Values, run
 
 from .arithmetic import PreciseArithmetic
@@ -79,16 +79,23 @@ class _BoundedArithmetic:
     def __init__(self) -> None:
         self._exact = exact = PreciseArithmetic(_DIGITS)
         one = exact.operations
-        two = exact.number(2)
 
-        def smooth(name: str, slope: Callable[[Any, Any], Any]) -> Operation:
-            def call(a: Bounded) -> Bounded:
+        def call(name: str, *args: Any) -> Any:
+            return one[name](*args)
+
+        def passed_on(slope: Slope, value: Any, a: Bounded) -> Any:
+            # An exact operand passes nothing on, even where the slope has no bound.
+            try:
+                return a.error and abs(slope(call, value, (a.value,), (a.error,)))
+            except ZeroDivisionError:
+                return one["div"](a.error, exact.number(0))
+
+        def smooth(name: str, slope: Slope) -> Callable[[Bounded], Bounded]:
+            def rounded(a: Bounded) -> Bounded:
                 value = one[name](a.value)
-                # An exact operand passes nothing on, even where the slope has no bound.
-                passed = abs(slope(a.value, value)) * a.error if a.error else a.error
-                return _rounded(value, passed, 2)
+                return _rounded(value, passed_on(slope, value, a), 2)
 
-            return call
+            return rounded
 
         def divide(a: Bounded, b: Bounded) -> Bounded:
             value = one["div"](a.value, b.value)
@@ -105,38 +112,27 @@ class _BoundedArithmetic:
             passed = passed and passed / (a.value * a.value + b.value * b.value)
             return _rounded(one["atan2"](a.value, b.value), passed, 2)
 
-        def exactly(name: str) -> Operation:
+        def exactly(name: str) -> Callable[..., Bounded]:
             return lambda *args: Bounded(one[name](*(a.value for a in args)), exact.number(0))
 
         def choose(c: Bounded, a: Bounded, b: Bounded) -> Bounded:
             return a if self.true(c) else b
 
-        self.operations: dict[str, Operation] = {
+        rows = OPERATIONS.values()
+        self.operations: dict[str, Callable[..., Bounded]] = {
+            **{r.name: exactly(r.name) for r in rows if r.slope is None},
+            **{r.name: smooth(r.name, r.slope) for r in rows if r.slope and r.of_the_library},
             "neg": lambda a: -a,
             "add": lambda a, b: a + b,
             "sub": lambda a, b: a - b,
             "mul": lambda a, b: a * b,
             "div": divide,
             "pow": power,
-            "sqrt": smooth("sqrt", lambda a, v: one["div"](1, two * v)),
-            "sin": smooth("sin", lambda a, v: one["cos"](a)),
-            "cos": smooth("cos", lambda a, v: one["sin"](a)),
-            "tan": smooth("tan", lambda a, v: 1 + v * v),
-            "asin": smooth("asin", lambda a, v: one["div"](1, one["sqrt"](1 - a * a))),
-            "acos": smooth("acos", lambda a, v: one["div"](1, one["sqrt"](1 - a * a))),
-            "atan": smooth("atan", lambda a, v: 1 / (1 + a * a)),
             "atan2": angle,
-            "sinh": smooth("sinh", lambda a, v: one["cosh"](a)),
-            "cosh": smooth("cosh", lambda a, v: one["sinh"](a)),
-            "tanh": smooth("tanh", lambda a, v: 1 - v * v),
-            "exp": smooth("exp", lambda a, v: v),
-            "log": smooth("log", lambda a, v: one["div"](1, a)),
             "abs": abs,
             "min": lambda a, b: a if b > a else b,
             "max": lambda a, b: b if b > a else a,
             "select": choose,
-            **{name: exactly(name) for name in ("sign", "floor", "lt", "le", "eq")},
-            **{name: exactly(name) for name in ("and", "or", "not")},
         }
 
     def number(self, value: Any) -> Bounded:

@@ -12,29 +12,15 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
-from mstmm.ir import (
-    INNER_INDEX,
-    LOOP_INDEX,
-    LOOPS,
-    Assign,
-    Constant,
-    Guard,
-    Inner,
-    KernelIR,
-    Operand,
-    Port,
-    Solve,
-    Statement,
-    Store,
-    Sum,
-    Temporary,
-)
+from mstmm.ir import Constant, Guard, KernelIR, Port, Solve
 from mstmm.ir.graph import Graph, Node
+from mstmm.ir.replay import Counted
 from mstmm.ir.unrolled import solve_symmetric
 
 Nodes = list[Node]
 Guarding = Callable[[Node, int], None]
-Refusal = Callable[[Node, int, str], None]
+#: Takes a condition, and the guard or the solve that asks for it.
+Judge = Callable[[Node, Guard | Solve], None]
 
 
 class Inliner:
@@ -43,7 +29,6 @@ class Inliner:
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.zero, self.one = graph.constant(0), graph.constant(1)
-        self._constants: dict[str, Node] = {}
 
     def run(
         self,
@@ -59,20 +44,15 @@ class Inliner:
         it they are dropped.
         """
 
-        def refuse(condition: Node, code: int, message: str) -> None:
+        def judge(condition: Node, judged: Guard | Solve) -> None:
             if guard is not None and not (condition.value or 0):
-                guard(condition, code)
+                guard(condition, judged.code)
 
-        return _Replay(self, kernel, inputs, refuse, n).run()
+        return _Replay(self.graph, kernel, inputs, judge, n).run()
 
     def constant(self, operand: Constant) -> Node:
         """The node of a constant."""
-        found = self._constants.get(operand.text)
-        if found is None:
-            graph = self.graph
-            found = graph.pi if operand.text == "pi" else graph.constant(Fraction(operand.text))
-            self._constants[operand.text] = found
-        return found
+        return self.graph.number(operand)
 
 
 def unrolled(kernel: KernelIR, n: int) -> KernelIR:
@@ -88,94 +68,49 @@ def unrolled(kernel: KernelIR, n: int) -> KernelIR:
     inputs, outputs = map(fixed, kernel.inputs), [fixed(port) for port in kernel.outputs]
     taken = tuple(inputs)
     given = {port.name: [graph.element(port.name, *i) for i in _places(port)] for port in taken}
-    found = _Replay(Inliner(graph), kernel, given, graph.guard, n).run()
+
+    def judge(condition: Node, judged: Guard | Solve) -> None:
+        graph.guard(condition, judged.code, judged.message)
+
+    found = _Replay(graph, kernel, given, judge, n).run()
     values = {port.name: _nested(port.shape, found[port.name]) for port in outputs}
     return graph.kernel(
         kernel.name, taken, outputs, values, purpose=kernel.purpose, sources=kernel.sources
     )
 
 
-class _Replay:
+class _Replay(Counted):
     """One run of one kernel."""
 
     def __init__(
         self,
-        inliner: Inliner,
+        graph: Graph,
         kernel: KernelIR,
         inputs: Mapping[str, Sequence[Node]],
-        refuse: Refusal,
+        judge: Judge,
         n: int,
     ) -> None:
-        self.inliner, self.kernel, self.refuse, self.n = inliner, kernel, refuse, n
-        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
-        self.outputs = {port.name: [inliner.zero] * port.length(n) for port in kernel.outputs}
-        self.arrays: dict[str, Sequence[Node]] = {**inputs, **self.outputs}
-        for port in kernel.inputs:
-            if len(inputs[port.name]) != port.length(n):
-                raise ValueError(f"{kernel.name}: {port.name} takes {port.length(n)} numbers")
-        self.known: dict[int, Node] = {}
-        self.at = dict.fromkeys(LOOPS, 0)
+        super().__init__(kernel, graph.operations, n, inputs, graph.constant(0))
+        self.graph, self._judge = graph, judge
 
-    def run(self) -> dict[str, Nodes]:
-        for statement in self.kernel.statements:
-            self._statement(statement)
-        return self.outputs
+    def constant(self, constant: Constant) -> Node:
+        return self.graph.number(constant)
 
-    def _statement(self, statement: Statement) -> None:
-        if isinstance(statement, (Assign, Sum)):
-            self._inner(statement)
-        elif isinstance(statement, Store):
-            self._store(statement)
-        elif isinstance(statement, Guard):
-            self.refuse(self._value(statement.condition), statement.code, statement.message)
-        else:
-            self._solve(statement)
+    def judge(self, condition: Node, judged: Guard | Solve) -> None:
+        self._judge(condition, judged)
 
-    def _inner(self, statement: Inner) -> None:
-        if isinstance(statement, Assign):
-            operands = map(self._value, statement.args)
-            self.known[statement.number] = self.inliner.graph.call(statement.op, *operands)
-            return
-        total = self.inliner.zero
-        for place in range(self.n):
-            self.at[statement.over] = place
-            for inner in statement.body:
-                self._inner(inner)
-            total = total + self._value(statement.value)
-        self.known[statement.number] = total
-
-    def _value(self, operand: Operand) -> Node:
-        if isinstance(operand, Temporary):
-            return self.known[operand.number]
-        if isinstance(operand, Constant):
-            return self.inliner.constant(operand)
-        return self.arrays[operand.port][self._place(operand.port, operand.index)]
-
-    def _place(self, port: str, index: tuple[int | str, ...]) -> int:
-        return self.ports[port].offset(index, self.n, self.at[LOOP_INDEX], self.at[INNER_INDEX])
-
-    def _store(self, store: Store) -> None:
-        row, accumulate = self.outputs[store.port], self.ports[store.port].accumulate
-        loops = store.loops
-        for places in product(range(self.n), repeat=len(loops)):
-            self.at.update(zip(loops, places, strict=True))
-            for inner in store.body:
-                self._inner(inner)
-            place, value = self._place(store.port, store.index), self._value(store.value)
-            row[place] = row[place] + value if accumulate else value
-
-    def _solve(self, solve: Solve) -> None:
+    def solve(self, solve: Solve) -> None:
         """Elimination as `Solve` has it, which reads the lower half of the matrix."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         width = len(b) // n if n else 0
         found = solve_symmetric(
-            self.inliner.graph,
+            self.graph,
             [[a[n * j + i] for j in range(n)] for i in range(n)],
             [list(b[width * i : width * (i + 1)]) for i in range(n)],
-            lambda condition, i: self.refuse(condition, solve.code, solve.message),
+            lambda condition, i: self.judge(condition, solve),
             Fraction(str(solve.relative_pivot)),
         )
-        self.outputs[solve.port][:] = [node for row in found for node in row]
+        self.results[solve.port][:] = [node for row in found for node in row]
 
 
 def _places(port: Port) -> list[tuple[int, ...]]:

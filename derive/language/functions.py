@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
+from mstmm.ir import OPERATIONS
+
 FUNCTIONS: dict[type, str] = {
-    sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "asin", sp.acos: "acos",
-    sp.atan: "atan", sp.atan2: "atan2", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh",
-    sp.exp: "exp", sp.log: "log", sp.Abs: "abs", sp.sign: "sign", sp.floor: "floor",
-}  # fmt: skip
+    getattr(sp, row.sympy): row.name for row in OPERATIONS.values() if row.sympy
+}

@@ -11,6 +11,7 @@ from typing import Any
 
 from mstmm.border.elements import parameter_names, work_name
 from mstmm.ir import (
+    OPERATIONS,
     Assign,
     Constant,
     Element,
@@ -24,45 +25,6 @@ from mstmm.ir import (
     Sum,
     Temporary,
 )
-
-#: How C writes each operation; {0}, {1}, {2} are operands (names or literals, never expressions)
-#: and {t0}, {t1} ask whether an operand is true, that is neither zero nor NaN.
-C_OPERATIONS: dict[str, str] = {
-    "neg": "-{0}",
-    "add": "{0} + {1}",
-    "sub": "{0} - {1}",
-    "mul": "{0} * {1}",
-    "div": "{0} / {1}",
-    "pow": "pow({0}, {1})",
-    "sqrt": "sqrt({0})",
-    "sin": "sin({0})",
-    "cos": "cos({0})",
-    "tan": "tan({0})",
-    "asin": "asin({0})",
-    "acos": "acos({0})",
-    "atan": "atan({0})",
-    "atan2": "atan2({0}, {1})",
-    "sinh": "sinh({0})",
-    "cosh": "cosh({0})",
-    "tanh": "tanh({0})",
-    "exp": "exp({0})",
-    "log": "log({0})",
-    "abs": "fabs({0})",
-    "sign": "{0} > 0 ? 1 : ({0} < 0 ? -1 : {0})",
-    "floor": "floor({0})",
-    "min": "({0} < {1} || isnan({0})) ? {0} : {1}",
-    "max": "({0} < {1} || isnan({1})) ? {1} : {0}",
-    "lt": "{0} < {1}",
-    "le": "{0} <= {1}",
-    "eq": "{0} == {1}",
-    "and": "{t0} && {t1}",
-    "or": "{t0} || {t1}",
-    "not": "{0} == 0",
-    "select": "{t0} ? {1} : {2}",
-}
-
-#: Operations whose value is 0 or 1.
-TRUTH_VALUED = frozenset({"lt", "le", "eq", "and", "or", "not"})
 
 
 def literal(text: str) -> str:
@@ -154,13 +116,14 @@ class KernelText:
         }
 
     def _assign(self, assign: Assign) -> dict[str, Any]:
-        if assign.op in TRUTH_VALUED:
+        row = OPERATIONS[assign.op]
+        if row.truth:
             self._truths.add(assign.number)
         else:
             self._truths.discard(assign.number)
         words = [self.operand(a) for a in assign.args]
         truths = {f"t{place}": self._truth(a) for place, a in enumerate(assign.args)}
-        expression = C_OPERATIONS[assign.op].format(*words, **truths)
+        expression = row.c.format(*words, **truths)
         return {"kind": "assign", "number": assign.number, "expression": expression}
 
     def _solve(self, solve: Solve) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .callers import calls_header
-from .kernel import C_OPERATIONS, KernelText, comment, string
+from .kernel import KernelText, comment, string
 from .storage import layout_header
 from .sweep import sweep_files
 
@@ -194,9 +194,9 @@ def _tape_view() -> dict[str, Any]:
             {
                 "name": name,
                 "code": OPCODES[name],
-                "expression": C_OPERATIONS[name].format("a", "b", "c", **truths),
+                "expression": row.c.format("a", "b", "c", **truths),
             }
-            for name in OPERATIONS
+            for name, row in OPERATIONS.items()
         ],
     }
 

@@ -12,14 +12,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
+from mstmm.ir import (
+    OPERATIONS,
+    Assign,
+    Constant,
+    Guard,
+    KernelIR,
+    Operand,
+    Port,
+    Store,
+    Temporary,
+)
 
 from ..fuse.passes.line import operands
-from .kernel import TRUTH_VALUED, literal
-
-_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
-_COMPARISONS = {"lt": "<", "le": "<=", "eq": "=="}
-_LOGIC = {"and": "&", "or": "|"}
+from .kernel import literal
 
 
 @dataclass(frozen=True)
@@ -59,14 +65,14 @@ class StraightText:
         self.kernel, self.dialect = kernel, dialect
         self.ports: dict[str, Port] = {p.name: p for p in (*kernel.inputs, *kernel.outputs)}
         self._truths = {
-            s.number for s in kernel.statements if isinstance(s, Assign) and s.op in TRUTH_VALUED
+            s.number for s in kernel.statements if isinstance(s, Assign) and OPERATIONS[s.op].truth
         }
         self._numbers = _used_as_numbers(kernel.statements) & self._truths
 
     def assign(self, statement: Assign) -> list[str]:
         """`const real t12 = ...;`; a truth value is `m12`, and `t12` where somebody counts it."""
         number, op, args = statement.number, statement.op, statement.args
-        if op not in TRUTH_VALUED:
+        if not OPERATIONS[op].truth:
             return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
         lines = [f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"]
         if number in self._numbers:
@@ -105,22 +111,22 @@ class StraightText:
         return self.dialect.vector and isinstance(operand, Constant)
 
     def _value(self, op: str, args: Sequence[Operand]) -> str:
-        if op in _INFIX:
+        row = OPERATIONS[op]
+        if row.sign:
             left = self.whole(args[0]) if self._bare(args[1]) else self.word(args[0])
-            return f"{left} {_INFIX[op]} {self.word(args[1])}"
+            return f"{left} {row.sign} {self.word(args[1])}"
         if op == "neg":
             return f"-{self.whole(args[0])}"
-        if op == "select":
-            words = [self.truth(args[0]), self.whole(args[1]), self.whole(args[2])]
-        else:
-            words = [self.whole(a) for a in args]
+        asked = row.conditions
+        words = [*map(self.truth, args[:asked]), *map(self.whole, args[asked:])]
         return f"{self.dialect.prefix}{op}({', '.join(words)})"
 
     def _comparison(self, op: str, args: Sequence[Operand]) -> str:
-        if op in _COMPARISONS:
-            return f"{self.whole(args[0])} {_COMPARISONS[op]} {self.whole(args[1])}"
-        if op in _LOGIC:
-            return f"{self.truth(args[0])} {_LOGIC[op]} {self.truth(args[1])}"
+        row = OPERATIONS[op]
+        if row.conditions:  # & and |: nothing hangs on the order, and && does not know lanes
+            return f"{self.truth(args[0])} {row.sign[0]} {self.truth(args[1])}"
+        if row.sign:
+            return f"{self.whole(args[0])} {row.sign} {self.whole(args[1])}"
         (a,) = args
         if isinstance(a, Temporary) and a.number in self._truths:
             return f"{self.dialect.prefix}not(m{a.number})"
@@ -134,9 +140,9 @@ def _used_as_numbers(statements: Iterable[object]) -> set[int]:
         read = operands(statement)
         if isinstance(statement, Guard):
             continue
-        if isinstance(statement, Assign) and statement.op in ("and", "or", "not"):
+        if isinstance(statement, Assign) and statement.op == "not":
             continue
-        if isinstance(statement, Assign) and statement.op == "select":
-            read = read[1:]
+        if isinstance(statement, Assign):
+            read = read[OPERATIONS[statement.op].conditions :]
         used |= {operand.number for operand in read if isinstance(operand, Temporary)}
     return used

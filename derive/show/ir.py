@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from mstmm.ir import Assign, Constant, Element, Guard, KernelIR, Operand, Statement, Store, Sum
-
-_INFIX = {
-    "add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "**", "lt": "<", "le": "<=", "eq": "==",
-    "and": "and", "or": "or",
-}  # fmt: skip
-_PREFIX = {"neg": "-", "not": "not "}
+from mstmm.ir import (
+    OPERATIONS,
+    Assign,
+    Constant,
+    Element,
+    Guard,
+    KernelIR,
+    Operand,
+    Statement,
+    Store,
+    Sum,
+)
 
 
 def listing(kernel: KernelIR) -> list[str]:
@@ -46,14 +51,7 @@ def _body(statement: Sum | Store, indent: str) -> list[str]:
 
 def _assign(assign: Assign) -> str:
     operands = [_operand(a) for a in assign.args]
-    if assign.op in _INFIX:
-        value = f" {_INFIX[assign.op]} ".join(operands)
-    elif assign.op in _PREFIX:
-        value = _PREFIX[assign.op] + operands[0]
-    elif assign.op == "select":
-        value = f"{operands[1]} if {operands[0]} else {operands[2]}"
-    else:
-        value = f"{assign.op}({', '.join(operands)})"
+    value = OPERATIONS[assign.op].text.format(*operands)
     return f"t{assign.number} = {value}"
 
 

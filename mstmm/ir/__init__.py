@@ -15,11 +15,11 @@ accumulate may be read by the statements behind.
 from __future__ import annotations
 
 from .kernel import KernelIR, assignments, check, from_json, to_json
+from .operations import OPERATIONS
 from .statements import (
     INNER_INDEX,
     LOOP_INDEX,
     LOOPS,
-    OPERATIONS,
     Assign,
     Constant,
     Element,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from .operations import OPERATIONS
 from .statements import (
     LOOPS,
-    OPERATIONS,
     Assign,
     Element,
     Guard,
@@ -100,7 +100,8 @@ class Check:
         self.defined.difference_update(statement.number for statement in body)
 
     def assign(self, assign: Assign, loops: tuple[str, ...]) -> None:
-        if OPERATIONS.get(assign.op) != len(assign.args):
+        row = OPERATIONS.get(assign.op)
+        if row is None or row.arity != len(assign.args):
             self.fail(f"{assign.op} with {len(assign.args)} operands")
         for operand in assign.args:
             self.use(operand, loops)

@@ -1,26 +1,32 @@
-"""A KernelIR evaluated without C, in any arithmetic, statement by statement."""
+"""The one walk over the statements of a KernelIR that computes: what a number is, others say.
+
+`run` takes any arithmetic of plain numbers.  Nodes of a graph (`derive.fuse.inline`, `tangent`) and
+numpy arrays (`runtime.kernels.vectorized`) come as classes of their own: they differ in what an
+entry of an array is, and in what becomes of guards and of solves.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 from ..errors import NumericalFailure
-from .floats import Arithmetic, FloatArithmetic
 from .kernel import KernelIR
+from .operations import OPERATIONS, true
 from .statements import (
     INNER_INDEX,
     LOOP_INDEX,
     LOOPS,
     Assign,
     Constant,
+    Element,
     Guard,
     Inner,
     Operand,
     Port,
     Solve,
-    Statement,
     Store,
     Sum,
     Temporary,
@@ -28,6 +34,8 @@ from .statements import (
 
 #: What an input may be: a number, or nested or flat sequences of numbers, row-major.
 Values = Any
+#: Operation name -> function.
+Operations = Mapping[str, Callable[..., Any]]
 
 
 class GuardFailure(NumericalFailure):
@@ -39,6 +47,171 @@ class GuardFailure(NumericalFailure):
         self.message = message
 
 
+# --- the walk ----------------------------------------------------------------------------------
+
+
+class Replay(ABC):
+    """One run of one kernel."""
+
+    def __init__(self, kernel: KernelIR, operations: Operations, n: int) -> None:
+        self.kernel, self.operations, self.n = kernel, operations, n
+        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
+        self.temporaries: dict[int, Any] = {}
+        self.results: Any = {}
+
+    def run(self) -> Any:
+        """Every statement in order; the results."""
+        for statement in self.kernel.statements:
+            if isinstance(statement, (Assign, Sum)):
+                self.inner(statement)
+            elif isinstance(statement, Store):
+                self.store(statement)
+            elif isinstance(statement, Guard):
+                self.guard(statement)
+            else:
+                self.solve(statement)
+        return self.results
+
+    def inner(self, statement: Inner) -> None:
+        """A statement that may stand inside a loop."""
+        if isinstance(statement, Assign):
+            operation = self.operations[statement.op]
+            self.temporaries[statement.number] = operation(*map(self.value, statement.args))
+        else:
+            self.temporaries[statement.number] = self.total(statement)
+
+    def inside(self, loop: Sum | Store) -> Any:
+        """The value of a loop where it stands, once its body has been run."""
+        for statement in loop.body:
+            self.inner(statement)
+        return self.value(loop.value)
+
+    def value(self, operand: Operand) -> Any:
+        """What an operand stands for."""
+        if isinstance(operand, Temporary):
+            return self.temporaries[operand.number]
+        return self.constant(operand) if isinstance(operand, Constant) else self.entry(operand)
+
+    @abstractmethod
+    def constant(self, constant: Constant) -> Any:
+        """A number of the kernel."""
+
+    @abstractmethod
+    def entry(self, element: Element) -> Any:
+        """An entry of an array."""
+
+    @abstractmethod
+    def total(self, statement: Sum) -> Any:
+        """The value of a sum over a loop."""
+
+    @abstractmethod
+    def store(self, store: Store) -> None:
+        """Write an output."""
+
+    @abstractmethod
+    def guard(self, guard: Guard) -> None:
+        """Leave the kernel, or take down that it is to be left."""
+
+    @abstractmethod
+    def solve(self, solve: Solve) -> None:
+        """Fill an output with A^-1 B."""
+
+
+class Counted(Replay):
+    """Loops run place by place; arrays are flat lists, row-major, outputs full of `zero`."""
+
+    def __init__(
+        self,
+        kernel: KernelIR,
+        operations: Operations,
+        n: int,
+        inputs: Mapping[str, Any],
+        zero: Any,
+    ) -> None:
+        super().__init__(kernel, operations, n)
+        self.zero = zero
+        self.results = {port.name: [zero] * port.length(n) for port in kernel.outputs}
+        self.arrays: dict[str, Any] = {
+            **{port.name: self._given(port, inputs) for port in kernel.inputs}, **self.results
+        }  # fmt: skip
+        self._at = dict.fromkeys(LOOPS, 0)
+
+    def _given(self, port: Port, inputs: Mapping[str, Any]) -> Any:
+        if port.name not in inputs:
+            raise ValueError(f"{self.kernel.name}: no value for the input {port.name!r}")
+        row = inputs[port.name]
+        if len(row) != port.length(self.n):
+            raise ValueError(
+                f"{self.kernel.name}: {port.name} holds {port.length(self.n)} numbers "
+                f"{list(port.shape)}, not {len(row)}"
+            )
+        return row
+
+    def entry(self, element: Element) -> Any:
+        return self.arrays[element.port][self._place(element.port, element.index)]
+
+    def _place(self, name: str, index: tuple[int | str, ...]) -> int:
+        at = self._at
+        return self.ports[name].offset(index, self.n, at[LOOP_INDEX], at[INNER_INDEX])
+
+    def total(self, statement: Sum) -> Any:
+        total = self.zero
+        for place in range(self.n):
+            self._at[statement.over] = place
+            total = total + self.inside(statement)
+        return total
+
+    def store(self, store: Store) -> None:
+        accumulate, row = self.ports[store.port].accumulate, self.results[store.port]
+        for places in product(range(self.n), repeat=len(store.loops)):
+            self._at.update(zip(store.loops, places, strict=True))
+            value = self.inside(store)
+            place = self._place(store.port, store.index)
+            row[place] = row[place] + value if accumulate else value
+
+    def guard(self, guard: Guard) -> None:
+        self.judge(self.value(guard.condition), guard)
+
+    @abstractmethod
+    def judge(self, condition: Any, judged: Guard | Solve) -> None:
+        """What becomes of the condition of a guard, or of a pivot of a solve."""
+
+
+# --- plain numbers -----------------------------------------------------------------------------
+
+
+class Arithmetic(Protocol):
+    """What `run` needs: conversion of inputs and constants, and the operations."""
+
+    @property
+    def operations(self) -> Operations:
+        """Operation name -> function."""
+
+    def number(self, value: Any) -> Any:
+        """An input as a number of this arithmetic."""
+
+    def constant(self, constant: Constant) -> Any:
+        """A constant of the kernel as a number of this arithmetic."""
+
+    def true(self, value: Any) -> bool:
+        """Whether the value is neither zero nor NaN."""
+
+
+class Doubles:
+    """Doubles, with the values C gives."""
+
+    operations: ClassVar[Operations] = {name: row.value for name, row in OPERATIONS.items()}
+
+    def number(self, value: Any) -> float:
+        return float(value)
+
+    def constant(self, constant: Constant) -> float:
+        return constant.number
+
+    def true(self, value: Any) -> bool:
+        return true(value)
+
+
 def evaluate_floats(
     kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
 ) -> dict[str, list[float]]:
@@ -46,7 +219,7 @@ def evaluate_floats(
 
     What inputs may be and errors raised: as for `run`.
     """
-    return run(kernel, inputs, FloatArithmetic(), n)
+    return run(kernel, inputs, Doubles(), n)
 
 
 def run(
@@ -61,100 +234,48 @@ def run(
     """
     if kernel.size_symbol is not None and n is None:
         raise ValueError(f"{kernel.name}: give n, the run-time size {kernel.size_symbol!r}")
-    state = _Run(kernel, arithmetic, n or 0)
-    for port in kernel.inputs:
-        if port.name not in inputs:
-            raise ValueError(f"{kernel.name}: no value for the input {port.name!r}")
-        state.arrays[port.name] = state.read(port, inputs[port.name])
-    for statement in kernel.statements:
-        state.execute(statement)
-    return state.results
+    known = {port.name for port in kernel.inputs}
+    given = {
+        name: [arithmetic.number(value) for value in _flat(values)]
+        for name, values in inputs.items()
+        if name in known
+    }
+    return _Numbers(kernel, arithmetic, n or 0, given).run()
 
 
-class _Run:
-    """One evaluation: arrays read so far, temporaries, results."""
+class _Numbers(Counted):
+    """Guards that do not hold end the run."""
 
-    def __init__(self, kernel: KernelIR, arithmetic: Arithmetic, n: int) -> None:
-        self.kernel, self.arithmetic, self.n = kernel, arithmetic, n
-        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
-        self.temporaries: dict[int, Any] = {}
-        zero = arithmetic.number("0")
-        self.results = {port.name: [zero] * port.length(n) for port in kernel.outputs}
-        #: What can be read: inputs, and outputs that are complete.
-        self.arrays: dict[str, list[Any]] = dict(self.results)
-        #: Where the loops stand.
-        self._loops = dict.fromkeys(LOOPS, 0)
+    def __init__(
+        self, kernel: KernelIR, arithmetic: Arithmetic, n: int, inputs: Mapping[str, list[Any]]
+    ) -> None:
+        super().__init__(kernel, arithmetic.operations, n, inputs, arithmetic.number("0"))
+        self.arithmetic = arithmetic
         self._constants: dict[str, Any] = {}
 
-    def read(self, port: Port, values: Values) -> list[Any]:
-        row = [self.arithmetic.number(value) for value in _flat(values)]
-        if len(row) != port.length(self.n):
-            raise ValueError(
-                f"{self.kernel.name}: {port.name} holds {port.length(self.n)} numbers "
-                f"{list(port.shape)}, not {len(row)}"
-            )
-        return row
+    def constant(self, constant: Constant) -> Any:
+        found = self._constants.get(constant.text)
+        if found is None:
+            found = self._constants[constant.text] = self.arithmetic.constant(constant)
+        return found
 
-    def execute(self, statement: Statement) -> None:
-        if isinstance(statement, (Assign, Sum)):
-            self._inner(statement)
-        elif isinstance(statement, Store):
-            self._store(statement)
-        elif isinstance(statement, Guard):
-            if not self.arithmetic.true(self._value(statement.condition)):
-                raise GuardFailure(self.kernel.name, statement.code, statement.message)
-        else:
-            self._solve(statement)
+    def judge(self, condition: Any, judged: Guard | Solve) -> None:
+        if not self.arithmetic.true(condition):
+            raise GuardFailure(self.kernel.name, judged.code, judged.message)
 
-    def _inner(self, statement: Inner) -> None:
-        if isinstance(statement, Assign):
-            operation: Callable[..., Any] = self.arithmetic.operations[statement.op]
-            self.temporaries[statement.number] = operation(*map(self._value, statement.args))
-            return
-        total = self.arithmetic.number("0")
-        for place in range(self.n):
-            self._loops[statement.over] = place
-            for inner in statement.body:
-                self._inner(inner)
-            total = total + self._value(statement.value)
-        self.temporaries[statement.number] = total
-
-    def _value(self, operand: Operand) -> Any:
-        if isinstance(operand, Temporary):
-            return self.temporaries[operand.number]
-        if isinstance(operand, Constant):
-            if operand.text not in self._constants:
-                self._constants[operand.text] = self.arithmetic.constant(operand)
-            return self._constants[operand.text]
-        return self.arrays[operand.port][self._place(operand.port, operand.index)]
-
-    def _place(self, name: str, index: tuple[int | str, ...]) -> int:
-        at = self._loops
-        return self.ports[name].offset(index, self.n, at[LOOP_INDEX], at[INNER_INDEX])
-
-    def _store(self, store: Store) -> None:
-        accumulate, row = self.ports[store.port].accumulate, self.results[store.port]
-        for places in product(range(self.n), repeat=len(store.loops)):
-            self._loops.update(zip(store.loops, places, strict=True))
-            for inner in store.body:
-                self._inner(inner)
-            place, value = self._place(store.port, store.index), self._value(store.value)
-            row[place] = row[place] + value if accumulate else value
-
-    def _solve(self, solve: Solve) -> None:
+    def solve(self, solve: Solve) -> None:
         """LDL^T without pivoting, in the order of the generated C."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         limit = self.arithmetic.number(solve.relative_pivot)
-        work = [self.arithmetic.number("0")] * (n * n)
-        divide = self.arithmetic.operations["div"]
+        work = [self.zero] * (n * n)
+        divide, less = self.operations["div"], self.operations["lt"]
         for i in range(n):
             for j in range(i + 1):
                 rest = a[i * n + j]
                 for k in range(j):
                     rest = rest - work[i * n + k] * work[j * n + k] * work[k * n + k]
                 work[i * n + j] = divide(rest, work[j * n + j]) if j < i else rest
-            if not work[i * n + i] > limit * abs(a[i * n + i]):
-                raise GuardFailure(self.kernel.name, solve.code, solve.message)
+            self.judge(less(limit * abs(a[i * n + i]), work[i * n + i]), solve)
         m = len(b) // n if n else 0
         x = list(b)
         for column in range(m):
@@ -165,7 +286,7 @@ class _Run:
                 x[i * m + column] = divide(x[i * m + column], work[i * n + i])
                 for k in range(i + 1, n):
                     x[i * m + column] = x[i * m + column] - work[k * n + i] * x[k * m + column]
-        self.arrays[solve.port] = self.results[solve.port] = x
+        self.results[solve.port][:] = x
 
 
 def _flat(values: Values) -> list[Any]:

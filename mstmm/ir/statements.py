@@ -1,4 +1,4 @@
-"""What a kernel is made of: arrays, operands, operations, and the statements of a KernelIR."""
+"""What a kernel is made of: arrays, operands, and the statements of a KernelIR."""
 
 from __future__ import annotations
 
@@ -11,14 +11,6 @@ LOOP_INDEX = "k"
 #: That of a second loop, inside the first.
 INNER_INDEX = "l"
 LOOPS = (LOOP_INDEX, INNER_INDEX)
-
-#: Operation name -> number of operands.  The C printer, the tape and the evaluator read this table.
-OPERATIONS: dict[str, int] = {
-    "neg": 1, "add": 2, "sub": 2, "mul": 2, "div": 2, "pow": 2,
-    "sqrt": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "atan2": 2,
-    "sinh": 1, "cosh": 1, "tanh": 1, "exp": 1, "log": 1, "abs": 1, "sign": 1, "floor": 1,
-    "min": 2, "max": 2, "lt": 2, "le": 2, "eq": 2, "and": 2, "or": 2, "not": 1, "select": 3,
-}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -10,21 +10,20 @@ taken; sign, floor, comparisons and logic are flat.  No SymPy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from itertools import product
 from typing import Any
 
 from .graph import Graph
 from .kernel import KernelIR
-from .statements import LOOPS, Assign, Element, Guard, Inner, Operand, Port, Solve, Sum, Temporary
-from .terms import Node, Number, Terms
+from .operations import OPERATIONS
+from .replay import Replay
+from .statements import LOOPS, Constant, Element, Guard, Port, Solve, Store, Sum
+from .terms import Node, Number
 
 #: Name of the derivative of a port.
 PREFIX = "d_"
-
-Rule = Callable[[Terms, Node, list[Node]], Node]
 
 
 def derivative(node: Node, seeds: Mapping[Node, Node | Number]) -> Node:
@@ -52,70 +51,14 @@ def derivatives(nodes: Sequence[Node], seeds: Mapping[Node, Node | Number]) -> l
 
 
 def _differentiated(node: Node, d: list[Node]) -> Node:
-    """Derivative of one operation given the derivatives of its operands."""
+    """Derivative of one operation given the derivatives of its operands; without a rule flat."""
     graph = node.graph
-    if node.op not in _RULES or all(slope.value == 0 for slope in d):
+    if all(slope.value == 0 for slope in d):
         return graph.constant(0)
-    return _RULES[node.op](graph, node, d)
-
-
-def _power(graph: Terms, node: Node, d: list[Node]) -> Node:
-    base, exponent = node.args
-    slope = exponent * graph.power(base, exponent - 1) * d[0]
-    if d[1].value == 0:
-        return slope
-    # Where the exponent stands still, a negative base has a slope but no logarithm.
-    still = graph.call("eq", d[1], 0)
-    return graph.select(still, slope, slope + node * graph.call("log", base) * d[1])
-
-
-def _arc(graph: Terms, node: Node, d: list[Node]) -> Node:
-    """Derivative of asin; that of acos is its opposite."""
-    a = node.args[0]
-    return d[0] / graph.sqrt(1 - a * a)
-
-
-def _angle(graph: Terms, node: Node, d: list[Node]) -> Node:
-    y, x = node.args
-    return (d[0] * x - y * d[1]) / (y * y + x * x)
-
-
-def _lesser(graph: Terms, node: Node, d: list[Node]) -> Node:
-    """Slope of the operand that `min` gives."""
-    return graph.select(graph.call("lt", *node.args), d[0], d[1])
-
-
-def _greater(graph: Terms, node: Node, d: list[Node]) -> Node:
-    return graph.select(graph.call("lt", *node.args), d[1], d[0])
-
-
-#: Operation -> its derivative; an operation without a rule is flat.
-_RULES: dict[str, Rule] = {
-    "neg": lambda g, y, d: -d[0],
-    "add": lambda g, y, d: d[0] + d[1],
-    "sub": lambda g, y, d: d[0] - d[1],
-    "mul": lambda g, y, d: d[0] * y.args[1] + y.args[0] * d[1],
-    "div": lambda g, y, d: (d[0] - y * d[1]) / y.args[1],
-    "pow": _power,
-    "sqrt": lambda g, y, d: d[0] / (2 * y),
-    "sin": lambda g, y, d: g.cos(y.args[0]) * d[0],
-    "cos": lambda g, y, d: -(g.sin(y.args[0]) * d[0]),
-    "tan": lambda g, y, d: (1 + y * y) * d[0],
-    "asin": _arc,
-    "acos": lambda g, y, d: -_arc(g, y, d),
-    "atan": lambda g, y, d: d[0] / (1 + y.args[0] * y.args[0]),
-    "atan2": _angle,
-    "sinh": lambda g, y, d: g.call("cosh", y.args[0]) * d[0],
-    "cosh": lambda g, y, d: g.call("sinh", y.args[0]) * d[0],
-    "tanh": lambda g, y, d: (1 - y * y) * d[0],
-    "exp": lambda g, y, d: y * d[0],
-    "log": lambda g, y, d: d[0] / y.args[0],
-    "abs": lambda g, y, d: g.call("sign", y.args[0]) * d[0],
-    "min": _lesser,
-    "max": _greater,
-    "select": lambda g, y, d: g.select(y.args[0], d[1], d[2]),
-    "sum": lambda g, y, d: g.sum_over_modes(d[0], str(y.leaf)),
-}
+    if node.op == "sum":
+        return graph.sum_over_modes(d[0], str(node.leaf))
+    slope = OPERATIONS[node.op].slope
+    return graph.constant(0) if slope is None else slope(graph.call, node, node.args, d)
 
 
 def tangent(
@@ -145,8 +88,9 @@ def tangent(
 Index = tuple[int | str, ...]
 
 
-class _Tangent:
-    """One pass over a kernel: its statements replayed on a graph, then their derivatives."""
+class _Tangent(Replay):
+    """One pass over a kernel: its statements replayed on a graph, loops as they are, then their
+    derivatives."""
 
     def __init__(
         self,
@@ -156,7 +100,8 @@ class _Tangent:
         values: bool,
         guards: bool,
     ) -> None:
-        self.kernel, self.graph, self.guards = kernel, Graph(), guards
+        self.graph, self.guards = Graph(), guards
+        super().__init__(kernel, self.graph.operations, 0)
         names = [port.name for port in kernel.outputs]
         solved = {s.port for s in kernel.statements if isinstance(s, Solve)}
         wanted = (set(names) if outputs is None else set(outputs)) | solved
@@ -166,12 +111,11 @@ class _Tangent:
         self.moving = {port.name: port for port in self.directions}
         self.wanted = [port for port in kernel.outputs if port.name in wanted]
         self.kept = [p for p in kernel.outputs if values or p.name in solved]
-        self.nodes: dict[int, Node] = {}
         self.stores: dict[str, list[tuple[Index, Node]]] = {}
         self.still: list[Port] = []
 
     def run(self) -> KernelIR:
-        self._replay()
+        super().run()
         contents = {
             port.name: _nested(port.shape, dict(self.stores[port.name]))
             for port in self.kept
@@ -197,47 +141,23 @@ class _Tangent:
             kernel.sources,
         )
 
-    def _replay(self) -> None:
-        for statement in self.kernel.statements:
-            if isinstance(statement, Assign):
-                self._assign(statement)
-            elif isinstance(statement, Guard):
-                if not self.guards:
-                    continue
-                condition = self._value(statement.condition)
-                self.graph.guard(condition, statement.code, statement.message)
-            elif isinstance(statement, Solve):
-                self._solve(statement)
-            elif isinstance(statement, Sum):
-                self._inner(statement)
-            else:
-                for inner in statement.body:
-                    self._inner(inner)
-                value = self._value(statement.value)
-                self.stores.setdefault(statement.port, []).append((statement.index, value))
+    def constant(self, constant: Constant) -> Node:
+        return self.graph.number(constant)
 
-    def _inner(self, statement: Inner) -> None:
-        if isinstance(statement, Assign):
-            self._assign(statement)
-            return
-        for inner in statement.body:
-            self._inner(inner)
-        value = self._value(statement.value)
-        self.nodes[statement.number] = self.graph.sum_over_modes(value, statement.over)
+    def entry(self, element: Element) -> Node:
+        self._refuse_stored(element.port)
+        return self.graph.element(element.port, *element.index)
 
-    def _assign(self, assign: Assign) -> None:
-        operands = [self._value(operand) for operand in assign.args]
-        self.nodes[assign.number] = self.graph.call(assign.op, *operands)
+    def total(self, statement: Sum) -> Node:
+        return self.graph.sum_over_modes(self.inside(statement), statement.over)
 
-    def _value(self, operand: Operand) -> Node:
-        if isinstance(operand, Temporary):
-            return self.nodes[operand.number]
-        if isinstance(operand, Element):
-            self._refuse_stored(operand.port)
-            return self.graph.element(operand.port, *operand.index)
-        if operand.text == "pi":
-            return self.graph.pi
-        return self.graph.constant(Fraction(operand.text))
+    def store(self, store: Store) -> None:
+        value = self.inside(store)
+        self.stores.setdefault(store.port, []).append((store.index, value))
+
+    def guard(self, guard: Guard) -> None:
+        if self.guards:
+            self.graph.guard(self.value(guard.condition), guard.code, guard.message)
 
     def _refuse_stored(self, name: str) -> None:
         if name in self.stores:
@@ -246,7 +166,7 @@ class _Tangent:
                 "kernel at a fixed size"
             )
 
-    def _solve(self, solve: Solve) -> None:
+    def solve(self, solve: Solve) -> None:
         """The solve itself, and that of its derivative where it is not zero."""
         self._refuse_stored(solve.matrix)
         self._refuse_stored(solve.right)

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .kernel import KernelIR
-from .statements import OPERATIONS, Assign, Constant, Element, Guard, Operand, Store, Temporary
+from .operations import OPERATIONS
+from .statements import Assign, Constant, Element, Guard, Operand, Store, Temporary
 
 #: Operation name -> number of the instruction, in the order of `ir.OPERATIONS`.
 OPCODES: dict[str, int] = {name: number for number, name in enumerate(OPERATIONS)}

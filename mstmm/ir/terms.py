@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import cached_property, partial
 
-from .statements import INNER_INDEX, LOOP_INDEX, OPERATIONS, Element
+from .operations import OPERATIONS
+from .statements import INNER_INDEX, LOOP_INDEX, Constant, Element
 
 Number = int | float | Fraction
-_COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
 
 #: Loop variable -> its bit in `Node.loops`.
 LOOP_BITS = {LOOP_INDEX: 1, INNER_INDEX: 2}
@@ -83,6 +84,7 @@ class Terms:
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
         self._whole: dict[int, Node] = {}
+        self._numbers: dict[str, Node] = {}
         self._count = 0
         self._swapped: dict[int, Node] = {}
 
@@ -108,6 +110,15 @@ class Terms:
         found = self._whole.get(value)
         if found is None:
             found = self._whole[value] = self._make("constant", leaf=Fraction(value))
+        return found
+
+    def number(self, constant: Constant) -> Node:
+        """A constant of a kernel."""
+        found = self._numbers.get(constant.text)
+        if found is None:
+            text = constant.text
+            found = self.pi if text == "pi" else self.constant(Fraction(text))
+            self._numbers[text] = found
         return found
 
     @property
@@ -245,19 +256,22 @@ class Terms:
         arithmetic = _ARITHMETIC.get(op)
         if arithmetic is not None:
             return arithmetic(self, *nodes)
-        if len(nodes) != OPERATIONS[op]:
-            raise ValueError(f"{op} takes {OPERATIONS[op]} operands, not {len(nodes)}")
-        if nodes[0].value == 0 and op in ("sin", "tan", "asin", "atan", "sinh", "tanh", "sqrt"):
-            return nodes[0]
-        if nodes[0].value == 0 and op in ("cos", "cosh", "exp"):
-            return self.constant(1)
+        row = OPERATIONS[op]
+        if len(nodes) != row.arity:
+            raise ValueError(f"{op} takes {row.arity} operands, not {len(nodes)}")
+        if row.at_zero is not None and nodes[0].kind == _ZERO:
+            return self.constant(row.at_zero)
         if op == "select" and nodes[0].value is not None:
             return nodes[1] if nodes[0].value != 0 else nodes[2]
         if op == "select" and nodes[1] is nodes[2]:
             return nodes[1]
-        if op in _COMMUTATIVE:
-            return self._ordered(op, *nodes)
-        return self._make(op, nodes)
+        return self._ordered(op, *nodes) if row.commutative else self._make(op, nodes)
+
+    @cached_property
+    def operations(self) -> Mapping[str, Callable[..., Node]]:
+        """Operation name -> function of nodes."""
+        every = {name: partial(self.call, name) for name in OPERATIONS}
+        return every | {name: partial(method, self) for name, method in _ARITHMETIC.items()}
 
     def sin(self, a: Node) -> Node:
         return self.call("sin", a)

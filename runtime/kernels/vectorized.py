@@ -17,18 +17,19 @@ from mstmm.errors import NumericalFailure
 from mstmm.ir import (
     LOOP_INDEX,
     LOOPS,
+    OPERATIONS,
     Assign,
     Constant,
+    Element,
     Guard,
-    Inner,
     KernelIR,
-    Operand,
     Port,
     Solve,
     Store,
     Sum,
-    Temporary,
 )
+from mstmm.ir.operations import Operation
+from mstmm.ir.replay import Replay
 
 
 def evaluate(kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int = 0) -> dict[str, Array]:
@@ -40,28 +41,23 @@ def evaluate(kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int = 0) -> d
     Raises NumericalFailure where a guard or a pivot fails at any point, ValueError for a missing
     input or one that does not end in its port's shape.
     """
-    run = _Run(kernel, inputs, n)
     with np.errstate(all="ignore"):
-        for statement in kernel.statements:
-            run.statement(statement)
-    return run.outputs
+        return _Axes(kernel, inputs, n).run()
 
 
-class _Run:
-    """One evaluation."""
+class _Axes(Replay):
+    """One evaluation, every loop an axis."""
 
     def __init__(self, kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int) -> None:
-        self.kernel, self.n = kernel, n
-        self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
-        self.temporaries: dict[int, Array] = {}
+        super().__init__(kernel, _OPERATIONS, n)
         given = {port.name: self._given(port, inputs) for port in kernel.inputs}
         leads = [a.shape[: a.ndim - len(self.ports[name].shape)] for name, a in given.items()]
         lead = np.broadcast_shapes(*leads)
-        self.outputs: dict[str, Array] = {
+        self.results: dict[str, Array] = {
             port.name: np.zeros((*lead, *self._shape(port))) for port in kernel.outputs
         }
         #: What can be read: inputs, and outputs that are complete.
-        self.arrays = given | self.outputs
+        self.arrays = given | self.results
 
     def _shape(self, port: Port) -> tuple[int, ...]:
         return tuple(self.n if isinstance(extent, str) else extent for extent in port.shape)
@@ -78,53 +74,37 @@ class _Run:
 
     # --- statements -----------------------------------------------------------------------------
 
-    def statement(self, statement: object) -> None:
-        if isinstance(statement, (Assign, Sum)):
-            self._inner(statement)
-        elif isinstance(statement, Store):
-            self._store(statement)
-        elif isinstance(statement, Guard):
-            if not np.all(_true(self._value(statement.condition))):
-                raise NumericalFailure(f"{self.kernel.name}: {statement.message}")
-        elif isinstance(statement, Solve):
-            self._solve(statement)
+    def guard(self, guard: Guard) -> None:
+        if not np.all(_true(self.value(guard.condition))):
+            raise NumericalFailure(f"{self.kernel.name}: {guard.message}")
 
-    def _inner(self, statement: Inner) -> None:
-        if isinstance(statement, Assign):
-            operands = map(self._value, statement.args)
-            self.temporaries[statement.number] = _OPERATIONS[statement.op](*operands)
-            return
+    def total(self, statement: Sum) -> Array:
         axis = LOOPS.index(statement.over) - 2
         product = self._product(statement, axis)
         if product is not None:
-            self.temporaries[statement.number] = product
-            return
-        for inner in statement.body:
-            self._inner(inner)
-        value = self._value(statement.value)
+            return product
+        value: Array = self.inside(statement)
         # A value that is the same for all has the length 1 there.
         alike = value.shape[axis] == 1
-        total = value * self.n if alike else value.sum(axis=axis, keepdims=True)
-        self.temporaries[statement.number] = total
+        return np.asarray(value * self.n if alike else value.sum(axis=axis, keepdims=True))
 
     def _product(self, statement: Sum, axis: int) -> Array | None:
         """The sum where it is a vector of every point times a matrix that is the same for all."""
         (inner, *more) = statement.body
         if more or not isinstance(inner, Assign) or inner.op != "mul":
             return None
-        values = (np.moveaxis(self._value(operand), axis, -1) for operand in inner.args)
+        values = (np.moveaxis(self.value(operand), axis, -1) for operand in inner.args)
         matrix, vector = sorted(values, key=lambda a: a.ndim)
         if matrix.ndim > 2 or vector.shape[-2:] != (1, self.n) or matrix.shape != (self.n, self.n):
             return None
         return np.asarray(np.expand_dims(vector[..., 0, :] @ matrix.T, axis))
 
-    def _value(self, operand: Operand) -> Array:
-        if isinstance(operand, Temporary):
-            return self.temporaries[operand.number]
-        if isinstance(operand, Constant):
-            return np.full((1, 1), operand.number)
-        letters = [entry for entry in operand.index if isinstance(entry, str)]
-        entry: Array = self.arrays[operand.port][_slices(operand.index)]
+    def constant(self, constant: Constant) -> Array:
+        return np.full((1, 1), constant.number)
+
+    def entry(self, element: Element) -> Array:
+        letters = [entry for entry in element.index if isinstance(entry, str)]
+        entry: Array = self.arrays[element.port][_slices(element.index)]
         if len(letters) == 2 and letters[0] == letters[1]:
             entry = np.diagonal(entry, axis1=-2, axis2=-1)
             letters = letters[:1]
@@ -134,10 +114,8 @@ class _Run:
             return np.asarray(entry)[..., None, None]
         return entry[..., :, None] if letters[0] == LOOP_INDEX else entry[..., None, :]
 
-    def _store(self, store: Store) -> None:
-        for inner in store.body:
-            self._inner(inner)
-        value = self._value(store.value)
+    def store(self, store: Store) -> None:
+        value = self.inside(store)
         letters = [entry for entry in store.index if isinstance(entry, str)]
         if len(letters) == 2:
             value = value if letters[0] == LOOP_INDEX else np.swapaxes(value, -1, -2)
@@ -146,16 +124,16 @@ class _Run:
             value = value if letters else value[..., 0]
         place = _slices(store.index)
         if self.ports[store.port].accumulate:
-            self.outputs[store.port][place] += value
+            self.results[store.port][place] += value
         else:
-            self.outputs[store.port][place] = value
+            self.results[store.port][place] = value
 
-    def _solve(self, solve: Solve) -> None:
+    def solve(self, solve: Solve) -> None:
         """L D L^T without pivoting, from the lower half of the matrix, for all points at once."""
         a = self.arrays[solve.matrix]
         a = np.tril(a) + np.swapaxes(np.tril(a, -1), -1, -2)
         rest, lower = a.copy(), np.zeros_like(a)
-        columns = self.outputs[solve.port]
+        columns = self.results[solve.port]
         columns[...] = self.arrays[solve.right]
         if len(self.ports[solve.port].shape) == 1:
             columns = columns[..., None]
@@ -183,20 +161,15 @@ def _true(value: Array) -> NDArray[np.bool_]:
     return np.abs(value) > 0
 
 
-def _truth(operation: Callable[..., Any]) -> Callable[..., Array]:
-    """An operation whose value is 0 or 1."""
-    return lambda *args: np.asarray(operation(*args), dtype=float)
+def _function(row: Operation) -> Callable[..., Array]:
+    """The function of arrays; numpy takes a NaN for true, and its truths are no numbers."""
+    function, asked = getattr(np, row.numpy), row.conditions
+
+    def call(*args: Array) -> Array:
+        value = function(*map(_true, args[:asked]), *args[asked:])
+        return np.asarray(value, dtype=float)
+
+    return call if asked or row.truth else function
 
 
-_OPERATIONS: dict[str, Callable[..., Array]] = {
-    "neg": np.negative, "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide,
-    "pow": np.power, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan,
-    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2,
-    "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "exp": np.exp, "log": np.log,
-    "abs": np.abs, "sign": np.sign, "floor": np.floor, "min": np.minimum, "max": np.maximum,
-    "lt": _truth(np.less), "le": _truth(np.less_equal), "eq": _truth(np.equal),
-    "and": _truth(lambda a, b: _true(a) & _true(b)),
-    "or": _truth(lambda a, b: _true(a) | _true(b)),
-    "not": _truth(lambda a: a == 0),
-    "select": lambda c, a, b: np.asarray(np.where(_true(c), a, b)),
-}  # fmt: skip
+_OPERATIONS = {row.name: _function(row) for row in OPERATIONS.values()}

@@ -26,7 +26,7 @@ SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 3.0, 1e-310, 710.5, math.inf, -math.
 
 def operation_kernel(op: str) -> KernelIR:
     """y[0] = op(x[0], ...), y[1] = the same in an addition, y[2] = with a constant operand."""
-    operands: tuple[Operand, ...] = tuple(Element("x", (i,)) for i in range(OPERATIONS[op]))
+    operands: tuple[Operand, ...] = tuple(Element("x", (i,)) for i in range(OPERATIONS[op].arity))
     statements = (
         Assign(0, op, operands),
         Assign(1, "add", (Temporary(0), Constant("1/2"))),
@@ -51,7 +51,7 @@ def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 
 def points(op: str) -> list[list[float]]:
-    found = itertools.product(SPECIAL, repeat=min(OPERATIONS[op], 2))
+    found = itertools.product(SPECIAL, repeat=min(OPERATIONS[op].arity, 2))
     return [[*point, 7.0, 8.0, 9.0][:3] for point in found]
 
 

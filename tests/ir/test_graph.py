@@ -60,7 +60,7 @@ LEAVES = st.one_of(
 def trees(operations: list[str]) -> st.SearchStrategy[Tree]:
     def extend(inner: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
         return st.sampled_from(operations).flatmap(
-            lambda op: st.tuples(st.just(op), *[inner] * OPERATIONS[op])
+            lambda op: st.tuples(st.just(op), *[inner] * OPERATIONS[op].arity)
         )
 
     return st.recursive(LEAVES, extend, max_leaves=12)

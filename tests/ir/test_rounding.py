@@ -30,7 +30,7 @@ def test_doubles_stay_within_the_bound(seed: int) -> None:
 @pytest.mark.parametrize("op", OPERATIONS)
 def test_every_operation_passes_errors_on(op: str) -> None:
     """op(x0 / 3, ...) with rounded operands: within the bound, and the bound within reason."""
-    count = OPERATIONS[op]
+    count = OPERATIONS[op].arity
     thirds = [Assign(i, "div", (Element("x", (i,)), Element("x", (3,)))) for i in range(count)]
     last = Assign(9, op, tuple(Temporary(i) for i in range(count)))
     kernel = KernelIR(

@@ -180,7 +180,8 @@ def test_many_points_know_every_operation() -> None:
     from mstmm.ir import OPERATIONS, Assign, Temporary
 
     values = [0.0, 0.5, -1.5, 2.0, np.nan]
-    for op, count in OPERATIONS.items():
+    for op, row in OPERATIONS.items():
+        count = row.arity
         ports = tuple(Port(name) for name in "abc"[:count])
         call = Assign(0, op, tuple(Element(port.name) for port in ports))
         kernel = KernelIR("one", ports, (Port("y"),), (call, Store("y", (), Temporary(0))))

@@ -9,8 +9,7 @@ import cmath
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from mstmm.ir import Constant, KernelIR
-from mstmm.ir.floats import FloatArithmetic
+from mstmm.ir import OPERATIONS, Constant, KernelIR
 from mstmm.ir.replay import run
 
 STEP = 1e-200
@@ -18,22 +17,22 @@ STEP = 1e-200
 
 def _angle(y: complex, x: complex) -> complex:
     """atan2 of nearly real numbers: its value and its exact slope times the small part."""
-    real = FloatArithmetic.operations["atan2"](y.real, x.real)
+    real = OPERATIONS["atan2"].value(y.real, x.real)
     turning = y.imag * x.real - y.real * x.imag
     return complex(real, turning / (x.real**2 + y.real**2) if turning else 0.0)
 
 
 def _flat(name: str) -> Callable[..., complex]:
     """An operation that only looks at real parts."""
-    operation = FloatArithmetic.operations[name]
+    operation = OPERATIONS[name].value
     return lambda *args: complex(operation(*(a.real for a in args)))
 
 
 def _power(a: complex, b: complex) -> complex:
     """a^b; a whole exponent of a negative base has no imaginary part of its own."""
     if b.imag == 0:
-        value = FloatArithmetic.operations["pow"](a.real, b.real)
-        slope = b.real * FloatArithmetic.operations["pow"](a.real, b.real - 1)
+        value = OPERATIONS["pow"].value(a.real, b.real)
+        slope = b.real * OPERATIONS["pow"].value(a.real, b.real - 1)
         return complex(value, slope * a.imag)
     return a**b
 

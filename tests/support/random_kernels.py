@@ -29,7 +29,9 @@ def random_kernel(
     ends: list[Node] = []
     for _ in range(size):
         op = draw.choice(operations)
-        ends.append(_value(draw, op, [draw.choice(pool[-20:]) for _ in range(OPERATIONS[op])]))
+        ends.append(
+            _value(draw, op, [draw.choice(pool[-20:]) for _ in range(OPERATIONS[op].arity)])
+        )
         pool.append(ends[-1])
     graph.guard(graph.call("le", pool[0], pool[0]), 5, "x[0] is a number")
     outputs = (Port("y", (size,)), Port("total", (2, 2), accumulate=True))
