@@ -18,6 +18,7 @@ import jinja2
 import mstmm.templates
 from mstmm.border import elements as abi
 from mstmm.border import fused as fused_abi
+from mstmm.border.failures import Failed
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
 from mstmm.ir.facts import HingeFacts, facts_to_data
 from mstmm.ir.spec import ElementSpec, Param
@@ -54,8 +55,8 @@ def elements_header(specs: Sequence[ElementSpec]) -> str:
 
 
 def border_headers() -> dict[str, str]:
-    """File name -> text of what the engine's own C knows of tapes and of fused libraries."""
-    return {name: _render(f"{name}.jinja") for name in ("tape.h", "fused.h")}
+    """File name -> text of what the engine's own C knows of tapes, fused libraries, failures."""
+    return {name: _render(f"{name}.jinja") for name in ("tape.h", "fused.h", "failures.h")}
 
 
 def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
@@ -179,7 +180,7 @@ def _render(name: str, **values: Any) -> str:
     return (
         _environment()
         .get_template(name)
-        .render(abi=abi, fused_abi=fused_abi, tape=_tape_view(), **values)
+        .render(abi=abi, fused_abi=fused_abi, tape=_tape_view(), failures=Failed, **values)
     )
 
 

@@ -11,10 +11,9 @@ from typing import Any, Self
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.border.failures import Failed
 
 from ..pack.packed import Packed
-
-UNDETERMINED, _FORCE, _EXPRESSION, _HINGE, _PIVOT, _PRODUCT, _SECTION, _MODES = range(1, 9)
 
 
 @dataclass(frozen=True)
@@ -168,46 +167,46 @@ class Calls:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
         reason, element = int(failure.reason), int(failure.element)
-        if reason == UNDETERMINED and self.is_flexible(element):
+        if reason == Failed.UNDETERMINED and self.is_flexible(element):
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: what it moves has no positive inertia '
                 f'left: the shapes of the flexible body "{self.body_name(element).split("/")[0]}" '
                 "carry it all, or its deflection is beyond the stiffened model; use fewer shapes, "
                 'frame = "chord" or "mean", quadrature = true, or split it into welded beams'
             )
-        if reason == UNDETERMINED:
+        if reason == Failed.UNDETERMINED:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
                 "what it carries has no positive inertia in that direction (a thin rod on a ball, "
                 "a point mass, collinear axes, a negative principal moment); give the body "
                 "inertia, give the hinge rotor inertia (law.inertia), or fix that motion"
             )
-        if reason == _FORCE:
+        if reason == Failed.FORCE:
             name = self.packed.scene.spring[element].name
             return (
                 f'spring "{name}" {at}: its direction is undefined because its ends coincide; move '
                 "one of them, or put an elastic hinge in its place"
             )
-        if reason == _HINGE:
+        if reason == Failed.HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
-        if reason == _SECTION:
+        if reason == Failed.SECTION:
             name = self.hinge_name(element).replace("/", ".")
             return (
                 f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, '
                 "far beyond small deflections; split the body into several that are welded together"
             )
-        if reason == _MODES:
+        if reason == Failed.MODES:
             name = self.body_name(element)
             return (
                 f'flexible body "{name}" {at}: its modal mass matrix is not positive definite; '
                 'use fewer shapes, frame = "chord" or "mean", or quadrature = true'
             )
-        if reason == _PIVOT:
+        if reason == Failed.PRODUCT_PIVOT:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '
                 'vanishes, so the product does not exist in this state; use sweep = "riccati"'
             )
-        if reason == _PRODUCT:
+        if reason == Failed.PRODUCT_ERROR:
             return (
                 f"the product of transfer matrices {at}: its deviation from the Riccati sweep "
                 "exceeds the accuracy asked for (errors grow geometrically along the chain); "

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
+from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
-from .calls import UNDETERMINED, Calls
+from .calls import Calls
 from .culprit import culprit
 
 
@@ -47,7 +48,7 @@ class Engine(Calls):
         if cause:
             return NumericalFailure(cause)
         text = self.failure_text(failure, t)
-        if int(failure.reason) == UNDETERMINED:
+        if failure.reason == Failed.UNDETERMINED:
             return UndeterminedMotion(text, int(failure.element))
         return NumericalFailure(text)
 

@@ -74,7 +74,7 @@ def test_files_written_are_the_files_generated(tmp_path: Path) -> None:
     assert texts == generated_files([SPEC])
     assert set(texts) >= {
         "mstmm.h", "elements.h", "registry.c", "manifest.json", "hinge_drawn.c",
-        "hinge_drawn.json", "tape.h", "fused.h",
+        "hinge_drawn.json", "tape.h", "fused.h", "failures.h",
     }  # fmt: skip
     manifest = json.loads(texts["manifest.json"])
     assert manifest["abi"] == abi.ABI

@@ -1,0 +1,30 @@
+"""Reasons of a failure: one number in Python and in C, one sentence each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+from support.c_library import ENGINE, compile_library
+
+import mstmm
+from mstmm.border.failures import Failed
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_c_has_the_numbers_of_the_table(tmp_path: Path) -> None:
+    """A macro of the engine's own with another value is an error of the compiler."""
+    asked = [f'_Static_assert(MSTMM_FAILED_{r.name} == {r.value}, "{r.name}");' for r in Failed]
+    source = tmp_path / "numbers.c"
+    source.write_text("\n".join(['#include "sweep.h"', '#include "failures.h"', *asked, ""]))
+    compile_library([source], tmp_path / "numbers.so", f"-I{ENGINE}", f"-I{ROOT / 'generated'}")
+
+
+def test_every_reason_has_a_sentence_of_its_own() -> None:
+    path = ROOT / "examples" / "branched_tree" / "scene.toml"
+    looped = mstmm.compile(mstmm.load_scene(path)).looped
+    said = {
+        looped.failure_text(SimpleNamespace(reason=int(r), element=0, code=1), 0.25) for r in Failed
+    }
+    assert len(said) == len(Failed) and all("at t = 0.25 s" in text for text in said)
