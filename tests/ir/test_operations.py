@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,9 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
 def test_c_tape_and_floats_agree_at_special_points(op: str, library: CLibrary) -> None:
     tape = compile_tape(KERNELS[op])
     operands = OPERATIONS[op].arity
-    for point in itertools.product(SPECIAL, repeat=min(operands, 2)):
+    drawn = random.Random(op)
+    more = [tuple(drawn.uniform(-2, 2) for _ in range(3)) for _ in range(20)]
+    for point in (*itertools.product(SPECIAL, repeat=min(operands, 2)), *more):
         x = [*point, *(7.0, 8.0, 9.0)][:3]
         wanted = evaluate_floats(KERNELS[op], {"x": x})["y"]
         got = library.call("operations", f"k_{op}", {"x": x}).outputs["y"]
