@@ -6,22 +6,13 @@ import math
 from collections.abc import Callable, Iterable
 
 from ..errors import ExpressionError
+from ..ir import OPERATIONS
 from ..ir.graph import Graph, Node
 from ..ir.tangent import derivative
 from .expression import Expression
-from .parser import MEANING
 
 #: Longest numerator or denominator of a constant; fractions are stored as decimal text.
 _MAX_BITS = 12_000
-
-_MEANING: dict[str, Callable[..., float]] = MEANING | {
-    "select": MEANING["where"],
-    "floor": lambda a: float(math.floor(a)),
-    "eq": lambda a, b: float(a == b),
-    "and": lambda a, b: float(a != 0 and b != 0),
-    "or": lambda a, b: float(a != 0 or b != 0),
-    "not": lambda a: float(a == 0),
-}
 
 
 def motion(drive: Expression, time: Node) -> tuple[Node, Node, Node]:
@@ -124,11 +115,9 @@ def _one(node: Node, args: list[float], leaf: Callable[[Node], float]) -> float:
         return math.pi
     if node.op == "element":
         return leaf(node)
+    if node.value is None:
+        return float(OPERATIONS[node.op].value(*args))
     try:
-        return float(node.value) if node.value is not None else float(_MEANING[node.op](*args))
-    except ZeroDivisionError:
-        return math.nan if args[0] == 0 else math.inf
+        return float(node.value)
     except OverflowError:
         return math.inf
-    except ValueError:
-        return math.nan

@@ -125,7 +125,7 @@ class Expression:
             elif term.name is not None:
                 known[number] = float(values(term.name))
             else:
-                known[number] = _apply(term.op, [known[i] for i in term.args])
+                known[number] = float(MEANING[term.op](*(known[i] for i in term.args)))
         return known[self.root]
 
     def time_breaks(self) -> tuple[float, ...]:
@@ -207,17 +207,6 @@ def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], 
     if term.op in ("gt", "ge"):
         return graph.call("lt" if term.op == "gt" else "le", args[1], args[0])
     return graph.call(term.op, *args)
-
-
-def _apply(op: str, args: list[float]) -> float:
-    try:
-        return float(MEANING[op](*args))
-    except ZeroDivisionError:
-        return float("nan") if args[0] == 0 else float("inf")
-    except OverflowError:
-        return float("inf")
-    except ValueError:
-        return float("nan")
 
 
 def _line(term: Term, args: list[_Line | None]) -> _Line | None:

@@ -20,8 +20,10 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 from ..errors import ExpressionError
+from ..ir import OPERATIONS
 
 MAX_LENGTH = 4000
 MAX_DEPTH = 100
@@ -31,9 +33,11 @@ _MAX_BITS = 2100
 
 #: Function name -> number of arguments (None: two or more).
 FUNCTIONS: dict[str, int | None] = {
-    "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "atan2": 2, "sinh": 1,
-    "cosh": 1, "tanh": 1, "exp": 1, "log": 1, "sqrt": 1, "abs": 1, "sign": 1, "min": None,
-    "max": None, "where": 3,
+    **{name: OPERATIONS[name].arity for name in (
+        "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log",
+        "sqrt", "abs", "sign",
+    )},
+    "min": None, "max": None, "where": OPERATIONS["select"].arity,
 }  # fmt: skip
 
 COMPARISONS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
@@ -122,34 +126,18 @@ class Term:
         return self.op in ("lt", "le", "gt", "ge")
 
 
-def _power(base: float, exponent: float) -> float:
-    return math.pow(base, exponent)
+#: What each operation means in double precision, with the values that C gives.
+MEANING: dict[str, Callable[..., Any]] = {
+    **{name: row.value for name, row in OPERATIONS.items()},
+    "gt": lambda a, b: float(a > b),
+    "ge": lambda a, b: float(a >= b),
+    "where": OPERATIONS["select"].value,
+}
 
-
-def _sign(x: float) -> float:
-    return float((x > 0) - (x < 0))
-
-
-#: What each operation means in double precision.
-MEANING: dict[str, Callable[..., float]] = {
-    "neg": lambda a: -a, "add": lambda a, b: a + b, "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b, "div": lambda a, b: a / b, "pow": _power,
-    "lt": lambda a, b: float(a < b), "le": lambda a, b: float(a <= b),
-    "gt": lambda a, b: float(a > b), "ge": lambda a, b: float(a >= b),
-    "where": lambda c, a, b: a if c != 0 else b, "abs": abs, "sign": _sign, "min": min, "max": max,
-    "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "tan": math.tan, "asin": math.asin,
-    "acos": math.acos, "atan": math.atan, "atan2": math.atan2, "sinh": math.sinh,
-    "cosh": math.cosh, "tanh": math.tanh, "exp": math.exp, "log": math.log,
-}  # fmt: skip
-
-_EXACT: dict[str, Callable[..., Fraction]] = {
-    "neg": lambda a: -a, "add": lambda a, b: a + b, "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b, "div": lambda a, b: a / b, "abs": abs, "min": min, "max": max,
-    "lt": lambda a, b: Fraction(a < b), "le": lambda a, b: Fraction(a <= b),
-    "gt": lambda a, b: Fraction(a > b), "ge": lambda a, b: Fraction(a >= b),
-    "where": lambda c, a, b: a if c != 0 else b,
-    "sign": lambda a: Fraction((a > 0) - (a < 0)),
-}  # fmt: skip
+#: Operations with an exact value on fractions.
+_EXACT = frozenset({
+    "neg", "add", "sub", "mul", "div", "abs", "min", "max", "lt", "le", "gt", "ge", "where", "sign",
+})  # fmt: skip
 
 
 @dataclass
@@ -376,10 +364,7 @@ class Parser:
         values = [t.constant for t in terms if t.constant is not None]
         if len(values) < len(terms):
             return None, None
-        try:
-            value = float(MEANING[op](*values))
-        except (ArithmeticError, ValueError):
-            value = math.nan
+        value = float(MEANING[op](*values))
         if not math.isfinite(value):
             raise self.error(f"this {_WORDS.get(op, op)} has no finite real value", mark)
         exact = [t.exact for t in terms if t.exact is not None]
@@ -390,7 +375,8 @@ class Parser:
             if exponent.denominator != 1 or abs(exponent) > 16:
                 return None, value
             return _limited(base ** int(exponent), value), value
-        return (_limited(_EXACT[op](*exact), value) if op in _EXACT else None), value
+        found = _limited(Fraction(MEANING[op](*exact)), value) if op in _EXACT else None
+        return found, value
 
 
 _WORDS = {"pow": "power", "add": "sum", "sub": "difference", "mul": "product", "div": "quotient"}
