@@ -28,6 +28,8 @@ class Operation:
 
     name: str
     arity: int
+    #: Cycles until the result can be used, on current processors; only ratios matter.
+    latency: int
     #: In doubles, as C computes it; what needs but comparison and signs takes any real number.
     value: Callable[..., Any]
     #: Along a direction, branch by branch at kinks; None where it is flat.
@@ -92,109 +94,110 @@ def _arc_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
 
 _ROWS = (
     Operation(
-        "neg", 1, operator.neg, lambda call, y, a, d: -d[0], c="-{0}", numpy="negative",
+        "neg", 1, 1, operator.neg, lambda call, y, a, d: -d[0], c="-{0}", numpy="negative",
     ),
     Operation(
-        "add", 2, operator.add, lambda call, y, a, d: d[0] + d[1],
+        "add", 2, 4, operator.add, lambda call, y, a, d: d[0] + d[1],
         c="{0} + {1}", commutative=True,
     ),
     Operation(
-        "sub", 2, operator.sub, lambda call, y, a, d: d[0] - d[1],
+        "sub", 2, 4, operator.sub, lambda call, y, a, d: d[0] - d[1],
         c="{0} - {1}", numpy="subtract",
     ),
     Operation(
-        "mul", 2, operator.mul, lambda call, y, a, d: d[0] * a[1] + a[0] * d[1],
+        "mul", 2, 4, operator.mul, lambda call, y, a, d: d[0] * a[1] + a[0] * d[1],
         c="{0} * {1}", numpy="multiply", commutative=True,
     ),
     Operation(
-        "div", 2, doubles.divide, lambda call, y, a, d: (d[0] - y * d[1]) / a[1],
+        "div", 2, 13, doubles.divide, lambda call, y, a, d: (d[0] - y * d[1]) / a[1],
         c="{0} / {1}", numpy="divide",
     ),
-    Operation("pow", 2, doubles.power, _power_slope, text="{0} ** {1}"),
+    Operation("pow", 2, 20, doubles.power, _power_slope, text="{0} ** {1}"),
     Operation(
-        "sqrt", 1, doubles.guarded(math.sqrt), lambda call, y, a, d: d[0] / (2 * y), at_zero=0,
+        "sqrt", 1, 20, doubles.guarded(math.sqrt), lambda call, y, a, d: d[0] / (2 * y), at_zero=0,
     ),
     Operation(
-        "sin", 1, doubles.guarded(math.sin), lambda call, y, a, d: call("cos", a[0]) * d[0],
+        "sin", 1, 30, doubles.guarded(math.sin), lambda call, y, a, d: call("cos", a[0]) * d[0],
         sympy="sin", at_zero=0,
     ),
     Operation(
-        "cos", 1, doubles.guarded(math.cos), lambda call, y, a, d: -(call("sin", a[0]) * d[0]),
+        "cos", 1, 30, doubles.guarded(math.cos), lambda call, y, a, d: -(call("sin", a[0]) * d[0]),
         sympy="cos", at_zero=1,
     ),
     Operation(
-        "tan", 1, doubles.guarded(math.tan), lambda call, y, a, d: (1 + y * y) * d[0],
+        "tan", 1, 20, doubles.guarded(math.tan), lambda call, y, a, d: (1 + y * y) * d[0],
         sympy="tan", at_zero=0,
     ),
-    Operation("asin", 1, doubles.guarded(math.asin), _arc_slope, sympy="asin", at_zero=0),
+    Operation("asin", 1, 20, doubles.guarded(math.asin), _arc_slope, sympy="asin", at_zero=0),
     Operation(
-        "acos", 1, doubles.guarded(math.acos), lambda *given: -_arc_slope(*given), sympy="acos",
+        "acos", 1, 20, doubles.guarded(math.acos), lambda *given: -_arc_slope(*given), sympy="acos",
     ),
     Operation(
-        "atan", 1, math.atan, lambda call, y, a, d: d[0] / (1 + a[0] * a[0]),
+        "atan", 1, 20, math.atan, lambda call, y, a, d: d[0] / (1 + a[0] * a[0]),
         sympy="atan", at_zero=0,
     ),
     Operation(
-        "atan2", 2, math.atan2,
+        "atan2", 2, 20, math.atan2,
         lambda call, y, a, d: (d[0] * a[1] - a[0] * d[1]) / (a[1] * a[1] + a[0] * a[0]),
         sympy="atan2",
     ),
     Operation(
-        "sinh", 1, doubles.guarded(math.sinh, lambda a: math.copysign(math.inf, a)),
+        "sinh", 1, 20, doubles.guarded(math.sinh, lambda a: math.copysign(math.inf, a)),
         lambda call, y, a, d: call("cosh", a[0]) * d[0], sympy="sinh", at_zero=0,
     ),
     Operation(
-        "cosh", 1, doubles.guarded(math.cosh), lambda call, y, a, d: call("sinh", a[0]) * d[0],
+        "cosh", 1, 20, doubles.guarded(math.cosh), lambda call, y, a, d: call("sinh", a[0]) * d[0],
         sympy="cosh", at_zero=1,
     ),
     Operation(
-        "tanh", 1, math.tanh, lambda call, y, a, d: (1 - y * y) * d[0], sympy="tanh", at_zero=0,
+        "tanh", 1, 20, math.tanh, lambda call, y, a, d: (1 - y * y) * d[0], sympy="tanh", at_zero=0,
     ),
     Operation(
-        "exp", 1, doubles.guarded(math.exp), lambda call, y, a, d: y * d[0],
+        "exp", 1, 20, doubles.guarded(math.exp), lambda call, y, a, d: y * d[0],
         sympy="exp", at_zero=1,
     ),
-    Operation("log", 1, doubles.log, lambda call, y, a, d: d[0] / a[0], sympy="log"),
+    Operation("log", 1, 20, doubles.log, lambda call, y, a, d: d[0] / a[0], sympy="log"),
     Operation(
-        "abs", 1, abs, lambda call, y, a, d: call("sign", a[0]) * d[0],
+        "abs", 1, 1, abs, lambda call, y, a, d: call("sign", a[0]) * d[0],
         c="fabs({0})", text="abs({0})", sympy="Abs",
     ),
     Operation(
-        "sign", 1, lambda a: type(a)((a > 0) - (a < 0)) if true(a) else a,
+        "sign", 1, 3, lambda a: type(a)((a > 0) - (a < 0)) if true(a) else a,
         c="{0} > 0 ? 1 : ({0} < 0 ? -1 : {0})", text="sign({0})", sympy="sign",
     ),
-    Operation("floor", 1, doubles.floor, sympy="floor"),
+    Operation("floor", 1, 8, doubles.floor, sympy="floor"),
     Operation(
-        "min", 2, lambda a, b: a if a < b or a != a else b,
+        "min", 2, 3, lambda a, b: a if a < b or a != a else b,
         lambda call, y, a, d: call("select", call("lt", *a), d[0], d[1]),
         c="({0} < {1} || isnan({0})) ? {0} : {1}", text="min({0}, {1})", numpy="minimum",
         commutative=True,
     ),
     Operation(
-        "max", 2, lambda a, b: b if a < b or b != b else a,
+        "max", 2, 3, lambda a, b: b if a < b or b != b else a,
         lambda call, y, a, d: call("select", call("lt", *a), d[1], d[0]),
         c="({0} < {1} || isnan({1})) ? {1} : {0}", text="max({0}, {1})", numpy="maximum",
         commutative=True,
     ),
-    Operation("lt", 2, _truth(operator.lt), c="{0} < {1}", numpy="less", truth=True),
-    Operation("le", 2, _truth(operator.le), c="{0} <= {1}", numpy="less_equal", truth=True),
+    Operation("lt", 2, 1, _truth(operator.lt), c="{0} < {1}", numpy="less", truth=True),
+    Operation("le", 2, 1, _truth(operator.le), c="{0} <= {1}", numpy="less_equal", truth=True),
     Operation(
-        "eq", 2, _truth(operator.eq), c="{0} == {1}", numpy="equal", truth=True, commutative=True,
+        "eq", 2, 1, _truth(operator.eq), c="{0} == {1}", numpy="equal", truth=True,
+        commutative=True,
     ),
     Operation(
-        "and", 2, _truth(lambda a, b: true(a) and true(b)), c="{t0} && {t1}", text="{0} and {1}",
+        "and", 2, 1, _truth(lambda a, b: true(a) and true(b)), c="{t0} && {t1}", text="{0} and {1}",
         numpy="logical_and", truth=True, conditions=2, commutative=True,
     ),
     Operation(
-        "or", 2, _truth(lambda a, b: true(a) or true(b)), c="{t0} || {t1}", text="{0} or {1}",
+        "or", 2, 1, _truth(lambda a, b: true(a) or true(b)), c="{t0} || {t1}", text="{0} or {1}",
         numpy="logical_or", truth=True, conditions=2, commutative=True,
     ),
     Operation(
-        "not", 1, _truth(lambda a: a == 0), c="{0} == 0", text="not {0}",
+        "not", 1, 1, _truth(lambda a: a == 0), c="{0} == 0", text="not {0}",
         numpy="logical_not", truth=True,
     ),
     Operation(
-        "select", 3, lambda c, a, b: a if true(c) else b,
+        "select", 3, 2, lambda c, a, b: a if true(c) else b,
         lambda call, y, a, d: call("select", a[0], d[1], d[2]),
         c="{t0} ? {1} : {2}", text="{1} if {0} else {2}", numpy="where", conditions=1,
     ),

@@ -47,6 +47,11 @@ def agree(found: Any, wanted: float) -> bool:
 
 
 @ROWS
+def test_every_operation_takes_time(row: Operation) -> None:
+    assert 1 <= row.latency <= 100, "latency"
+
+
+@ROWS
 def test_texts_name_every_operand(row: Operation) -> None:
     asked = [f"{{t{k}}}" in row.c for k in range(row.arity)]
     named = [f"{{{k}}}" in row.c for k in range(row.arity)]

@@ -10,12 +10,10 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 
-from mstmm.ir import Assign, Guard, KernelIR, Operand, Statement, Store, Temporary
+from mstmm.ir import OPERATIONS, Assign, Guard, KernelIR, Operand, Statement, Store, Temporary
 
-#: Cycles until a result can be used, as on current processors; only ratios matter.
-LATENCY = {"div": 13, "sqrt": 19, "sin": 30, "cos": 30, "neg": 1}
-#: Latency of everything else.
-USUAL_LATENCY = 4
+#: Cycles that a sum or a product takes; they are one when a product is added.
+_SUM = OPERATIONS["add"].latency
 
 #: A signed term: (ready, tie-break, negative, operand, is a product that fuses with an addition).
 _Term = tuple[float, int, bool, Operand, bool]
@@ -92,7 +90,7 @@ class _Balance:
                 self.names[statement.number] = self._sum(terms)
                 return
         args = [self._renamed(a) for a in statement.args]
-        ready = max(map(self._when, args), default=0.0) + LATENCY.get(statement.op, USUAL_LATENCY)
+        ready = max(map(self._when, args), default=0.0) + OPERATIONS[statement.op].latency
         self.names[statement.number] = self._emit(statement.op, args, ready)
 
     def _terms(self, statement: Assign) -> list[tuple[bool, Operand]]:
@@ -123,12 +121,12 @@ class _Balance:
                 and self.by_number[operand.number].op == "mul"
             )
             renamed = self._renamed(operand)
-            ready = self._when(renamed) - (USUAL_LATENCY if product else 0)
+            ready = self._when(renamed) - (_SUM if product else 0)
             heapq.heappush(heap, (ready, order, negative, renamed, product))
         order = len(terms)
         while len(heap) > 1:
             a, b = heapq.heappop(heap), heapq.heappop(heap)
-            wait = max(a[0] + (USUAL_LATENCY if a[4] and b[4] else 0), b[0]) + USUAL_LATENCY
+            wait = max(a[0] + (_SUM if a[4] and b[4] else 0), b[0]) + _SUM
             if a[2] == b[2]:
                 result, negative = self._emit("add", (a[3], b[3]), wait), a[2]
             else:
@@ -138,7 +136,7 @@ class _Balance:
             order += 1
         ready, _, negative, total, _ = heap[0]
         if negative:
-            return self._emit("neg", (total,), ready + LATENCY["neg"])
+            return self._emit("neg", (total,), ready + OPERATIONS["neg"].latency)
         assert isinstance(total, Temporary)
         return total
 

@@ -13,16 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mstmm.ir import Assign, Guard
+from mstmm.ir import OPERATIONS, Assign, Guard
 
 from .line import Line, reads_of, units_of
-
-#: Cycles until a result can be used, on current processors, and of everything that is not named.
-_LATENCY = {
-    "add": 4, "sub": 4, "mul": 4, "div": 13, "sqrt": 20, "neg": 1, "abs": 1, "min": 3, "max": 3,
-    "lt": 1, "le": 1, "eq": 1, "and": 1, "or": 1, "not": 1, "select": 2,
-}  # fmt: skip
-_USUAL_LATENCY = 20
 
 #: Operations that start in a cycle, and how far a part is looked ahead into.
 _WIDTH, _WINDOW = 4, 8
@@ -87,4 +80,4 @@ def _parts(units: Sequence[Sequence[Line]], before: Sequence[set[int]]) -> list[
 
 def _latency(unit: Sequence[Line]) -> int:
     last = unit[-1]
-    return _LATENCY.get(last.op, _USUAL_LATENCY) if isinstance(last, Assign) else 0
+    return OPERATIONS[last.op].latency if isinstance(last, Assign) else 0
