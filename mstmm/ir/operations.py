@@ -1,7 +1,8 @@
 """What the IR computes: one row for each operation, with all that others ask of it.
 
-C, the tape, numpy, SymPy, the listing, folding and differentiation read this table; a new
-operation is one row here, and a function in `fused_real.c` and `fused_lanes.c` where C has none.
+C, the tape, numpy, SymPy, the listing, folding, differentiation, expressions and the passes over
+fused code read this table.  A new operation is one row here, a function each in the C texts
+`fused_real.c` and `fused_lanes.c`, and what mpmath computes otherwise (`derive.audit.arithmetic`).
 """
 
 from __future__ import annotations
