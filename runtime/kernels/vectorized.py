@@ -7,6 +7,7 @@ kernel; outside the loops they have the length 1.  So a loop is one array operat
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ class _Axes(Replay):
         return np.asarray(np.expand_dims(vector[..., 0, :] @ matrix.T, axis))
 
     def constant(self, constant: Constant) -> Array:
-        return np.full((1, 1), constant.number)
+        return _constant(constant.text)
 
     def entry(self, element: Element) -> Array:
         letters = [entry for entry in element.index if isinstance(entry, str)]
@@ -150,6 +151,11 @@ class _Axes(Replay):
         for i in reversed(range(self.n)):
             above = lower[..., i, :i, None]
             columns[..., :i, :] -= above * columns[..., None, i, :]
+
+
+@lru_cache(maxsize=1024)
+def _constant(text: str) -> Array:
+    return np.full((1, 1), Constant(text).number)
 
 
 def _slices(index: tuple[int | str, ...]) -> tuple[Any, ...]:
