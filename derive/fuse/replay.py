@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
+from mstmm.border.failures import Failed
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Node
@@ -34,8 +35,6 @@ from .known import along_a_screw, screw_axis, unit_row
 from .slots import GROUND, Slots, Subject
 from .state import FusionState
 
-#: Reasons of a failure, as the looped engine numbers them.
-REASONS = {"undetermined": 1, "force": 2, "hinge": 4, "section": 7, "modes": 8}
 #: A pivot must exceed this share of the mean inertia of the body it moves.
 PIVOT_FLOOR = Fraction(1, 10**14)
 
@@ -134,7 +133,8 @@ class Replay(Slots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "balance": True, "efforts": True, "inverse": False,
-            "laws": bool(s.laws), "driven": s.drives is not None, "valued": s.values is not None, "posed": bool(self._posed),
+            "laws": bool(s.laws), "driven": s.drives is not None,
+            "valued": s.values is not None, "posed": bool(self._posed),
             "flexible": any(body.modal for body in s.bodies),
         }  # fmt: skip
         return known[trait]
@@ -217,7 +217,7 @@ class Replay(Slots):
                 return
             positive = condition.op == "lt" and condition.args[0].value == 0
             if not (positive and reason == "undetermined"):  # pivots are judged more severely
-                self.state.fail_unless(condition, REASONS[reason], element, code)
+                self.state.fail_unless(condition, int(Failed[reason.upper()]), element, code)
 
         return guard
 
@@ -325,7 +325,7 @@ class Replay(Slots):
         for i, pivot in enumerate(self.get(step.pivots, count)):
             moves = any(x.value != 0 for x in columns[i::count][:3])
             condition = graph.call("lt", mass if moves else inertia, pivot)
-            self.state.fail_unless(condition, REASONS[step.fails], self.index, 1)
+            self.state.fail_unless(condition, int(Failed[step.fails.upper()]), self.index, 1)
 
 
 def _total(own: Nodes, whole: Nodes, places: tuple[int, int, int]) -> Node:

@@ -7,21 +7,12 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "failures.h"
 #include "layout.h"
 #include "mstmm.h"
 #include "tape.h"
 
 /* cdef begin */
-/* Reasons of a failure. */
-#define MSTMM_FAILED_UNDETERMINED 1
-#define MSTMM_FAILED_FORCE 2
-#define MSTMM_FAILED_EXPRESSION 3
-#define MSTMM_FAILED_HINGE 4
-#define MSTMM_FAILED_PRODUCT_PIVOT 5
-#define MSTMM_FAILED_PRODUCT_ERROR 6
-#define MSTMM_FAILED_SECTION 7
-#define MSTMM_FAILED_MODES 8
-
 /* Moments of the fields of a flexible body under one density; see derive/flexible/symbols.py. */
 typedef struct {
     const real *rigid, *c, *p, *b, *z[6], *y[3], *g[3], *m;
