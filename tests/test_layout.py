@@ -256,6 +256,24 @@ def test_nothing_goes_by_the_name_of_a_hinge() -> None:
     assert not found
 
 
+#: What reads a scene's numbers out of C, or recognises something by its address.
+READS_BACK = re.compile(
+    r"\.unpack\(|uintptr_t|records\.column\(|\.model\.(bodies|laws|loads|forces|drives|n_\w+)\b"
+)
+
+
+def test_nothing_is_read_back_out_of_c() -> None:
+    """A scene's numbers are in its System; C records are the business of one room."""
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for folder in ("runtime", "mstmm/bridge")
+        for path in python_files(folder)
+        if READS_BACK.search(path.read_text())
+    }
+    libraries = {"runtime/kernels/store.py"}  # hands a library's symbol on
+    assert not {one for one in found - libraries if not one.startswith("runtime/pack/records/")}
+
+
 def test_no_module_imports_itself_in_the_end() -> None:
     """Imports inside functions and for the type checker count like any other."""
     graph = grimp.build_graph("mstmm")

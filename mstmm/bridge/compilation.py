@@ -15,7 +15,7 @@ from ..scene import Scene
 if TYPE_CHECKING:
     from ..derive.catalogue.registry import Element
     from ..runtime.model.model import Model
-    from ..runtime.pack.bodies import Known
+    from ..runtime.pack.elements import Known
     from ..runtime.pack.packed import Packed
 
 ENGINES = ("auto", "fused", "looped")

@@ -27,7 +27,7 @@ from ..runtime.pack.structure import structure_of
 
 if TYPE_CHECKING:
     from ..derive.fuse.scene import Fused
-    from ..runtime.pack.bodies import Known
+    from ..runtime.pack.elements import Known
     from ..runtime.pack.packed import Packed
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
@@ -70,7 +70,7 @@ class Fusion:
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         if not self.obstacle:
-            self.structure, self.numbers = structure_of(packed, known, bake)
+            self.structure, self.numbers = structure_of(packed.system, known, bake)
 
     def find(self) -> FusedLibrary | None:
         """The scalar library if it is in the cache; no compiler is started."""
@@ -232,16 +232,17 @@ def _note(built: Built) -> str:
 
 def _obstacle(packed: Packed, most: int) -> str:
     """Why a scene is not fused; empty if it can be."""
-    count = int(packed.model.n_bodies)
+    count = packed.system.count
     if packed.releases:
         names = ", ".join(f'"{name}"' for name in packed.releases)
         return f"hinge {names} is released during the run, which changes the structure"
     if count > most:
         asked = f' ({MOST_ASKED} with engine = "fused")' if most < MOST_ASKED else ""
         return f"it has {count} bodies; fused code is for {most} at most{asked}"
-    if packed.model.product != packed.ffi.NULL:
+    if packed.product is not None:
         return "the product of classical matrices is looped"
-    if any(packed.model.bodies[i].tape != packed.ffi.NULL for i in range(count)):
+    hinges = {body.hinge for body in packed.system.distinct}
+    if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
     return ""
 

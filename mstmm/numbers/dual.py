@@ -4,8 +4,7 @@ The code that turns the numbers of a scene into those of its kernels (frames, ma
 runs unchanged on Dual numbers.  Values are computed by the same operations in the same order, so
 they are bit for bit those of plain floats.
 
-A Dual that enters a C array travels as a marker, a double of about 2^1000 that stands for its entry
-in a list of marks; whoever reads the array back resolves it (`Marks.resolve`).
+A Dual is no float: `float(dual)`, and with it an array of doubles or of C, refuses it.
 """
 
 from __future__ import annotations
@@ -17,27 +16,6 @@ from typing import Any
 #: Slopes by number of the parameter; those that are exactly zero are left out.
 Slopes = Mapping[int, float]
 
-_EXPONENT, _STEP = 1000, 2.0**-52
-
-
-class Marks:
-    """The Duals that have entered C arrays, in order."""
-
-    def __init__(self) -> None:
-        self._entered: list[Dual] = []
-
-    def enter(self, number: Dual) -> float:
-        """The marker that stands for `number`."""
-        self._entered.append(number)
-        return math.ldexp(1 + (len(self._entered) - 1) * _STEP, _EXPONENT)
-
-    def resolve(self, number: float) -> float | Dual:
-        """What the number read from an array stands for: itself, if it is no marker."""
-        fraction = math.ldexp(number, -_EXPONENT) - 1
-        if not 0 <= fraction < len(self._entered) * _STEP:
-            return number
-        return self._entered[round(fraction / _STEP)]
-
 
 class Dual:
     """value, and slope[k] = d value / d parameter k.
@@ -46,14 +24,11 @@ class Dual:
     no structural zero.
     """
 
-    __slots__ = ("marks", "slope", "value")
+    __slots__ = ("slope", "value")
 
-    def __init__(self, value: float, slope: Slopes, marks: Marks) -> None:
-        self.value, self.marks = value, marks
+    def __init__(self, value: float, slope: Slopes) -> None:
+        self.value = value
         self.slope = {k: s for k, s in slope.items() if s != 0}
-
-    def __float__(self) -> float:
-        return self.marks.enter(self) if self.slope else self.value
 
     def __bool__(self) -> bool:
         return bool(self.slope) or self.value != 0
@@ -79,7 +54,7 @@ class Dual:
         return self.value >= value_of(other)
 
     def __neg__(self) -> Dual:
-        return Dual(-self.value, {k: -s for k, s in self.slope.items()}, self.marks)
+        return Dual(-self.value, {k: -s for k, s in self.slope.items()})
 
     def __abs__(self) -> Dual:
         return -self if math.copysign(1.0, self.value) < 0 else self
@@ -128,13 +103,13 @@ def real(number: Any) -> float:
 def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
     """`value` whose derivative with respect to each number is given; a float where none moves."""
     slope: dict[int, float] = {}
-    marks = None
+    moves = False
     for number, partial in partials:
         if isinstance(number, Dual):
-            marks = number.marks
+            moves = True
             for k, s in number.slope.items():
                 slope[k] = slope.get(k, 0.0) + partial * s
-    return value if marks is None else Dual(value, slope, marks)
+    return Dual(value, slope) if moves else value
 
 
 def moving(numbers: Iterable[object]) -> bool:

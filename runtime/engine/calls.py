@@ -58,7 +58,7 @@ class Calls:
 
     def workspace(self) -> Any:
         """This thread's workspace as `real *`."""
-        size = int(self.packed.model.workspace)
+        size = self.packed.workspace
         if getattr(self._local, "size", None) != size:
             self._local.array = np.zeros(size)
             self._local.pointer = self.pointer(self._local.array)
@@ -76,7 +76,7 @@ class Calls:
 
     def start_memory(self) -> Array:
         """Memory at the start: nothing released, no turns counted."""
-        return np.zeros(max(1, self.packed.n_memory))
+        return np.zeros(max(1, self.packed.system.n_memory))
 
     @cached_property
     def inertia_alone(self) -> Self:

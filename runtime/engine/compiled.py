@@ -9,7 +9,7 @@ from mstmm.scene import Scene
 
 from ..flexible.modal_body import ModalBody
 from ..pack import parameters as named_parameters
-from ..pack.bodies import Known
+from ..pack.elements import Known
 from ..pack.layout import Layout
 from ..pack.pack import pack
 from ..pack.packed import Packed

@@ -16,9 +16,7 @@ def _manifest() -> bytes:
 
 def kernels_hash(model: Compiled) -> str:
     """SHA-256 of the hashes of all generated kernels, and of the elements that are not prebuilt."""
-    found, ffi = hashlib.sha256(_manifest()), model.looped.ffi
+    found = hashlib.sha256(_manifest())
     for (kind, name), element in sorted((model.known or {}).items()):
-        text = element.descriptor.hash
-        own = "" if text == ffi.NULL else ffi.string(text).decode()
-        found.update(f"{kind} {name} {own}\n".encode())
+        found.update(f"{kind} {name} {element.hash}\n".encode())
     return found.hexdigest()

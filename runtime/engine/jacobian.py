@@ -19,7 +19,6 @@ from mstmm.errors import ElementError, EnvironmentFailure
 from mstmm.ir.tangent import PREFIX, tangent
 
 from ..kernels.tape import TapeKernel
-from ..pack.pack import pack
 from ..pack.structure import structure_of
 
 if TYPE_CHECKING:
@@ -87,9 +86,9 @@ class Jacobian:
 def _tape(model: Compiled, outputs: list[str]) -> TapeKernel | None:
     """The tangent of the equations with respect to q and u; None where there is none."""
     packed, known = model.packed, model.known or {}
-    if packed.releases or packed.model.n_bodies > MOST_BODIES:
+    if packed.releases or packed.system.count > MOST_BODIES:
         return None
-    structure, numbers = structure_of(pack(model.scene, known), known)
+    structure, numbers = structure_of(packed.system, known)
     try:
         kernels = model.fusion.fused(structure).kernels
     except (ElementError, EnvironmentFailure):

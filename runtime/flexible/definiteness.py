@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 from ..kernels.vectorized import evaluate
+from .kernel_inputs import moments_of, section_inputs
 from .modal_kernels import kernel
 from .parts import slices
-from .records import moments_of, section_inputs
 from .sizes import modal_sizes
 from .support import ANY, Support
 

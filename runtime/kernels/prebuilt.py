@@ -31,6 +31,7 @@ class Element:
     descriptor: Any
     tape: Tape | None = None  # hinge kernel of an element without a library
     declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
+    hash: str = ""  # of its definition
     owner: Any = None  # keeps the library or the arrays of the descriptor alive
 
 
@@ -86,7 +87,7 @@ def describe(ffi: Any, descriptor: Any) -> Element:
     parameters = tuple(text(ffi, descriptor.p_names[i]) for i in range(descriptor.np))
     return Element(
         text(ffi, descriptor.kind), name, int(descriptor.nq), int(descriptor.nu), parameters,
-        functions, guards, descriptor,
+        functions, guards, descriptor, hash=text(ffi, descriptor.hash),
     )  # fmt: skip
 
 

@@ -19,7 +19,6 @@ from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.tangents import Tangents
-from ..pack.pack import pack
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -69,7 +68,7 @@ class Differentiation:
         if names:
             structure, self.p, self.slopes = slopes(model.scene, known, names)
         else:
-            structure, self.p = structure_of(pack(model.scene, known), known)
+            structure, self.p = structure_of(model.packed.system, known)
             self.slopes = np.zeros((len(self.p), 0))
         self.tangents = Tangents(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
@@ -142,9 +141,9 @@ def _refuse(model: Compiled) -> None:
             f"derivatives: hinge {names} is released during the run, so that the accelerations "
             "change their form; take the release out"
         )
-    if packed.model.n_bodies > MOST_BODIES:
+    if packed.system.count > MOST_BODIES:
         raise SceneError(
-            f"derivatives: {packed.model.n_bodies} bodies; expected {MOST_BODIES} or fewer, as "
+            f"derivatives: {packed.system.count} bodies; expected {MOST_BODIES} or fewer, as "
             "work and results grow with their square"
         )
 

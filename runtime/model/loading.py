@@ -89,7 +89,7 @@ def _read(xarray: Any, path: Path) -> Any:
 
 def _fits(model: Model, run: Trajectory) -> bool:
     """The sizes of every array follow from the scene and the number of samples."""
-    n, memory = len(run.t), model.packed.n_memory
+    n, memory = len(run.t), model.packed.system.n_memory
     expected = {
         "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
     }  # fmt: skip

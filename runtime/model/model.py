@@ -19,7 +19,7 @@ from mstmm.scene import Scene
 from ..engine.code import Fusing
 from ..engine.compiled import Compiled
 from ..integrate.settings import Settings, checked, times_of
-from ..pack.bodies import Known
+from ..pack.elements import Known
 from ..pack.layout import refuse_dense
 from ..pack.packed import Packed
 

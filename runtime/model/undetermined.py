@@ -7,12 +7,12 @@ moves no inertia passes nothing inwards, so that the rotor changes nothing for t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotion
+
+from ..pack.records.rotors import rotors
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -51,7 +51,7 @@ def _concerned(
 ) -> list[int]:
     """Places in the tree of all hinges with an undetermined motion, that of the error first."""
     places = [error.place]
-    with _rotors(engine) as give:
+    with rotors(engine.packed.written) as give:
         while len(places) < _MOST and not engine.is_flexible(places[-1]):
             give(places[-1])
             try:
@@ -65,25 +65,6 @@ def _concerned(
             else:
                 break
     return places
-
-
-@contextmanager
-def _rotors(engine: Engine) -> Iterator[Callable[[int], None]]:
-    """Lets rotors be given to hinges for a while, all of which are taken away again."""
-    ffi, bodies = engine.ffi, engine.packed.model.bodies
-    rotor = ffi.new("real[]", [1.0] * 6)
-    before: dict[int, tuple[object, int]] = {}
-
-    def give(place: int) -> None:
-        record = bodies[place]
-        before[place] = (record.rotor, int(record.generic))
-        record.rotor, record.generic = rotor, 1
-
-    try:
-        yield give
-    finally:
-        for place, (old, generic) in before.items():
-            bodies[place].rotor, bodies[place].generic = old, generic
 
 
 def _listed(names: list[str]) -> str:

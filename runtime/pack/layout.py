@@ -130,9 +130,13 @@ class Layout:
     def __len__(self) -> int:
         return len(self._numbers)
 
+    def group(self, hinge: int) -> Group:
+        """The group to which the hinge of this number belongs."""
+        return self.groups[bisect_right(self._firsts, hinge) - 1]
+
     def slots(self, hinge: int) -> HingeSlots:
         """Slots of the hinge of this number."""
-        group = self.groups[bisect_right(self._firsts, hinge) - 1]
+        group = self.group(hinge)
         k = hinge - group.first
         if group.count == 1:
             return group.hinges[0]

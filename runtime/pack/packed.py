@@ -2,49 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from mstmm.ir import KernelIR
-from mstmm.scene import Scene, split
-from mstmm.scene.checks.topology import GROUND_INDEX, Topology
-
 from ..breaks.acting import acting
 from ..breaks.times import TimeMap, time_map
-from ..flexible.modal_body import ModalBody
-from ..kernels.records import Records
-from .flexible.expansion import Expanded
-from .layout import Layout
-from .placement import Placement
+from .frames import Frames
+from .records.model import Written
 from .switches import Watched, watched
+from .system import System
 
 #: Spans of time whose maps are kept.
 _MAPS = 8
 
 
 @dataclass
-class Packed:
-    """A scene in the engine's arrays.  `kept` holds what C points to."""
+class Packed(Frames):
+    """A scene in internal frames, in Python and in the engine's arrays.
 
-    scene: Scene  #: of nodes: flexible bodies are replaced by theirs
-    topology: Topology
-    layout: Layout
+    `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
+    largest workspace of a tape, `workspace` the whole length.
+    """
+
+    system: System
     ffi: Any
     lib: Any
     model: Any
-    records: Records
-    placements: Mapping[str, Placement]
-    positions: Mapping[str, int]
-    hinge_position: Mapping[str, int]
-    releases: dict[str, int]
-    n_memory: int
+    written: Written
+    scratch: int
+    tape_slots: int = 0
+    workspace: int = 0
+    product: Any = None
     warnings: list[str] = field(default_factory=list)
-    #: kernels of the scene's expressions: "values", "drives", and "effort k" of spring k
-    expressions: dict[str, KernelIR] = field(default_factory=dict)
-    kept: list[Any] = field(default_factory=list)
-    expanded: Expanded | None = None
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
 
     def time_map(self, start: float, end: float) -> TimeMap:
@@ -61,36 +51,12 @@ class Packed:
         """Events, releases and switches as one tape."""
         return watched(self.scene, self.layout)
 
-    @property
-    def described(self) -> Scene:
-        """The scene as the user describes it."""
-        return self.scene if self.expanded is None else self.expanded.described
-
-    @property
-    def flexible(self) -> Mapping[str, ModalBody]:
-        """Numbers of the flexible bodies."""
-        return {} if self.expanded is None else self.expanded.bodies
-
-    def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
-        """(body position, axes (9), offset (3)) of "body" or "body.end", internal axes."""
-        if self.expanded is not None:
-            reference = self.expanded.nodes.get(reference, reference)
-        name, at = split(reference)
-        if name == "ground":
-            return GROUND_INDEX, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
-        place = self.placements[name]
-        body = self.scene.bodies.by_name[name]
-        axes = place.axes(body.end_rotation(at))
-        return (
-            self.positions[name],
-            (*axes[0], *axes[1], *axes[2]),
-            place.point(body.end_position(at)),
-        )
-
 
 def resize(packed: Packed, slots: int) -> None:
     """Room for tapes of `slots` numbers behind the blocks."""
-    model = packed.model
-    model.tape_slots = max(int(model.tape_slots), slots)
-    tail = 2 * (model.nq + model.nu) + model.n_values + 3 * model.n_drives + model.tape_slots
-    model.workspace = model.scratch + tail
+    system, model = packed.system, packed.model
+    packed.tape_slots = max(packed.tape_slots, slots)
+    state = 2 * (system.nq + system.nu) + system.n_values + 3 * len(system.driven)
+    packed.workspace = packed.scratch + state + packed.tape_slots
+    model.scratch, model.tape_slots = packed.scratch, packed.tape_slots
+    model.workspace = packed.workspace

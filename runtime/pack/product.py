@@ -32,16 +32,15 @@ def _kind(hinge: Hinge) -> str | None:
 
 def attach(packed: Packed, accuracy: float) -> None:
     """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
-    scene, lib, ffi = packed.scene, packed.lib, packed.ffi
+    scene, lib = packed.scene, packed.lib
     _refuse(packed)
-    record = ffi.new("mstmm_product *")
+    packed.product = record = packed.ffi.new("mstmm_product *")
     record.kind = getattr(lib, f"MSTMM_PRODUCT_{_kind(scene.hinges[0])}")
     record.accuracy = accuracy
     # Its numbers stand between the blocks and what lies behind them: one workspace per thread.
-    record.place = packed.model.scratch
-    packed.model.scratch += len(scene.bodies) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
+    record.place = packed.scratch
+    packed.scratch += len(scene.bodies) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
     packed.model.product = record
-    packed.kept.append(record)
 
 
 def _refuse(packed: Packed) -> None:

@@ -11,6 +11,7 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,15 +19,17 @@ from pydantic import BaseModel
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.expression.expression import Expression, number
+from mstmm.expression.expression import Expression, Name
 from mstmm.ir.structure import Structure
-from mstmm.numbers.dual import Dual, Marks, value_of
+from mstmm.ir.terms import Node, Terms
+from mstmm.numbers.dual import Dual, value_of
 from mstmm.scene import Hinge, Scene
 
 from . import parameters
-from .bodies import Known
-from .pack import pack
-from .structure import structure_of
+from .elements import Known
+from .internal import system_of
+from .structure import structure_and_numbers, structure_of
+from .values import MOVING
 
 Change = Callable[[float], Any]
 
@@ -43,12 +46,11 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     numbers of flexible bodies.
     """
     _refuse_flexible(scene, parameters.resolved(scene, names))
-    marks = Marks()
-    moving = _seeded(scene, names, marks)
-    plain = pack(scene, known, align=False)  # frames that are chosen by cases have no slopes
-    seeded = pack(moving, known, align=False, flexible=plain.flexible)
-    structure, raw = structure_of(seeded, known)
-    found = [marks.resolve(x) for x in raw.tolist()]
+    seeded, moving = _seeded(scene, names)
+    # without aligning: frames that are chosen by cases have no slopes
+    plain, frames = system_of(scene, known, align=False)
+    system, _ = system_of(seeded, known, align=False, flexible=frames.modal, moving=moving)
+    structure, found = structure_and_numbers(system, known)
     values = np.array([value_of(x) for x in found])
     _check(structure_of(plain, known)[1].tolist(), values.tolist())
     moved = np.zeros((len(found), len(names)))
@@ -89,18 +91,42 @@ def _check(plain: Sequence[float], found: Sequence[float]) -> None:
         del others[near]
 
 
-def _seeded(scene: Scene, names: Sequence[str], marks: Marks) -> Scene:
-    """The scene, not validated again, with a Dual of slope 1 in place of every named number."""
+@dataclass(frozen=True)
+class _Moving(Expression):
+    """A number of the port "moving" in place of a constant expression."""
+
+    number: Dual
+    place: int
+
+    @property
+    def is_zero(self) -> bool:
+        """Never: a zero that moves is none."""
+        return False
+
+    def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
+        """The entry of the port."""
+        return graph.element(MOVING, self.place)
+
+
+def _seeded(scene: Scene, names: Sequence[str]) -> tuple[Scene, dict[int, Dual]]:
+    """The scene, not validated again, with a Dual of slope 1 in place of every named number, and
+    those of expressions by their places."""
+    moving: dict[int, Dual] = {}
     for k, name in enumerate(parameters.resolved(scene, names)):
 
         def dual(value: Any, k: int = k) -> Any:
             if isinstance(value, Expression):
-                constant = value.evaluate(lambda _: math.nan)
-                return number(float(Dual(constant, {k: 1.0}, marks)))
-            return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0}, marks)
+                known = value.number if isinstance(value, _Moving) else value.evaluate(_unknown)
+                moving[k] = dual(known)
+                return _Moving(value.text, (), (), -1, moving[k], k)
+            return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
 
         scene = _changed(scene, name, dual)
-    return scene
+    return scene, moving
+
+
+def _unknown(_: Name) -> float:
+    return math.nan
 
 
 def _changed(scene: Scene, name: str, change: Change) -> Scene:

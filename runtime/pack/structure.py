@@ -1,118 +1,76 @@
-"""Packed scene -> Structure for the fused engine, and the vector p of its run-time numbers."""
+"""System -> Structure for the fused engine, and the vector p of its run-time numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.ir import (
-    Assign,
-    Constant,
-    KernelIR,
-    Operand,
-    Port,
-    Statement,
-    Store,
-)
-from mstmm.ir import (
-    Element as ArrayEntry,
-)
-from mstmm.ir.structure import (
-    BodyStructure,
-    Entries,
-    Entry,
-    ExpressionStructure,
-    ForceStructure,
-    Key,
-    LawStructure,
-    LoadStructure,
-    ModalStructure,
-    SectionStructure,
-    Structure,
-    angle_of,
-)
+from mstmm import ir
+from mstmm.ir import KernelIR, Operand, Port, Statement
+from mstmm.ir import structure as code
+from mstmm.ir.structure import Entries, Entry, Structure
+from mstmm.numbers.dual import real, value_of
 
-from ..kernels import prebuilt
-from ..kernels.prebuilt import Element
-from .bodies import Known, kernel_type
-from .packed import Packed
+from . import system as given
+from .elements import Elements, Known
+from .system import System
+from .values import MOVING
 
-#: Numbers behind the parameters of a user's body: internal frame in its own (rotation, origin).
-_USER_FRAME = 12
 #: Numbers of expressions that decide which terms there are.
 _STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
 
 
-class _Reader:
-    """Reads the engine's records; numbers become structural constants or places in p."""
+def structure_of(
+    system: System, known: Known, bake: bool = False
+) -> tuple[Structure, NDArray[np.float64]]:
+    """(structure, p) of a system; `known` are elements beyond the prebuilt ones.
 
-    def __init__(self, packed: Packed, known: Known, bake: bool) -> None:
-        self.packed, self.ffi, self.bake = packed, packed.ffi, bake
-        self.numbers: list[float] = []
-        self.elements = {**prebuilt.elements(), **known}
-        self._owners = {
-            (name, self._address(function)): key
-            for key, element in self.elements.items()
-            for name, function in element.functions.items()
-        }
+    With `bake` every number is part of the structure and p is empty.
+    """
+    structure, numbers = structure_and_numbers(system, known, bake)
+    return structure, np.array(numbers)
 
-    def _address(self, function: Any) -> int:
-        return int(self.ffi.cast("uintptr_t", function))
 
-    def owner(self, kernel: str, function: Any) -> Key:
-        """Element to which a kernel function belongs."""
-        return self._owners[kernel, self._address(function)]
+def structure_and_numbers(
+    system: System, known: Known, bake: bool = False
+) -> tuple[Structure, list[Any]]:
+    """The same with p as a list of floats and Duals."""
+    sorting, elements = _Sorting(system, bake), Elements(known)
+    gravity = sorting.entries(system.gravity)
+    bodies = tuple(body for run in system.bodies for body in sorting.bodies(run))
+    laws = tuple(law for run in system.laws for law in sorting.laws(run))
+    loads = tuple(map(sorting.load, system.loads))
+    forces = tuple(map(sorting.force, system.forces))
+    used = {key for body in bodies for key in (body.hinge, body.body)}
+    used |= {force.element for force in forces}
+    values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
+    structure = Structure(
+        system.nq, system.nu, len(sorting.numbers), system.n_memory, gravity, bodies, laws, loads,
+        forces, values, prescribed, system.driven,
+        {key: elements[key].hash for key in sorted(used)},
+    )  # fmt: skip
+    return structure, sorting.numbers
 
-    def hinge(self, index: int, record: Any) -> Key:
-        """Element of a body's hinge; one that is interpreted has no function to be known by."""
-        if record.hinge != self.ffi.NULL:
-            return self.owner("hinge", record.hinge)
-        link = self.packed.topology.links[index]
-        return "hinge", kernel_type(self.packed.scene.hinges[link.hinge], self.packed.releases)
 
-    def law_kernel(self, function: Any) -> str:
-        """Name of a kernel of the laws."""
-        laws = self.elements["sweep", "laws"].functions
-        address = self._address(function)
-        return next(name for name, f in laws.items() if self._address(f) == address)
+class _Sorting:
+    """Sorts the numbers of a system into structural constants and places in p."""
+
+    def __init__(self, system: System, bake: bool) -> None:
+        self.moving, self.bake = system.moving, bake
+        self.numbers: list[Any] = []
 
     def entries(self, values: Iterable[float], axes: bool = False) -> Entries:
         """Zeros, and +-1 of axes, are structure; the rest goes to p."""
-        return tuple(self._entry(float(value), axes) for value in values)
+        return tuple(self._entry(real(value), axes) for value in values)
 
     def _entry(self, value: float, axes: bool) -> Entry:
         if value == 0.0 or (axes and abs(value) == 1.0):
-            return value + 0.0  # -0.0 and 0.0 are one structure
+            return value_of(value) + 0.0  # -0.0 and 0.0 are one structure
         return self._place(value)
-
-    def expression(self, name: str) -> ExpressionStructure | None:
-        """Expressions of the scene with their numbers taken out; None if there are none."""
-        kernel = self.packed.expressions.get(name)
-        if kernel is None:
-            return None
-        texts: list[str] = []
-
-        def taken(operand: Operand) -> Operand:
-            if not isinstance(operand, Constant) or operand.text in _STRUCTURAL:
-                return operand
-            texts.append(operand.text)
-            return ArrayEntry("constants", (len(texts) - 1,))
-
-        statements: list[Statement] = []
-        for statement in kernel.statements:
-            if isinstance(statement, Assign):
-                arguments = tuple(map(taken, statement.args))
-                statements.append(Assign(statement.number, statement.op, arguments))
-            elif isinstance(statement, Store):
-                statements.append(Store(statement.port, statement.index, taken(statement.value)))
-            else:
-                statements.append(statement)
-        inputs = (*kernel.inputs, Port("constants", (len(texts),)))
-        ir = KernelIR(kernel.name, inputs, kernel.outputs, tuple(statements))
-        return ExpressionStructure(ir, tuple(self._place(Constant(x).number) for x in texts))
 
     def _place(self, value: float) -> Entry:
         if self.bake:
@@ -120,152 +78,108 @@ class _Reader:
         self.numbers.append(value)
         return len(self.numbers) - 1
 
-    def unpack(self, pointer: Any, count: int) -> list[Any]:
-        """The first `count` numbers of a C array."""
-        return list(self.ffi.unpack(pointer, count)) if count else []
+    # --- expressions --------------------------------------------------------------------------
 
+    def expression(self, kernel: KernelIR | None) -> code.ExpressionStructure | None:
+        """Expressions of the scene with their numbers taken out; None if there are none."""
+        if kernel is None:
+            return None
+        found: list[Any] = []
 
-def structure_of(
-    packed: Packed, known: Known, bake: bool = False
-) -> tuple[Structure, NDArray[np.float64]]:
-    """(structure, p) of a packed scene; `known` are elements beyond the prebuilt ones.
+        def taken(operand: Operand) -> Operand:
+            if isinstance(operand, ir.Element) and operand.port == MOVING:
+                found.append(self.moving[int(operand.index[0])])
+            elif isinstance(operand, ir.Constant) and operand.text not in _STRUCTURAL:
+                found.append(operand.number)
+            else:
+                return operand
+            return ir.Element("constants", (len(found) - 1,))
 
-    With `bake` every number is part of the structure and p is empty.
-    """
-    reader, model = _Reader(packed, known, bake), packed.model
-    gravity = reader.entries(model.gravity)
-    drives = [model.drives[k] for k in range(model.n_drives)]
-    bodies = tuple(_body(reader, i) for i in range(model.n_bodies))
-    laws = tuple(_law(reader, model.laws[k]) for k in range(model.n_laws))
-    loads = tuple(_load(reader, model.loads[k]) for k in range(model.n_loads))
-    forces = tuple(_force(reader, k) for k in range(model.n_forces))
-    used = {key for body in bodies for key in (body.hinge, body.body)}
-    used |= {force.element for force in forces}
-    values, prescribed = reader.expression("values"), reader.expression("drives")
-    structure = Structure(
-        int(model.nq), int(model.nu), len(reader.numbers), int(model.n_memory), gravity, bodies,
-        laws, loads, forces, values, prescribed,
-        tuple((int(d.body), int(d.speed)) for d in drives),
-        {key: _hash(reader, reader.elements[key]) for key in sorted(used)},
-    )  # fmt: skip
-    return structure, np.array(reader.numbers)
+        statements: list[Statement] = []
+        for statement in kernel.statements:
+            if isinstance(statement, ir.Assign):
+                statements.append(replace(statement, args=tuple(map(taken, statement.args))))
+            elif isinstance(statement, ir.Store):
+                statements.append(replace(statement, value=taken(statement.value)))
+            else:
+                statements.append(statement)
+        inputs = [port for port in kernel.inputs if port.name != MOVING]
+        inputs.append(Port("constants", (len(found),)))
+        general = KernelIR(kernel.name, tuple(inputs), kernel.outputs, tuple(statements))
+        return code.ExpressionStructure(general, tuple(map(self._place, found)))
 
+    # --- bodies -------------------------------------------------------------------------------
 
-def _hash(reader: _Reader, element: Element) -> str:
-    return prebuilt.text(reader.ffi, element.descriptor.hash)
+    def bodies(self, run: given.BodyRun) -> Iterable[code.BodyStructure]:
+        """Every body of a run."""
+        places = zip(run.slots.q_places().tolist(), run.slots.u_places().tolist(), strict=True)
+        for k, (q, u) in enumerate(places):
+            yield self._body(run.member(k), run.place + k - 1 if k else run.parent, q, u)
 
+    def _body(self, body: given.BodyNumbers, parent: int, q: int, u: int) -> code.BodyStructure:
+        link = self._link(body)
+        connection = () if link else body.connection
+        return code.BodyStructure(
+            parent, body.hinge, body.body, q, u, body.nq, body.nu,
+            self.entries(connection[:9], axes=True), self.entries(connection[9:]),
+            self.entries(body.hinge_p),
+            (*self.entries(body.body_p), *self.entries(body.body_frame, axes=True)),
+            self.entries(body.rotor), link, body.imposed, self._modal(body.modal),
+            self._section(body.section), body.idle,
+        )  # fmt: skip
 
-def _body(reader: _Reader, index: int) -> BodyStructure:
-    record = reader.packed.model.bodies[index]
-    hinge, body = reader.hinge(index, record), reader.owner("inertia", record.inertia)
-    link = _link(reader, record, hinge)
-    connection = [] if link else reader.unpack(record.connection, 12)
-    count = reader.elements[body].descriptor.np
-    own = reader.unpack(record.body_p, count if body[1] == "rigid" else count + _USER_FRAME)
-    return BodyStructure(
-        int(record.parent), hinge, body, int(record.q), int(record.u), int(record.nq),
-        int(record.nu), reader.entries(connection[:9], axes=True), reader.entries(connection[9:]),
-        reader.entries(reader.unpack(record.hinge_p, reader.elements[hinge].descriptor.np)),
-        (*reader.entries(own[:count]), *reader.entries(own[count:], axes=True)),
-        reader.entries(reader.unpack(record.rotor, record.nu)), link,
-        tuple(reader.unpack(record.imposed_mask, record.nu)),
-        _modal(reader, record.modal), _section(reader, record), bool(record.idle),
-    )  # fmt: skip
+    def _link(self, body: given.BodyNumbers) -> Entries:
+        """Screws about x and z of a connection between axial hinges; empty if it is none.
 
+        A slide has no coordinate that could take up a constant angle about z.
+        """
+        if not body.link or (code.angle_of(body.hinge) is None and body.link[3] != 0.0):
+            return ()
+        return (*self.entries(body.link[:2], axes=True), *self.entries(body.link[2:]))
 
-#: Fields of `mstmm_moments` in the order of the kernels' inputs: name, field, place in it.
-_MOMENTS = (
-    ("p", "rigid", None), ("C", "c", None), ("P", "p", None), ("B", "b", None),
-    *((f"Z_{ab}", "z", k) for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))),
-    *((f"Y_{a}", "y", k) for k, a in enumerate("xyz")),
-    *((f"G_{a}", "g", k) for k, a in enumerate("xyz")),
-    ("M", "m", None),
-)  # fmt: skip
-#: Rows of those that are not n x n.
-_ROWS = {"C": 3, "P": 3, "B": 6}
+    def _arrays(self, arrays: given.Arrays) -> tuple[tuple[str, Entries], ...]:
+        named = arrays.named.items()
+        return tuple((name, self.entries(array.ravel().tolist())) for name, array in named)
 
+    def _modal(self, modal: given.ModalNumbers | None) -> code.ModalStructure | None:
+        """Modes of a flexible body; None for a body without."""
+        if modal is None:
+            return None
+        drag = () if modal.drag is None else self._arrays(modal.drag)
+        moments, matrices = self._arrays(modal.moments), dict(self._arrays(modal.matrices))
+        return code.ModalStructure(modal.n, modal.q, modal.u, moments, drag, **matrices)
 
-def _moments(reader: _Reader, record: Any, n: int) -> tuple[tuple[str, Entries], ...]:
-    found = []
-    for name, field, place in _MOMENTS:
-        pointer = getattr(record, field)
-        count = 10 if name == "p" else n * _ROWS.get(name, n)
-        array = reader.unpack(pointer if place is None else pointer[place], count)
-        found.append((name, reader.entries(array)))
-    return tuple(found)
+    def _section(self, section: given.SectionNumbers | None) -> code.SectionStructure | None:
+        """Section that a body's connection passes; None where it passes none."""
+        if section is None:
+            return None
+        return code.SectionStructure(
+            section.frame, section.inward, self._arrays(section.inputs),
+            self.entries(section.end, axes=True),
+        )  # fmt: skip
 
+    # --- laws, loads, forces --------------------------------------------------------------------
 
-def _modal(reader: _Reader, record: Any) -> ModalStructure | None:
-    """Modes of a flexible body; None for a body without."""
-    if record == reader.ffi.NULL:
-        return None
-    n = int(record.n)
-    drag = () if record.drag == reader.ffi.NULL else _moments(reader, record.drag, n)
-    return ModalStructure(
-        n, int(record.q), int(record.u), _moments(reader, record.moments, n), drag,
-        reader.entries(reader.unpack(record.stiffness, n * n)),
-        reader.entries(reader.unpack(record.damping, n * n)),
-    )  # fmt: skip
+    def laws(self, run: given.LawRun) -> Iterable[code.LawStructure]:
+        """Every law of a run."""
+        for law, body, twist, effort in run.each():
+            yield code.LawStructure(
+                body, law.kernel, law.coordinate, law.speed, law.n, twist, self.entries(law.p),
+                self.entries(law.axes, axes=True), effort,
+            )  # fmt: skip
 
+    def load(self, load: given.LoadNumbers) -> code.LoadStructure:
+        """A load."""
+        return code.LoadStructure(
+            load.body, load.axes, self.entries(load.axes_own, axes=True),
+            self.entries(load.offset), load.force, load.moment,
+        )  # fmt: skip
 
-def _section(reader: _Reader, body: Any) -> SectionStructure | None:
-    """Section that a body's connection passes; None where it passes none."""
-    record = body.section
-    if record == reader.ffi.NULL:
-        return None
-    n, model = int(record.modal.n), reader.packed.model
-    frame = next(i for i in range(model.n_bodies) if model.bodies[i].modal == record.modal)
-    arrays = [
-        ("r", record.point, 3), ("phi", record.phi, 3 * n), ("theta", record.theta, 3 * n),
-        *((f"g_{a}", record.drawn[k], n * n) for k, a in enumerate("xyz")),
-        *((f"h_{a}", record.turned[k], n * n) for k, a in enumerate("xyz")),
-    ]  # fmt: skip
-    return SectionStructure(
-        frame, bool(record.inward),
-        tuple((name, reader.entries(reader.unpack(x, count))) for name, x, count in arrays),
-        reader.entries(reader.unpack(record.end, 9), axes=True),
-    )  # fmt: skip
-
-
-def _link(reader: _Reader, record: Any, hinge: Key) -> Entries:
-    """Screws about x and z of a connection between axial hinges; empty if it is none.
-
-    A slide has no coordinate that could take up a constant angle about z.
-    """
-    if record.link == reader.ffi.NULL:
-        return ()
-    cosine, sine, shift, angle, height = reader.unpack(record.link, 5)
-    if angle_of(hinge) is None and angle != 0.0:
-        return ()
-    return (*reader.entries((cosine, sine), axes=True), *reader.entries((shift, angle, height)))
-
-
-def _law(reader: _Reader, record: Any) -> LawStructure:
-    kernel = reader.law_kernel(record.evaluate)
-    kind = int(record.kind)
-    counts = {"linear": 3, "full": 11, "rotation": 7, "six": 16}
-    return LawStructure(
-        int(record.body), kernel, int(record.coordinate), int(record.speed), int(record.n),
-        int(record.twist), reader.entries(reader.unpack(record.p, counts[kernel])),
-        reader.entries(reader.unpack(record.axes, 9 * kind), axes=True),
-        tuple(reader.unpack(record.effort, record.n)),
-    )  # fmt: skip
-
-
-def _load(reader: _Reader, record: Any) -> LoadStructure:
-    return LoadStructure(
-        int(record.body), int(record.axes), reader.entries(record.axes_own, axes=True),
-        reader.entries(record.offset), tuple(record.force), tuple(record.moment),
-    )  # fmt: skip
-
-
-def _force(reader: _Reader, index: int) -> ForceStructure:
-    record = reader.packed.model.forces[index]
-    element = reader.owner("wrench", record.wrench)
-    count = reader.elements[element].descriptor.np
-    return ForceStructure(
-        element, int(record.body_f), int(record.body_t), reader.entries(record.axes_f, axes=True),
-        reader.entries(record.axes_t, axes=True), reader.entries(record.offset_f),
-        reader.entries(record.offset_t), reader.entries(reader.unpack(record.p, count)),
-        reader.expression(f"effort {index}"),
-    )  # fmt: skip
+    def force(self, force: given.ForceNumbers) -> code.ForceStructure:
+        """A spring."""
+        (body_f, axes_f, offset_f), (body_t, axes_t, offset_t) = force.ends
+        return code.ForceStructure(
+            force.element, body_f, body_t, self.entries(axes_f, axes=True),
+            self.entries(axes_t, axes=True), self.entries(offset_f), self.entries(offset_t),
+            self.entries(force.p), self.expression(force.effort),
+        )  # fmt: skip

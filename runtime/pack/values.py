@@ -16,12 +16,16 @@ from .layout import Layout
 
 Resolver = Callable[[Name], Node]
 
+#: Inputs that stand for numbers which carry derivatives.
+MOVING = "moving"
+Moving = Sequence[Port]
+
 
 class Values:
     """Numbers that expressions give at (t, q, u): each is asked for once and known by its place."""
 
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
+    def __init__(self, layout: Layout, moving: Moving = ()) -> None:
+        self.layout, self._moving = layout, moving
         self._graph = Graph()
         self._nodes: list[Node] = []
         self._places: dict[int, int] = {}
@@ -41,7 +45,8 @@ class Values:
 
     def kernel(self) -> KernelIR:
         """t (1), q, u -> the values in the order of their places."""
-        return _kernel(self._graph, "values", state_ports(self.layout), self._nodes)
+        inputs = [*state_ports(self.layout), *self._moving]
+        return _kernel(self._graph, "values", inputs, self._nodes)
 
 
 def state_ports(layout: Layout) -> list[Port]:
@@ -93,19 +98,20 @@ def _kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) 
     return graph.kernel(name, inputs, [output], {"values": nodes})
 
 
-def drive_kernel(drives: Sequence[Expression]) -> KernelIR:
+def drive_kernel(drives: Sequence[Expression], moving: Moving = ()) -> KernelIR:
     """t -> position, speed and acceleration of every drive."""
     graph = Graph()
     time = graph.element("t", 0)
     nodes = [node for drive in drives for node in motion(drive, time)]
-    return _kernel(graph, "drives", [Port("t", (1,))], nodes)
+    return _kernel(graph, "drives", [Port("t", (1,)), *moving], nodes)
 
 
-def effort_kernel(effort: Expression, layout: Layout) -> KernelIR:
+def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> KernelIR:
     """t, q, u, [length, rate] -> effort of a spring."""
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))
-    return _kernel(graph, "effort", [*state_ports(layout), Port("length", (2,))], [node])
+    inputs = [*state_ports(layout), Port("length", (2,)), *moving]
+    return _kernel(graph, "effort", inputs, [node])
 
 
 def event_tape(
@@ -127,6 +133,3 @@ def event_tape(
         nodes.append(difference if sign in (">", ">=") else -difference)
     inputs = [*state_ports(layout), Port("points", (6 * len(probes),))]
     return compile_tape(_kernel(graph, "events", inputs, [*nodes, *margins]))
-
-
-__all__ = ["Values", "drive_kernel", "effort_kernel", "event_tape"]

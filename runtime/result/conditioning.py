@@ -9,6 +9,7 @@ part in D over D.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
-from mstmm.scene import Hinge
 
-from ..kernels import prebuilt
-from ..pack.bodies import kernel_type
-from ..pack.packed import Packed
 from .flexible.pivots import ModalPivots
 
 if TYPE_CHECKING:
@@ -91,11 +88,10 @@ class _Pivots:
 
     def __init__(self, model: Compiled) -> None:
         packed, lib = model.packed, model.looped.lib
-        records = packed.records
-        self.parents = records.column("parent").astype(np.int64)
-        count = len(self.parents)
-        speeds = records.column("nu").astype(np.int64)[:, None]
-        blocks = records.column("block").astype(np.int64)[:, None]
+        system = packed.system
+        self.parents = system.parents
+        speeds = system.rows(lambda body: body.nu)[:, None]
+        blocks = packed.written.blocks[:, None]
         self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
         self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
@@ -104,9 +100,9 @@ class _Pivots:
         first = blocks + lib.MSTMM_BLOCK_FIXED + 10 * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
         self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
-        self.release = records.column("release").astype(np.int64)
-        self.rotor = _pointed(packed, "rotor", "real *", count)
-        self.imposed = _pointed(packed, "imposed_mask", "int *", count) != 0
+        self.release = system.rows(lambda body: body.release)
+        self.rotor = system.rows(lambda body: _six(body.rotor))
+        self.imposed = system.rows(lambda body: _six(body.imposed)) != 0
         self.modal = ModalPivots(packed)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
@@ -142,15 +138,9 @@ class _Pivots:
         return np.asarray(known[self.release] != 0.0) & (self.release >= 0)
 
 
-def _pointed(packed: Packed, field: str, pointer: str, count: int) -> Array:
-    """(n, 6) numbers per speed to which a field of the bodies' records points."""
-    addresses, first, which = np.unique(
-        packed.records.column(field), return_index=True, return_inverse=True
-    )
-    rows, speeds = np.zeros((len(addresses), 6)), packed.records.column("nu")[first]
-    for row, address, nu in zip(rows, addresses.tolist(), speeds.tolist(), strict=True):
-        row[:nu] = packed.ffi.unpack(packed.ffi.cast(pointer, address), nu) if nu else []
-    return np.asarray(rows[which.reshape(count)])
+def _six(numbers: Sequence[float]) -> list[float]:
+    """Numbers per speed, filled up with zeros."""
+    return [*numbers, *[0.0] * (6 - len(numbers))]
 
 
 def _carried_motion(turn: Array, shift: Array) -> Array:
@@ -173,7 +163,7 @@ def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | No
     found: list[SingularDistance] = []
     for group in model.layout.groups:
         for k in range(min(group.count, len(group.hinges))):
-            function = _measure(model, model.packed.scene.hinges[group.first + k])
+            function = _measure(model, group.first + k)
             if function is None:
                 continue
             for number in range(group.first + k, group.first + group.count, len(group.hinges)):
@@ -190,12 +180,11 @@ def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) ->
     return SingularDistance(value, model.packed.scene.hinges.name(number), float(run.t[k]))
 
 
-def _measure(model: Compiled, hinge: Hinge) -> Any:
+def _measure(model: Compiled, number: int) -> Any:
     """The kernel `singularity` of a hinge's type, None if it has none."""
     packed = model.packed
-    key = ("hinge", kernel_type(hinge, packed.releases))
-    element = (model.known or {}).get(key) or prebuilt.elements().get(key)
-    function = None if element is None else element.functions.get("singularity")
+    body = packed.system.body(packed.topology.place_of_hinge(number))
+    function = packed.elements[body.hinge].functions.get("singularity")
     if function is None:
         return None
     return packed.ffi.cast("int (*)(const double *, const double *, double *)", function)
@@ -205,10 +194,10 @@ def _measures(model: Compiled, run: Trajectory, number: int, call: Any) -> Array
     """The measure of one hinge at every sample."""
     packed = model.packed
     ffi, slots = packed.ffi, packed.layout.slots(number)
-    p = packed.model.bodies[packed.topology.place_of_hinge(number)].hinge_p
+    p = packed.system.body(packed.topology.place_of_hinge(number)).hinge_p or (0.0,)
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
     measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
     for k, row in enumerate(coordinates):
-        if call(p, ffi.from_buffer("double[]", row), pointer) == 0:
+        if call(list(p), ffi.from_buffer("double[]", row), pointer) == 0:
             measures[k] = pointer[0]
     return measures[np.isfinite(measures)]

@@ -184,7 +184,7 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
         with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
             some[:, entries] /= lengths[:, :, None]
-    if engine.packed.model.n_drives:
+    if engine.packed.system.driven:
         times, known = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(
             system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),

@@ -45,10 +45,10 @@ class SceneSystem:
         actions, self.event_names = _actions(engine)
         self.switches = packed.watched.switches
         self.memory = engine.start_memory()
-        model = packed.model
+        model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
-        works = bool(model.n_laws or model.n_drives or model.n_loads or model.n_forces)
+        works = bool(system.laws or system.driven or system.loads or system.forces)
         works = works or any(
             body.D.any() or body.drag is not None for body in packed.flexible.values()
         )
@@ -60,7 +60,7 @@ class SceneSystem:
         self.kept += [model, first]
         if packed.watched.tape is not None:
             self._events(packed.watched.tape, packed.watched.ends, actions)
-        self.workspace = np.zeros(int(model.workspace))
+        self.workspace = np.zeros(packed.workspace)
         run.workspace = engine.pointer(self.workspace)
         if compiled is not None:
             self._compiled(compiled)

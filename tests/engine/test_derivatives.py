@@ -19,7 +19,7 @@ import mstmm
 from mstmm.derive.audit.evaluate import evaluate
 from mstmm.ir import KernelIR
 from mstmm.runtime.model.derivatives import Derivatives
-from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.internal import system_of
 from mstmm.runtime.pack.structure import structure_of
 
 TIME = 0.3
@@ -33,7 +33,7 @@ def compiled(scene: dict[str, Any]) -> mstmm.Model:
 
 def equations(model: mstmm.Model, q: Array, u: Array) -> tuple[KernelIR, Arrays]:
     """The fused kernel of a model, with every number of the scene baked in, and its inputs."""
-    structure, p = structure_of(pack(model.scene, model.known), model.known or {})
+    structure, p = structure_of(system_of(model.scene, model.known)[0], model.known or {})
     kernel = model.fusion.fused(structure).kernels["accelerations"]
     still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * model.nu}
     return kernel, {"p": list(p), "t": [TIME], "q": list(q), "u": list(u), **still}

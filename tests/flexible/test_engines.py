@@ -34,7 +34,7 @@ class Interpreted:
     """
 
     def __init__(self, model: mstmm.Model, q: Array, u: Array) -> None:
-        structure, p = structure_of(model.packed, model.known or {})
+        structure, p = structure_of(model.packed.system, model.known or {})
         self.kernel: KernelIR = model.fusion.fused(structure).kernels["accelerations"]
         self.inputs: dict[str, Any] = {
             "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,

@@ -42,7 +42,7 @@ def fused(scene: dict[str, Any], **options: Any) -> mstmm.Model:
 
 def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
     """The fused IR with plain floats."""
-    structure, p = structure_of(model.packed, model.known or {})
+    structure, p = structure_of(model.packed.system, model.known or {})
     found = model.fusion.fused(structure).kernels
     kernel = found.get("accelerations_power", found["accelerations"])
     inputs = {

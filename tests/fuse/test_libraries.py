@@ -39,7 +39,7 @@ def model() -> mstmm.Model:
 
 
 def text_of(model: mstmm.Model, part: str) -> str:
-    structure, _ = structure_of(model.packed, model.known or {})
+    structure, _ = structure_of(model.packed.system, model.known or {})
     return fused_sources(model.fusion.fused(structure), KEY, part)["fused.c"]
 
 
@@ -47,7 +47,7 @@ def text_of(model: mstmm.Model, part: str) -> str:
 def test_one_state_and_many(
     compiler: str, model: mstmm.Model, tmp_path: Path, rng: np.random.Generator
 ) -> None:
-    _, p = structure_of(model.packed, model.known or {})
+    _, p = structure_of(model.packed.system, model.known or {})
     (tmp_path / "lanes").mkdir()
     scalar = open_library(compiled(text_of(model, "scalar"), tmp_path, compiler), KEY)
     lanes = open_library(compiled(text_of(model, "lanes"), tmp_path / "lanes", compiler), KEY)
@@ -70,7 +70,7 @@ def test_one_state_and_many(
 
 def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) -> None:
     """Strides of p, t, memory and efforts: a row for each state equals one row for all."""
-    _, p = structure_of(model.packed, model.known or {})
+    _, p = structure_of(model.packed.system, model.known or {})
     library = open_library(compiled(text_of(model, "lanes"), tmp_path), KEY)
     q0, u0 = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(2))
     n = 5
@@ -89,7 +89,7 @@ def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) ->
 
 
 def test_prepared_calls(model: mstmm.Model, tmp_path: Path) -> None:
-    _, p = structure_of(model.packed, model.known or {})
+    _, p = structure_of(model.packed.system, model.known or {})
     library = open_library(compiled(text_of(model, "scalar"), tmp_path), KEY)
     q, u = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(3))
     call = Call(library, p)

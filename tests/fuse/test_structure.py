@@ -39,7 +39,7 @@ def chain(
 
 def kernel(scene: mstmm.Scene) -> KernelIR:
     model = mstmm.compile(scene, engine="looped")
-    structure, _ = structure_of(model.packed, model.known or {})
+    structure, _ = structure_of(model.packed.system, model.known or {})
     found: KernelIR = model.fusion.fused(structure).kernels["accelerations"]
     return found
 
@@ -100,7 +100,7 @@ def test_numbers_of_expressions_are_no_structure() -> None:
     found = []
     for force in ("10*cos(3*t)", "4*cos(5*t)"):
         looped = mstmm.compile(loaded(force), engine="looped")
-        structure, _ = structure_of(looped.packed, {})
+        structure, _ = structure_of(looped.packed.system, {})
         found.append(structure.identity())
         fused = mstmm.compile(loaded(force), engine="fused")
         np.testing.assert_allclose(

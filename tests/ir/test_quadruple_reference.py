@@ -13,7 +13,7 @@ from support.rod_scenes import chain, drawn_state
 from support.scalar_kernels import ScalarKernel, farthest
 
 import mstmm
-from mstmm.runtime.pack.pack import pack
+from mstmm.runtime.pack.internal import system_of
 from mstmm.runtime.pack.structure import structure_of
 
 
@@ -22,7 +22,7 @@ def reference(
 ) -> tuple[ScalarKernel, dict[str, Any]]:
     """The accelerations of a scene in quadruple precision, and the inputs of a state."""
     model = mstmm.compile(scene, engine="looped")
-    structure, p = structure_of(pack(scene, model.known), model.known or {})
+    structure, p = structure_of(system_of(scene, model.known)[0], model.known or {})
     kernel = model.fusion.fused(structure).kernels["accelerations"]
     still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * model.nu}
     inputs = {"p": p, "t": [t], "q": q, "u": u, **still}

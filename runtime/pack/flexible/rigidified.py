@@ -68,21 +68,26 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
     return Scene.model_construct(**fields)
 
 
-def rigidified(scene: Scene) -> Rigidified:
+def rigidified(scene: Scene, known: Mapping[str, ModalBody]) -> Rigidified:
     """The scene with rigid bodies in place of those whose model is "rigid" or "one-way".
+
+    `known` are the modal bodies that need not be computed.
 
     SceneError for a viscous drag, which rigid bodies do not have.
     """
     stiff: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
     stiff += [b for b in scene.elastic if b.model != "flexible"]
-    return _Rigidifying(scene, stiff).run() if stiff else Rigidified(scene)
+    return _Rigidifying(scene, stiff, known).run() if stiff else Rigidified(scene)
 
 
 class _Rigidifying:
     """One walk over the bodies to be made rigid."""
 
-    def __init__(self, scene: Scene, stiff: list[Beam | Elastic]) -> None:
+    def __init__(
+        self, scene: Scene, stiff: list[Beam | Elastic], known: Mapping[str, ModalBody]
+    ) -> None:
         self.scene, self.stiff = scene, {body.name: body for body in stiff}
+        self.known = known
         self.made = Rigidified(scene)
         self.bodies: dict[str, Body] = {}
         self.welds: list[Hinge] = []
@@ -108,7 +113,9 @@ class _Rigidifying:
         return self.made
 
     def _body(self, name: str, body: Beam | Elastic) -> None:
-        modal = _modal(self.scene, body) if body.model == "one-way" else None
+        modal = None
+        if body.model == "one-way":
+            modal = self.known.get(name) or _modal(self.scene, body)
         rigid = _rigid(body, modal)
         ends = dict(rigid.ends)
         for load in self._spread(name):

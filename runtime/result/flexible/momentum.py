@@ -16,8 +16,8 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from ...flexible.kernel_inputs import moments_of
 from ...flexible.modal_kernels import kernel
-from ...flexible.records import moments_of
 from ...kernels.vectorized import evaluate
 from .motion import tilde
 
@@ -78,10 +78,10 @@ class Momenta:
         the engine takes them from."""
         packed = self.observed.engine.packed
         place, axes, offset = packed.end(name)
-        body, ffi = packed.model.bodies[place], packed.ffi
-        numbers = np.zeros(21)
-        kernel = ffi.cast("void (*)(const double *, double *)", body.inertia)
-        kernel(body.body_p, ffi.from_buffer("double[]", numbers))
+        body, ffi, numbers = packed.system.body(place), packed.ffi, np.zeros(21)
+        function = packed.elements[body.body].functions["inertia"]
+        inertia = ffi.cast("void (*)(const double *, double *)", function)
+        inertia([*body.body_p, *body.body_frame], ffi.from_buffer("double[]", numbers))
         matrix = np.zeros((6, 6))
         matrix[_UPPER] = numbers
         matrix = matrix + np.triu(matrix, 1).T

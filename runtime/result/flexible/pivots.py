@@ -28,15 +28,12 @@ class ModalPivots:
 
     def __init__(self, packed: Packed) -> None:
         self.frames: dict[int, tuple[int, int, int | None]] = {}
-        self.sections: dict[int, int] = {}
-        null, count = packed.ffi.NULL, packed.topology.count if packed.flexible else 0
-        for i in range(count):
-            body = packed.model.bodies[i]
-            place = None if body.section == null else int(body.section.place)
-            if body.modal != null:
-                self.frames[i] = (int(body.modal.n), int(body.modal.place), place)
-            elif place is not None:
-                self.sections[i] = place
+        modal, sections = packed.written.modal, packed.written.sections
+        for i, place in modal.items():
+            body = packed.system.body(i)
+            assert body.modal is not None
+            self.frames[i] = (body.modal.n, place, sections.get(i))
+        self.sections = {i: place for i, place in sections.items() if i not in modal}
 
     def through(
         self, numbers: Array, S: Array, carried: Array, parents: NDArray[np.int64], E: Array

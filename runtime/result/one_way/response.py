@@ -20,8 +20,8 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import split
 
+from ...flexible.kernel_inputs import moments_of
 from ...flexible.modal_kernels import kernel
-from ...flexible.records import moments_of
 from ...kernels.vectorized import evaluate
 from ...run.execution import Watch, first_run
 from ..observed import Observed

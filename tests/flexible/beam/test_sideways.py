@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.pack.pack import expansion_of
+from mstmm.runtime.pack.internal import expansion_of
 from mstmm.runtime.result.flexible.certify import flexibilities
 from mstmm.runtime.result.flexible.sideways import rule, sideways
 

@@ -1,10 +1,9 @@
-"""Flexible bodies and their sections -> C records of the looped engine."""
+"""Flexible bodies and their sections -> inputs of the kernels that sweep them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -103,74 +102,3 @@ def massless(body: ModalBody) -> ModalBody:
     """The frame node of a body whose mass stands in points: stiffness and damping alone."""
     zero = {name: np.zeros_like(getattr(body, name)) for name in "CEFGX"}
     return replace(body, mass=0.0, first=np.zeros(3), second=np.zeros((3, 3)), **zero)
-
-
-class ModalRecords:
-    """Makes `mstmm_modal` and `mstmm_section`; `kept` holds what C points to.
-
-    `place` counts the workspace that they need; who fills the model sets where it begins.
-    """
-
-    def __init__(self, ffi: Any, lib: Any, kept: list[Any]) -> None:
-        self.ffi, self.lib, self.kept = ffi, lib, kept
-        self.size = 0
-        self._made: list[Any] = []
-
-    def modal(self, body: ModalBody, q: int, u: int) -> Any:
-        """`mstmm_modal *` of a body whose numbers are in the axes of its node."""
-        record = self._new("mstmm_modal *")
-        record.n, record.q, record.u = len(body.modes), q, u
-        inertial = massless(body) if body.points else body
-        self._moments(record.moments, inertial)
-        if body.drag is not None:
-            record.drag = self._new("mstmm_moments *")
-            self._moments(record.drag, body.drag)
-        record.stiffness, record.damping = self._reals(body.K), self._reals(body.D)
-        record.place = self._room(self.lib.mstmm_modal_numbers(record.n))
-        return record
-
-    def section(self, port: ModalPort, modal: Any, inward: bool) -> Any:
-        """`mstmm_section *` of a section of the body of `modal`."""
-        record = self._new("mstmm_section *")
-        record.modal, record.inward = modal, int(inward)
-        record.point, record.phi = self._reals(port.position), self._reals(port.phi)
-        record.theta, record.end = self._reals(port.theta), self._reals(port.rotation)
-        for a in range(3):
-            record.drawn[a] = self._reals(port.second_order[a])
-            record.turned[a] = self._reals(port.second_order[3 + a])
-        record.place = self._room(self.lib.mstmm_section_numbers(modal.n))
-        return record
-
-    def begin(self, first: int) -> int:
-        """Put all numbers behind `first` of the workspace; returns the place behind them."""
-        for record in self._made:
-            record.place += first
-        return first + self.size
-
-    def _moments(self, record: Any, body: Moments) -> None:
-        found = moments_of(body)
-        record.rigid, record.c = self._reals(found["p"]), self._reals(found["C"])
-        record.p, record.b = self._reals(found["P"]), self._reals(found["B"])
-        for k, (a, b) in enumerate(_PAIRS):
-            record.z[k] = self._reals(found[f"Z_{'xyz'[a]}{'xyz'[b]}"])
-        for k in range(3):
-            record.y[k] = self._reals(found[f"Y_{'xyz'[k]}"])
-            record.g[k] = self._reals(found[f"G_{'xyz'[k]}"])
-        record.m = self._reals(found["M"])
-
-    def _room(self, count: int) -> int:
-        first = self.size
-        self.size += int(count)
-        return first
-
-    def _new(self, kind: str) -> Any:
-        record = self.ffi.new(kind)
-        self.kept.append(record)
-        if "moments" not in kind:
-            self._made.append(record)
-        return record
-
-    def _reals(self, numbers: Array | Sequence[float]) -> Any:
-        array = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
-        self.kept.append(array)
-        return self.ffi.from_buffer("real[]", array)

@@ -1,0 +1,140 @@
+"""Scene -> System: placement, alignment and layout of everything a scene holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mstmm.expression.expression import Expression
+from mstmm.ir import Port
+from mstmm.scene import Scene, split
+from mstmm.scene.checks.topology import Topology, build
+from mstmm.scene.tables.hinge import HingeTable
+from mstmm.scene.tables.loads import Load, Spring
+
+from ..flexible.modal_body import ModalBody
+from ..kernels.records import Lookup
+from .bodies import Bodies
+from .elements import Elements, Known, declared_numbers
+from .flexible.expansion import Expanded, expand
+from .frames import Frames
+from .laws import laws_of
+from .letting_go import releasable
+from .slots import layout_of
+from .system import ForceNumbers, LoadNumbers, Numbers, System
+from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
+
+
+def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> Expanded:
+    """The scene of nodes; scenes without flexible bodies are their own.
+
+    `flexible` are the numbers of all modal bodies where they are known already.
+    """
+    if not (scene.beam or scene.elastic):
+        return Expanded(scene, scene, {})
+    from ..flexible.bodies import modal_bodies
+    from .flexible.rigidified import rigidified
+
+    rigid = rigidified(scene, flexible or {})
+    known = {name: body for name, body in (flexible or {}).items() if name not in rigid.one_way}
+    expanded = expand(rigid.scene, modal_bodies(rigid.scene) if flexible is None else known)
+    expanded.described, expanded.rigidified = scene, rigid
+    expanded.nodes |= rigid.nodes
+    return expanded
+
+
+def system_of(
+    scene: Scene,
+    known: Known | None = None,
+    *,
+    align: bool = True,
+    flexible: Mapping[str, ModalBody] | None = None,
+    moving: Mapping[int, Any] | None = None,
+) -> tuple[System, Frames]:
+    """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
+
+    Without `align` internal frames are those of the bodies' own hinges, whatever hangs on them:
+    smooth functions of the scene's numbers.  `flexible` are the numbers of all modal bodies
+    where they are known already, `moving` those that expressions take from the port "moving".
+
+    Raises SceneError for hinges that do not form a tree or types that nobody defines.
+    """
+    expanded, elements = expansion_of(scene, flexible), Elements(known or {})
+    nodes, tree = expanded.scene, build(expanded.scene)
+    releases = {name: i for i, name in enumerate(releasable(scene))}
+    layout = layout_of(expanded, releases, elements)
+    bodies = Bodies(expanded, tree, layout, elements, releases, align)
+    runs = tuple(map(bodies.run, tree.runs))
+    frames = Frames(
+        nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
+        Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
+        expanded,
+    )  # fmt: skip
+    ports = [Port(MOVING, (1 + max(moving),))] if moving else []
+    driven, values = list(_driven(nodes, tree)), Values(layout, ports)
+    laws = tuple(laws_of(nodes, tree, layout, values, len(releases)))
+    loads = tuple(_load(frames, load, values) for load in nodes.load)
+    system = System(
+        layout.nq, layout.nu, laws[-1].next_twist if laws else len(releases), nodes.gravity, runs,
+        laws, loads, tuple(_force(frames, spring, ports) for spring in nodes.spring),
+        values.kernel() if len(values) else None,
+        drive_kernel([drive for _, _, drive in driven], ports) if driven else None,
+        tuple((place, k) for place, k, _ in driven), moving or {},
+    )  # fmt: skip
+    return system, frames
+
+
+def _driven(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:
+    """(place of the body, coordinate, drive) of everything driven."""
+    for place, hinge in _with_drives(scene, tree):
+        for k, entry in enumerate(hinge.drive or ()):
+            if entry is not None:
+                yield place, k, entry
+
+
+def _with_drives(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable]]:
+    """(place, table) of every hinge with a drive."""
+    tables = len(scene.hinge)
+    for run in tree.runs:
+        if run.hinge < tables:
+            if scene.hinge[run.hinge].drive is not None:
+                yield run.place, scene.hinge[run.hinge]
+            continue
+        chain = scene.chain[scene.hinges.member(run.hinge)[0]]
+        if any(table.drive is not None for table in chain.hinge):
+            for k in range(run.count):
+                yield run.place + k, chain.hinge_of(k)
+
+
+def _load(frames: Frames, load: Load, values: Values) -> LoadNumbers:
+    body, _, offset = frames.end(load.on)
+    name = split(load.on)[0] if load.axes == "body" else load.axes
+    reference = "ground" if load.axes == "inertial" else name
+    axes, own, _ = frames.end(reference)
+    return LoadNumbers(
+        body, axes, _section_axes(frames, reference) or own, offset,
+        tuple(map(values.place, load.force)), tuple(map(values.place, load.moment)),
+    )  # fmt: skip
+
+
+def _section_axes(frames: Frames, reference: str) -> Numbers:
+    """Axes of a section of a flexible body (turned with it) in those of its end; else none."""
+    node = frames.expanded.nodes.get(reference)
+    passage = frames.expanded.passages.get(node or "")
+    return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())
+
+
+def _force(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
+    element = frames.elements.get("force", spring.type, spring.name)
+    one, other = (
+        (body, axes, spring.position if body < 0 else offset)
+        for body, axes, offset in map(frames.end, (spring.from_, spring.to))
+    )
+    law, effort = spring.law, None
+    if spring.type == "spring":
+        p: Numbers = (law.stiffness, law.rest, law.damping)
+        if not law.effort.is_zero:
+            effort = effort_kernel(law.effort, frames.layout, moving)
+    else:
+        p = declared_numbers(element.declared, spring.parameters, f'spring "{spring.name}"')
+    return ForceNumbers(("force", spring.type), (one, other), p, effort)

@@ -1,0 +1,107 @@
+"""Bodies -> C records: one filled for all that are alike, and copied."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mstmm.arrays import Integers
+from mstmm.ir.structure import Key
+
+from ...kernels.records import Records
+from ..bodies import RIGID
+from ..elements import Elements
+from ..system import BodyNumbers, Numbers, System
+from .memory import Memory
+from .modal import ModalRecords
+
+_HINGE = ("hinge", "forward", "condense", "recover")
+_BODY = ("inertia", "bias_load", "energy")
+
+
+class BodyRecords:
+    """The records of a system's bodies, in the order of the tree.
+
+    `blocks` are the places of the bodies' blocks in the workspace, `end` is behind them and behind
+    the numbers of flexible bodies.
+    """
+
+    def __init__(self, system: System, elements: Elements, memory: Memory, lib: Any) -> None:
+        self.system, self.elements, self.memory = system, elements, memory
+        self.modal = ModalRecords(memory, lib)
+        self._tapes: dict[Key, Any] = {}
+        self.records = self._filled()
+        memory.kept.append(self.records)
+        self.blocks, behind = self._blocks(lib)
+        columns = {"parent": system.parents, **system.places, "block": self.blocks}
+        for name, column in columns.items():
+            self.records.write(name, column)
+        self.end = self.modal.begin(behind)
+
+    def _filled(self) -> Records:
+        """Every body but for its place."""
+        alike = [(run.place, one) for run in self.system.bodies for one in run.alike]
+        prototypes = Records(self.memory.ffi, "mstmm_body", len(alike))
+        for record, (place, one) in zip(prototypes.array, alike, strict=False):
+            self._fill(record, one, place)
+        if len(alike) == self.system.count:
+            return prototypes
+        records = Records(self.memory.ffi, "mstmm_body", self.system.count)
+        records.copy(slice(None), prototypes, self.system.which)
+        return records
+
+    def _blocks(self, lib: Any) -> tuple[Integers, int]:
+        """Places of the blocks in the workspace, behind the ground's, and the place behind them."""
+        fixed, per_speed = int(lib.MSTMM_BLOCK_FIXED), int(lib.MSTMM_BLOCK_PER_SPEED)
+        if not self.system.count:
+            return np.zeros(0, dtype=np.int64), fixed
+        lengths = fixed + per_speed * self.system.rows(lambda body: body.nu).astype(np.int64)
+        ends = fixed + np.cumsum(lengths)
+        return ends - lengths, int(ends[-1])
+
+    def _fill(self, record: Any, body: BodyNumbers, place: int) -> None:
+        """Numbers, and the kernels that read them."""
+        record.nq, record.nu, record.held[2] = body.nq, body.nu, -body.height
+        record.release, record.idle = body.release, int(body.idle)
+        record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
+        self._numbers(record, body)
+        self._kernels(record, body)
+        if body.modal is not None:
+            record.modal = self.modal.add_modal(place, body.modal)
+        if body.section is not None:
+            record.section = self.modal.add_section(place, body.section)
+
+    def _numbers(self, record: Any, body: BodyNumbers) -> None:
+        """Arrays side by side in memory."""
+        link: Numbers = ()
+        if body.link:
+            rigid = body.body_p if body.body[1] == RIGID else ()
+            link = (*body.link, *rigid, *(body.hinge_p or (0.0,)))  # every link has room for it
+        own = (*body.body_p, *body.body_frame)
+        start = self.memory.reals(
+            (*body.connection, *body.rotor, *body.hinge_p, *own, *link, 0.0)  # 0: never empty
+        )
+        record.connection, record.rotor = start, start + 12
+        record.hinge_p = start = start + (12 + len(body.rotor))
+        record.body_p = start = start + len(body.hinge_p)
+        if link:
+            record.link = start + len(own)
+
+    def _kernels(self, record: Any, body: BodyNumbers) -> None:
+        """Functions of the hinge, the body and the link; generic is what only these know."""
+        hinge, rigid = self.elements[body.hinge], self.elements[body.body].functions
+        for name in _HINGE:
+            setattr(record, name, hinge.functions.get(name, self.memory.ffi.NULL))
+        for name in _BODY:
+            setattr(record, name, rigid[name])
+        if hinge.tape is not None:
+            if body.hinge not in self._tapes:
+                self._tapes[body.hinge] = self.memory.tape(hinge.tape)
+            record.tape = self._tapes[body.hinge]
+        unknown = not hinge.functions.get("condense")
+        generic = unknown or body.section is not None or any(body.imposed) or any(body.rotor)
+        record.generic = int(generic)
+        if body.link and body.body[1] == RIGID and not generic:
+            for name, function in self.elements["sweep", f"link_{body.hinge[1]}"].functions.items():
+                setattr(record, f"link_{name}", function)

@@ -1,0 +1,84 @@
+"""System -> `mstmm_model`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mstmm.arrays import Integers
+
+from ...kernels import prebuilt
+from ..elements import Elements
+from ..system import ForceNumbers, LoadNumbers, System
+from .bodies import BodyRecords
+from .laws import LawRecords
+from .links import attach_runs
+from .memory import Memory
+
+
+@dataclass(frozen=True)
+class Written:
+    """A system in the memory of C, which `kept` keeps.
+
+    Of the workspace `blocks`, `modal` and `sections` say where the numbers of bodies, flexible
+    bodies and sections begin, by places in the tree; `scratch` is behind them, where tapes need
+    `slots`.
+    """
+
+    model: Any
+    kept: list[Any]
+    blocks: Integers
+    modal: dict[int, int]
+    sections: dict[int, int]
+    scratch: int
+    slots: int
+
+
+def write(system: System, elements: Elements) -> Written:
+    """The records of a system."""
+    ffi, lib = prebuilt.module()
+    memory = Memory(ffi)
+    model = memory.new("mstmm_model *")
+    model.nq, model.nu, model.n_memory = system.nq, system.nu, system.n_memory
+    model.gravity = list(system.gravity)
+    bodies = BodyRecords(system, elements, memory, lib)
+    model.bodies, model.n_bodies = bodies.records.array, system.count
+    model.n_flexible = len(bodies.modal.modal)
+    drives = memory.new("mstmm_drive[]", max(1, len(system.driven)))
+    for record, (body, k) in zip(drives, system.driven, strict=False):
+        record.body, record.coordinate, record.speed = body, k, k
+    model.drives, model.n_drives = drives, len(system.driven)
+    model.drive_tape = memory.expression(system.drives)
+    laws = LawRecords(system, memory)
+    model.laws, model.n_laws = laws.records.array, laws.records.count
+    loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
+    for record, load in zip(loads, system.loads, strict=False):
+        _load(record, load)
+    model.loads, model.n_loads = loads, len(system.loads)
+    forces = memory.new("mstmm_force[]", max(1, len(system.forces)))
+    for record, force in zip(forces, system.forces, strict=False):
+        _force(record, force, elements, memory)
+    model.forces, model.n_forces = forces, len(system.forces)
+    model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
+    model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
+    scratch = attach_runs(model, system, memory, lib, bodies.end)
+    modal = bodies.modal
+    return Written(
+        model, memory.kept, bodies.blocks, modal.modal, modal.sections, scratch, memory.slots
+    )
+
+
+def _load(record: Any, load: LoadNumbers) -> None:
+    record.body, record.offset = load.body, list(load.offset)
+    record.axes, record.axes_own = load.axes, list(load.axes_own)
+    record.force, record.moment = list(load.force), list(load.moment)
+
+
+def _force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory) -> None:
+    for letter, (body, axes, offset) in zip("ft", force.ends, strict=True):
+        setattr(record, f"body_{letter}", body)
+        setattr(record, f"axes_{letter}", list(axes))
+        setattr(record, f"offset_{letter}", list(offset))
+    record.wrench = elements[force.element].functions["wrench"]
+    record.p = memory.reals(force.p)
+    record.effort = memory.expression(force.effort)

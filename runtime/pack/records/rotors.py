@@ -1,0 +1,30 @@
+"""Rotors given to hinges for a while, to see what then moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ...kernels import prebuilt
+from .model import Written
+
+
+@contextmanager
+def rotors(written: Written) -> Iterator[Callable[[int], None]]:
+    """Lets rotors of 1 kg m^2 be given to the hinges at places of the tree; all of them are taken
+    away again."""
+    ffi, _ = prebuilt.module()
+    rotor = ffi.new("real[]", [1.0] * 6)
+    before: dict[int, tuple[object, int]] = {}
+
+    def give(place: int) -> None:
+        record = written.model.bodies[place]
+        before[place] = (record.rotor, int(record.generic))
+        record.rotor, record.generic = rotor, 1
+
+    try:
+        yield give
+    finally:
+        for place, (old, generic) in before.items():
+            record = written.model.bodies[place]
+            record.rotor, record.generic = old, generic

@@ -1,0 +1,289 @@
+"""System: the numbers of a scene in internal frames, as all engines take them.
+
+Nothing in here knows of C.  Numbers are floats, or Duals that carry their derivatives.  Of a chain
+the members that are alike share one record.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array, Integers
+from mstmm.ir import KernelIR
+from mstmm.ir.structure import Key
+
+from .layout import Group
+
+Numbers = tuple[float, ...]
+#: Places among the values of the scene's expressions, -1 for the constant zero.
+Places = tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Arrays:
+    """Arrays by their names; two are equal where all their numbers are."""
+
+    named: Mapping[str, Array]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Arrays) and list(self.named) == list(other.named) and all(
+            np.array_equal(array, other.named[name]) for name, array in self.named.items()
+        )  # fmt: skip
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, slots=True)
+class ModalNumbers:
+    """Internal coordinates of the flexible body whose floating frame a body is.
+
+    `moments` and `drag` are inputs of kernels of ("sweep", "modal"); `stiffness` and `damping` are
+    n x n.
+    """
+
+    n: int
+    q: int
+    u: int
+    moments: Arrays
+    drag: Arrays | None
+    matrices: Arrays
+
+
+@dataclass(frozen=True, slots=True)
+class SectionNumbers:
+    """A section of the flexible body with its frame at place `frame`, passed inward to the frame or
+    outward from it; `inputs` are those of the kernel "section", `end` its axes at rest (9)."""
+
+    frame: int
+    inward: bool
+    inputs: Arrays
+    end: Numbers
+
+
+@dataclass(frozen=True, slots=True)
+class BodyNumbers:
+    """A body with its inboard hinge, but for its place in the tree.
+
+    `connection` is Rt (9) and ro (3), `link` the same as screws about x and z where it can be one
+    (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
+    `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
+    `imposed` go by speed, `release` is a place in memory or -1.  `idle` is an end that nothing
+    hangs on or acts on.
+    """
+
+    hinge: Key
+    body: Key
+    nq: int
+    nu: int
+    connection: Numbers
+    link: Numbers
+    height: float
+    hinge_p: Numbers
+    body_p: Numbers
+    body_frame: Numbers
+    rotor: Numbers
+    imposed: tuple[int, ...]
+    release: int
+    modal: ModalNumbers | None
+    section: SectionNumbers | None
+    idle: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRun:
+    """`count` bodies in a row from `place` on, each the child of the one before: a body of its own,
+    or a chain.
+
+    `alike` are the first member, one `period` of those that repeat behind it, and the last.
+    `slots` are the hinges' places in q and u.
+    """
+
+    place: int
+    parent: int
+    count: int
+    period: int
+    alike: tuple[BodyNumbers, ...]
+    slots: Group
+
+    @property
+    def which(self) -> Integers:
+        """Member by member its number among `alike`."""
+        found = 1 + np.arange(-1, self.count - 1) % self.period
+        found[0], found[-1] = 0, len(self.alike) - 1
+        return found
+
+    def member(self, k: int) -> BodyNumbers:
+        """Numbers of member k."""
+        if k in (0, self.count - 1):
+            return self.alike[-1 if k else 0]
+        return self.alike[1 + (k - 1) % self.period]
+
+
+@dataclass(frozen=True, slots=True)
+class LawNumbers:
+    """The law `kernel` on n speeds of a hinge, that of `member` in the pattern of its run.
+
+    `turn` is its number among the pattern's laws that remember a turn, or -1; `axes` (9) are
+    theirs.  `efforts` go by speed: one for all repeats of the pattern, or one for each.
+    """
+
+    member: int
+    kernel: str
+    coordinate: int
+    speed: int
+    n: int
+    turn: int
+    p: Numbers
+    axes: Numbers
+    efforts: tuple[Places, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LawRun:
+    """`count` laws on the bodies from `place` on: those of a pattern of `period` bodies, repeated;
+    `twist` is the first of their places in memory."""
+
+    place: int
+    count: int
+    period: int
+    pattern: tuple[LawNumbers, ...]
+    twist: int
+
+    @property
+    def turns(self) -> int:
+        """Laws of the pattern that remember a turn."""
+        return sum(law.turn >= 0 for law in self.pattern)
+
+    @property
+    def next_twist(self) -> int:
+        """Place in memory behind the last of the run."""
+        repeats, rest = divmod(self.count, len(self.pattern))
+        return self.twist + repeats * self.turns + sum(x.turn >= 0 for x in self.pattern[:rest])
+
+    def each(self) -> Iterator[tuple[LawNumbers, int, int, Places]]:
+        """(law, place of its body, place in memory or -1, efforts) one by one."""
+        turns = self.turns
+        for row in range(self.count):
+            repeat, which = divmod(row, len(self.pattern))
+            law = self.pattern[which]
+            twist = self.twist + repeat * turns + law.turn if law.turn >= 0 else -1
+            body = self.place + repeat * self.period + law.member
+            yield law, body, twist, law.efforts[repeat if len(law.efforts) > 1 else 0]
+
+
+@dataclass(frozen=True, slots=True)
+class LoadNumbers:
+    """Force and moment at a point of a body; components in axes of the body `axes` (-1: inertial),
+    which lie in its internal ones as `axes_own` says."""
+
+    body: int
+    axes: int
+    axes_own: Numbers
+    offset: Numbers
+    force: Places
+    moment: Places
+
+
+@dataclass(frozen=True, slots=True)
+class ForceNumbers:
+    """Massless element between (body, axes (9), offset (3)) of an end F and of an end T; body -1 is
+    the ground.  `effort`: t, q, u, [length, its rate] -> given effort."""
+
+    element: Key
+    ends: tuple[tuple[int, Numbers, Numbers], tuple[int, Numbers, Numbers]]
+    p: Numbers
+    effort: KernelIR | None
+
+
+@dataclass(frozen=True)
+class System:
+    """A scene in internal frames.
+
+    `values` gives efforts and load components of (t, q, u); `drives` value, rate and acceleration
+    of each of `driven` (place of the body, coordinate).  `moving` are the numbers in expressions
+    that carry derivatives, by their places in the port "moving".
+    """
+
+    nq: int
+    nu: int
+    n_memory: int
+    gravity: Numbers
+    bodies: tuple[BodyRun, ...]
+    laws: tuple[LawRun, ...]
+    loads: tuple[LoadNumbers, ...]
+    forces: tuple[ForceNumbers, ...]
+    values: KernelIR | None
+    drives: KernelIR | None
+    driven: tuple[tuple[int, int], ...]
+    moving: Mapping[int, Any]
+
+    @property
+    def count(self) -> int:
+        """How many bodies there are."""
+        return self.bodies[-1].place + self.bodies[-1].count if self.bodies else 0
+
+    @property
+    def dragged(self) -> bool:
+        """Whether the medium drags on a flexible body."""
+        return any(one.modal is not None and one.modal.drag is not None for one in self.distinct)
+
+    @property
+    def n_values(self) -> int:
+        """How many values the expressions give."""
+        return 0 if self.values is None else self.values.outputs[0].length()
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        return [run.place for run in self.bodies]
+
+    def body(self, place: int) -> BodyNumbers:
+        """Numbers of the body at a place of the tree."""
+        run = self.bodies[bisect_right(self._starts, place) - 1]
+        return run.member(place - run.place)
+
+    @property
+    def distinct(self) -> Iterator[BodyNumbers]:
+        """Every body that differs from others."""
+        for run in self.bodies:
+            yield from run.alike
+
+    @property
+    def parents(self) -> Integers:
+        """Place of every body's parent, -1 for the ground."""
+        found = np.arange(-1, self.count - 1)
+        for run in self.bodies:
+            found[run.place] = run.parent
+        return found
+
+    @property
+    def places(self) -> dict[str, Integers]:
+        """Every body's first coordinate "q" and first speed "u"."""
+        q, u = np.zeros((2, self.count), dtype=np.int64)
+        for run in self.bodies:
+            members, one, slots = slice(run.place, run.place + run.count), run.count == 1, run.slots
+            q[members] = slots.q if one else slots.q_places()
+            u[members] = slots.u if one else slots.u_places()
+        return {"q": q, "u": u}
+
+    @property
+    def which(self) -> Integers:
+        """Body by body its number among the `distinct` ones."""
+        found, first = np.zeros(self.count, dtype=np.int64), 0
+        for run in self.bodies:
+            if run.count == 1:
+                found[run.place] = first
+            else:
+                found[run.place : run.place + run.count] = first + run.which
+            first += len(run.alike)
+        return found
+
+    def rows(self, number: Callable[[BodyNumbers], Any]) -> NDArray[Any]:
+        """A number of every body, or a row of as many of each."""
+        return np.array([number(one) for one in self.distinct])[self.which]
