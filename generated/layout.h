@@ -29,6 +29,17 @@
 #define MSTMM_SPEED_H 10
 #define MSTMM_SPEED_H_FREE 16
 #define MSTMM_BLOCK_PER_SPEED 22
+/* Arrays of flexible bodies and sections before which others lie, so many per mode. */
+#define MSTMM_MODES_S_RF_PER_MODE 0
+#define MSTMM_MODES_BASED_PER_MODE 6
+#define MSTMM_MODES_A_PER_MODE 12
+#define MSTMM_MODES_RIGHT_PER_MODE 18
+#define MSTMM_MODES_GAIN_PER_MODE 25
+#define MSTMM_MODES_S_FF_PER_MODE 32
+#define MSTMM_SECTION_PHI_PER_MODE 0
+#define MSTMM_SECTION_H_PER_MODE 6
+#define MSTMM_SECTION_PUSH_PER_MODE 12
+#define MSTMM_SECTION_H6_PER_MODE 18
 /* cdef end */
 
 /* Arrays of a flexible body of n modes, and of one of its sections. */

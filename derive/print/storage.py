@@ -156,6 +156,17 @@ def _macro(slot: str) -> str:
     return f"MSTMM_{slot.replace('.', '_').upper()}"
 
 
+def _per_mode(layout: dict[str, tuple[int, int]]) -> list[str]:
+    """Constants of the slots whose place is a multiple of the number of modes."""
+    lines, count = [], 0
+    for slot, (one, other) in layout.items():
+        lines.append(f"#define {_macro(slot)}_PER_MODE {count}")
+        count += one
+        if other:
+            break
+    return lines
+
+
 def _offsets(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
     """Macros of where the slots of a layout begin, by the number of modes."""
     lines, counts = [], [0, 0]
@@ -200,6 +211,8 @@ def layout_header() -> str:
         + "\n".join(lines)
         + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
         + "\n".join(rows)
+        + "\n/* Arrays of flexible bodies and sections before which others lie, so many per mode. */\n"
+        + "\n".join([*_per_mode(MODES), *_per_mode(SECTION)])
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offsets(MODES, " * (size_t)(n) * (n)"), *_offsets(SECTION, "")])

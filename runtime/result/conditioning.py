@@ -97,13 +97,13 @@ class _Pivots:
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
         column = np.arange(6)
         self.there = column < speeds  # (n, 6): the columns of H that exist
-        first = blocks + lib.MSTMM_BLOCK_FIXED + 10 * speeds
+        first = blocks + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_H * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
         self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
         self.release = system.rows(lambda body: body.release)
         self.rotor = system.rows(lambda body: _six(body.rotor))
         self.imposed = system.rows(lambda body: _six(body.imposed)) != 0
-        self.modal = ModalPivots(packed)
+        self.modal = ModalPivots(packed, lib)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
         """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.

@@ -83,8 +83,10 @@ static int accelerations_in_lanes(void *context, const double *t, const double *
     return any;
 }
 
-void mstmm_compiled_system(mstmm_scene_run *run, mstmm_system *system)
+void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 {
+    mstmm_looped_system(run, system);
+    if (!run->fused) return;
     system->rhs = run->with_power ? accelerations_and_power : accelerations;
     if (!run->fused_lanes) return;
     system->lanes = run->fused_lanes->lanes;

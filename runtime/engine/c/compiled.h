@@ -6,6 +6,8 @@
 #include "scene.h"
 
 /* cdef begin */
+/* Fills the integrator's view of `run`. */
+void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system);
 /* Numbers that `mstmm_scene_compiled` needs room for. */
 int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes);
 /* From now on `run` evaluates `one`, and several states at a time by `lanes` (or NULL; not used
@@ -28,8 +30,5 @@ int64_t mstmm_lanes_numbers(const mstmm_fused *fused);
 void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
                               mstmm_group *group);
 /* cdef end */
-
-/* Right-hand sides of a run with compiled code; called by mstmm_scene_system. */
-void mstmm_compiled_system(mstmm_scene_run *run, mstmm_system *system);
 
 #endif

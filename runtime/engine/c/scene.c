@@ -3,8 +3,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "compiled.h"
 #include "kernel_calls.h"
+#include "scene.h"
 #include "sweep_steps.h"
 
 static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, const real *memory,
@@ -277,7 +277,7 @@ static int needs_settling(const mstmm_scene_run *run)
     return run->n_quaternions > 0 || model->n_drives > 0;
 }
 
-void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
+void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
 {
     const mstmm_model *model = run->model;
     memset(system, 0, sizeof *system);
@@ -292,5 +292,4 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
     system->fire = scene_fire;
     system->n_memory = model->n_memory;
     system->memory = run->memory;
-    if (run->fused) mstmm_compiled_system(run, system);
 }

@@ -68,8 +68,6 @@ typedef struct {
     real *fused_numbers;
 } mstmm_scene_run;
 
-/* Fills the integrator's view of `run`. */
-void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system);
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
 /* The same for n states in rows of `width` numbers, each with its own memory; the run's memory is
@@ -77,5 +75,8 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
                             real *memory, real *y);
 /* cdef end */
+
+/* The integrator's view of `run`, evaluated by the looped engine. */
+void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system);
 
 #endif

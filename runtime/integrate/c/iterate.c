@@ -4,7 +4,7 @@
  * States lie side by side: component i of node j at [(j / L) n L + i L + j % L] with L lanes. */
 #include <string.h>
 
-#include "step.h"
+#include "iterate.h"
 
 MSTMM_INLINE int64_t place(int64_t n, int lanes, int64_t component, int node) {
   return (node / lanes) * n * lanes + component * lanes + node % lanes;

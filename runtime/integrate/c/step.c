@@ -2,51 +2,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "iterate.h"
 #include "step.h"
-
-int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time) {
-  run->count.fail_status = status;
-  run->count.code = code;
-  run->count.component = component;
-  run->real.fail_time = time;
-  return status;
-}
-
-int64_t mstmm_first_not_finite(int64_t n, const double *x) {
-  for (int64_t i = 0; i < n; i++)
-    if (!isfinite(x[i])) return i;
-  return -1;
-}
-
-int mstmm_all_finite(int64_t n, const double *x) {
-  wide zeros = {0.0}; /* 0 * x is 0 for finite x and NaN otherwise */
-  double rest = 0.0;
-  int64_t i = 0;
-  for (; i + WIDE <= n; i += WIDE) zeros += 0.0 * *(const wide *)(x + i);
-  for (; i < n; i++) rest += 0.0 * x[i];
-  return mstmm_total(&zeros) + rest == 0.0;
-}
-
-int mstmm_check_finite(const mstmm_work *work, double t, const double *x) {
-  const int64_t n = work->system->n_state;
-  if (mstmm_all_finite(n, x)) return 0;
-  return mstmm_note(work->run, MSTMM_NOT_FINITE, 0, mstmm_first_not_finite(n, x), t);
-}
-
-/* A break belongs to neither side: stages of the step that ends there see the last number before
- * it, stages of the step that starts there the first number after it. */
-double mstmm_time_in(const mstmm_run *run, double c) {
-  double t = c == 1.0 ? run->real.t_new : run->real.t + c * run->real.h;
-  if (run->count.lands_on_break && t >= run->real.t_new) t = nextafter(run->real.t_new, -INFINITY);
-  if (run->count.at_break && t <= run->real.t) t = nextafter(run->real.t, INFINITY);
-  return t;
-}
-
-int mstmm_evaluate(const mstmm_work *work, double t, const double *y, double *dy) {
-  work->run->count.evaluations++;
-  const int code = work->system->rhs(work->system->context, t, y, dy);
-  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
-}
 
 int mstmm_first_stage(const mstmm_work *work) {
   mstmm_run *run = work->run;

@@ -2,8 +2,7 @@
 #ifndef MSTMM_STEP_H
 #define MSTMM_STEP_H
 
-#include "integrate.h"
-#include "wide.h"
+#include "work.h"
 
 /* Where the loop stands between two calls */
 enum {
@@ -28,65 +27,10 @@ enum {
 #define DOUBTFUL 0.5
 #define HOLDS 1.0
 
-/* The workspace cut into named arrays.  First lies what must be kept between steps: the state, the
- * first stage, what is known of events; the rest matters only inside a step.  Rows of the state
- * hold `row` numbers, n_state rounded up to whole vectors; those behind n_state stay 0. */
-typedef struct mstmm_work {
-  mstmm_run *run;
-  const mstmm_system *system;
-  const mstmm_tableau *tableau;
-  int64_t row;
-  double *y;                         /* row: the current good state */
-  double *k;                         /* (s + 1 + n_extra) rows */
-  double *truth;                     /* events and switches */
-  double *last_fire;                 /* the same: time, or NaN */
-  double *side;                      /* the same: 1, or -1 for a switch that starts above zero */
-  double *y_new, *y_stage, *y_event; /* a row each */
-  double *dense;                     /* n_dense rows */
-  double *atol;                      /* a row: the tolerances, 0 where there are none */
-  double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterate.c */
-  double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
-  double *memory;                                /* n_memory: saved while an event is tried */
-} mstmm_work;
-
-/* Rows of a method's weights, see mstmm_tableau. */
-MSTMM_INLINE mstmm_terms mstmm_row(const mstmm_tableau *tableau, int r) {
-  const int first = tableau->starts[r];
-  return (mstmm_terms){.count = tableau->starts[r + 1] - first,
-                       .columns = tableau->columns + first,
-                       .weights = tableau->weights + first};
-}
-MSTMM_INLINE mstmm_terms mstmm_stage_terms(const mstmm_tableau *tableau, int i) {
-  return mstmm_row(tableau, i - 1);
-}
-MSTMM_INLINE mstmm_terms mstmm_step_terms(const mstmm_tableau *tableau) {
-  return mstmm_row(tableau, tableau->n_stages - 1);
-}
-MSTMM_INLINE mstmm_terms mstmm_error_terms(const mstmm_tableau *tableau, int which) {
-  return mstmm_row(tableau, tableau->n_stages + which);
-}
-MSTMM_INLINE mstmm_terms mstmm_extra_terms(const mstmm_tableau *tableau, int i) {
-  return mstmm_row(tableau, tableau->n_stages + 2 + i);
-}
-MSTMM_INLINE mstmm_terms mstmm_dense_terms(const mstmm_tableau *tableau, int j) {
-  return mstmm_row(tableau, tableau->n_stages + 2 + tableau->n_extra + j);
-}
-
 void mstmm_work_cut(mstmm_run *run, mstmm_work *work);
 /* Breaks up to t lie behind the run; is t one of them? */
 void mstmm_pass_breaks(mstmm_run *run);
 
-int mstmm_all_finite(int64_t n, const double *x);
-int64_t mstmm_first_not_finite(int64_t n, const double *x);
-/* Notes a failure in the run and returns its status. */
-int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time);
-
-/* Time of a stage with node c in the trial step. */
-double mstmm_time_in(const mstmm_run *run, double c);
-int mstmm_evaluate(const mstmm_work *work, double t, const double *y, double *dy);
-int mstmm_check_finite(const mstmm_work *work, double t, const double *x);
-/* Stages 1 .. s - 1 of an iterated method. */
-int mstmm_iterate(const mstmm_work *work);
 int mstmm_first_stage(const mstmm_work *work);
 int mstmm_stages(const mstmm_work *work);
 int mstmm_build_dense(const mstmm_work *work);

@@ -7,7 +7,7 @@ itself by delta + H etadd.  The rounding of the body's own inertia counts in fra
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 class ModalPivots:
-    """Where gains and subspaces of the flexible bodies stand in the workspace.
+    """Where gains and subspaces of the flexible bodies stand in the workspace (`layout.h`): of a
+    body S_rf and the same re-based (6, n), the gain (n, 7), S_ff (n, n); of a section its subspace
+    (6, n)."""
 
-    Places as `engine/c/modal.c` has them: of a body S_rf (6, n), the same re-based,
-    ..., the gain (n, 7) from 25 n, S_ff (n, n) from 32 n; of a section its subspace (6, n) from
-    6 n.
-    """
-
-    def __init__(self, packed: Packed) -> None:
+    def __init__(self, packed: Packed, lib: Any) -> None:
+        self._rows, self._based = lib.MSTMM_MODES_S_RF_PER_MODE, lib.MSTMM_MODES_BASED_PER_MODE
+        self._gain, self._inner = lib.MSTMM_MODES_GAIN_PER_MODE, lib.MSTMM_MODES_S_FF_PER_MODE
+        self._subspace = lib.MSTMM_SECTION_H_PER_MODE
         self.frames: dict[int, tuple[int, int, int | None]] = {}
         modal, sections = packed.written.modal, packed.written.sections
         for i, place in modal.items():
@@ -50,22 +50,25 @@ class ModalPivots:
                 own = carried[i] @ moved
                 if i in self.sections:
                     n = len(gain)
-                    first = self.sections[i] + 6 * n
+                    first = self.sections[i] + self._subspace * n
                     own = own - numbers[first : first + 6 * n].reshape(6, n) @ gain
                 carried[i] = own
         for i, (n, place, inward) in self.frames.items():
             gain, moved = answers[i]
-            first = place + (0 if inward is None else 6 * n)
+            first = place + n * (self._rows if inward is None else self._based)
             rows = numbers[first : first + 6 * n].reshape(6, n)
             whole = np.abs(np.diag(S[i] + rows @ gain))
-            modal = np.abs(np.diag(numbers[place + 32 * n : place + 32 * n + n * n].reshape(n, n)))
+            inner = place + self._inner * n
+            modal = np.abs(np.diag(numbers[inner : inner + n * n].reshape(n, n)))
             E[i] = moved.T @ (whole[:, None] * moved) + gain.T @ (modal[:, None] * gain)
 
     def _answer(self, numbers: Array, i: int) -> tuple[Array, Array]:
         """G (n, 6), and the motion (6, 6) of the frame itself."""
         n, place, inward = self.frames[i]
-        gain = numbers[place + 25 * n : place + 32 * n].reshape(n, 7)[:, :6]
+        first = place + self._gain * n
+        gain = numbers[first : first + 7 * n].reshape(n, 7)[:, :6]
         if inward is None:
             return gain, np.eye(6)
-        subspace = numbers[inward + 6 * n : inward + 12 * n].reshape(6, n)
+        first = inward + self._subspace * n
+        subspace = numbers[first : first + 6 * n].reshape(6, n)
         return gain, np.eye(6) - subspace @ gain

@@ -1,0 +1,77 @@
+/* The workspace of a run, its right-hand side and its failures: what every part of the time
+ * integration stands on. */
+#ifndef MSTMM_WORK_H
+#define MSTMM_WORK_H
+
+#include <math.h>
+
+#include "integrate.h"
+#include "wide.h"
+
+/* The workspace cut into named arrays.  First lies what must be kept between steps: the state, the
+ * first stage, what is known of events; the rest matters only inside a step.  Rows of the state
+ * hold `row` numbers, n_state rounded up to whole vectors; those behind n_state stay 0. */
+typedef struct mstmm_work {
+  mstmm_run *run;
+  const mstmm_system *system;
+  const mstmm_tableau *tableau;
+  int64_t row;
+  double *y;                         /* row: the current good state */
+  double *k;                         /* (s + 1 + n_extra) rows */
+  double *truth;                     /* events and switches */
+  double *last_fire;                 /* the same: time, or NaN */
+  double *side;                      /* the same: 1, or -1 for a switch that starts above zero */
+  double *y_new, *y_stage, *y_event; /* a row each */
+  double *dense;                     /* n_dense rows */
+  double *atol;                      /* a row: the tolerances, 0 where there are none */
+  double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterate.c */
+  double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
+  double *memory;                                /* n_memory: saved while an event is tried */
+} mstmm_work;
+
+/* Rows of a method's weights, see mstmm_tableau. */
+MSTMM_INLINE mstmm_terms mstmm_row(const mstmm_tableau *tableau, int r) {
+  const int first = tableau->starts[r];
+  return (mstmm_terms){.count = tableau->starts[r + 1] - first,
+                       .columns = tableau->columns + first,
+                       .weights = tableau->weights + first};
+}
+MSTMM_INLINE mstmm_terms mstmm_stage_terms(const mstmm_tableau *tableau, int i) {
+  return mstmm_row(tableau, i - 1);
+}
+MSTMM_INLINE mstmm_terms mstmm_step_terms(const mstmm_tableau *tableau) {
+  return mstmm_row(tableau, tableau->n_stages - 1);
+}
+MSTMM_INLINE mstmm_terms mstmm_error_terms(const mstmm_tableau *tableau, int which) {
+  return mstmm_row(tableau, tableau->n_stages + which);
+}
+MSTMM_INLINE mstmm_terms mstmm_extra_terms(const mstmm_tableau *tableau, int i) {
+  return mstmm_row(tableau, tableau->n_stages + 2 + i);
+}
+MSTMM_INLINE mstmm_terms mstmm_dense_terms(const mstmm_tableau *tableau, int j) {
+  return mstmm_row(tableau, tableau->n_stages + 2 + tableau->n_extra + j);
+}
+
+int mstmm_all_finite(int64_t n, const double *x);
+int64_t mstmm_first_not_finite(int64_t n, const double *x);
+/* Notes a failure in the run and returns its status. */
+int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time);
+int mstmm_check_finite(const mstmm_work *work, double t, const double *x);
+
+/* Time of a stage with node c in the trial step.
+ * A break belongs to neither side: stages of the step that ends there see the last number before
+ * it, stages of the step that starts there the first number after it. */
+MSTMM_INLINE double mstmm_time_in(const mstmm_run *run, double c) {
+  double t = c == 1.0 ? run->real.t_new : run->real.t + c * run->real.h;
+  if (run->count.lands_on_break && t >= run->real.t_new) t = nextafter(run->real.t_new, -INFINITY);
+  if (run->count.at_break && t <= run->real.t) t = nextafter(run->real.t, INFINITY);
+  return t;
+}
+
+MSTMM_INLINE int mstmm_evaluate(const mstmm_work *work, double t, const double *y, double *dy) {
+  work->run->count.evaluations++;
+  const int code = work->system->rhs(work->system->context, t, y, dy);
+  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
+#endif
