@@ -29,7 +29,7 @@
 #define MSTMM_SPEED_H 10
 #define MSTMM_SPEED_H_FREE 16
 #define MSTMM_BLOCK_PER_SPEED 22
-/* Arrays of flexible bodies and sections before which others lie, so many per mode. */
+/* Flexible bodies and sections: arrays behind so many numbers per mode. */
 #define MSTMM_MODES_S_RF_PER_MODE 0
 #define MSTMM_MODES_BASED_PER_MODE 6
 #define MSTMM_MODES_A_PER_MODE 12

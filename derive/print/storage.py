@@ -211,7 +211,7 @@ def layout_header() -> str:
         + "\n".join(lines)
         + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
         + "\n".join(rows)
-        + "\n/* Arrays of flexible bodies and sections before which others lie, so many per mode. */\n"
+        + "\n/* Flexible bodies and sections: arrays behind so many numbers per mode. */\n"
         + "\n".join([*_per_mode(MODES), *_per_mode(SECTION)])
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
