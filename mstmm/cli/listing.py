@@ -117,6 +117,7 @@ def _sweep() -> Section:
 
 def _methods() -> Section:
     from mstmm.runtime.integrate.steppers import get, names
+    from mstmm.runtime.run import sundials
 
     rows, data = [], []
     for name in names():
@@ -129,6 +130,10 @@ def _methods() -> Section:
         (scipy, "", "adaptive", "solve_ivp of SciPy on the same kernels, such as scipy-LSODA")
     )
     data.append({"name": scipy, "order": None, "steps": "adaptive", "source": "scipy.integrate"})
+    for name in sundials.METHODS:
+        said = "CVODE of SUNDIALS on the same kernels (extra stiff)"
+        rows.append((name, "", "adaptive", said))
+        data.append({"name": name, "order": None, "steps": "adaptive", "source": said})
     columns = ("method", "order>", "steps", "source")
     return Section("methods of integration", columns, rows, data)
 

@@ -35,6 +35,10 @@ MAX_STEPS = 1e11
 _ROWS = 9
 
 
+#: How the names of methods begin that SciPy and SUNDIALS bring.
+_OF_OTHERS = ("scipy-", "sundials-")
+
+
 @dataclass(frozen=True)
 class Plan:
     """What was asked for, checked."""
@@ -59,8 +63,8 @@ class Plan:
 
     @property
     def resumable(self) -> bool:
-        """SciPy's integrators keep no checkpoints."""
-        return not self.method.startswith("scipy-")
+        """Integrators of others keep no checkpoints."""
+        return not self.method.startswith(_OF_OTHERS)
 
     @property
     def checkpoint(self) -> Path:
@@ -74,7 +78,10 @@ def simulate(
         float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the run, s.")
     ] = 10.0,
     method: Annotated[
-        str, typer.Option("--method", metavar="NAME", help="dop853, dopri5, rk4, or scipy-NAME.")
+        str,
+        typer.Option(
+            "--method", metavar="NAME", help="dop853, dopri5, rk4, scipy-NAME or sundials-NAME."
+        ),
     ] = METHOD,
     step: Annotated[
         float | None,
@@ -321,9 +328,14 @@ def _kept(checkpoint: Path) -> str:
 def load_method(name: str) -> None:
     """Read a method's coefficients, so that the time of a run is the run's.
 
-    SceneError for a method that does not exist.
+    SceneError for a method that does not exist, EnvironmentFailure for one whose package is not
+    installed.
     """
-    if not name.startswith("scipy-"):
+    from mstmm.runtime.run import sundials
+
+    if name in sundials.METHODS:
+        sundials.refuse_without(name)
+    elif not name.startswith(_OF_OTHERS):
         from mstmm.runtime.integrate.steppers import get
 
         get(name)

@@ -211,8 +211,9 @@ class Model(Compiled):
 
         Args:
             method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
-                code), or scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA: SciPy's
-                integrators on the same kernels.
+                code), or scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA,
+                sundials-BDF, sundials-Adams: integrators of SciPy and SUNDIALS on the same
+                kernels.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.

@@ -1,7 +1,7 @@
-"""SciPy's integrators on the very same compiled call-backs: a second opinion on every run.
+"""Integrators of others on the very same compiled call-backs: a second opinion on every run.
 
-The classes behind `scipy.integrate.solve_ivp` are driven step by step, so that breaks, events,
-releases, output times and Ctrl-C mean what they mean in the C loop.
+The classes behind `scipy.integrate.solve_ivp`, and CVODE of SUNDIALS, are driven step by step, so
+that breaks, events, releases, output times and Ctrl-C mean what they mean in the C loop.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..engine.jacobian import Jacobian
 from ..host.interruptible import interruptible
 from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
+from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
 from .notes import endless, unseen
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
 
 
-#: Method of `simulate` -> name of SciPy's class.
-METHODS = {f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")}
+#: Method of `simulate` -> name of SciPy's class, or of CVODE's method.
+METHODS = {
+    f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
+} | sundials.METHODS
 
 #: Those that solve equations in every step, and take their Jacobian.
 _IMPLICIT = ("Radau", "BDF", "LSODA")
@@ -125,12 +128,14 @@ class Equations:
 def integrate(
     model: Compiled, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
 ) -> Trajectory:
-    """One run by SciPy.
+    """One run by SciPy, or by SUNDIALS.
 
-    Raises SceneError for a fixed step or an unknown method.
+    Raises SceneError for a fixed step, EnvironmentFailure where the package is not installed.
     """
     if settings.step is not None:
         raise SceneError(f"method {settings.method!r} chooses its own steps: leave step out")
+    if settings.method in sundials.METHODS:
+        sundials.refuse_without(settings.method)
     alone: AbstractContextManager[object] = nullcontext()
     if METHODS[settings.method] == "LSODA":
         alone = _ONE_LSODA
@@ -279,14 +284,20 @@ class _Loop:
     def solver(self, y: Array, stop: float) -> Any:
         import scipy.integrate
 
-        name = METHODS[self.settings.method]
-        kind = getattr(scipy.integrate, name)
+        method = self.settings.method
+        name, longest = METHODS[method], self.longest_step()
         first = self.settings.first_step if self.t == self.settings.t_start else 0.0
+        first = min(first, stop - self.t)
+        common = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
+        if method in sundials.METHODS:
+            return sundials.Cvode(
+                method, self.rates, self.system.jacobian, self.t, y, stop, first_step=first,
+                max_step=longest, **common,
+            )  # fmt: skip
         more = {"jac": self.system.jacobian} if name in _IMPLICIT else {}
-        return kind(
-            self.rates, self.t, y, stop, rtol=max(self.settings.rtol, 2.3e-14),
-            atol=self.atol, max_step=self.longest_step(),
-            first_step=min(first, stop - self.t) or None, **more,
+        return getattr(scipy.integrate, name)(
+            self.rates, self.t, y, stop, max_step=longest, first_step=first or None, **common,
+            **more,
         )  # fmt: skip
 
     def longest_step(self) -> float:

@@ -26,7 +26,7 @@ PATIENCE = 0.5
 FIRST = "dop853"
 METHODS = (
     "dopri5", "rk4", "pirk13", "scipy-DOP853", "scipy-RK45", "scipy-RK23",
-    "scipy-Radau", "scipy-BDF", "scipy-LSODA",
+    "scipy-Radau", "scipy-BDF", "scipy-LSODA", "sundials-BDF", "sundials-Adams",
 )  # fmt: skip
 
 REFUSED, RAN, STOPPED, INTERRUPTED = "refused well", "ran", "stopped with a reason", "interrupted"

@@ -19,7 +19,10 @@ from mstmm.runtime.run import second_opinion
 
 Array = NDArray[np.float64]
 
-METHODS = ("scipy-DOP853", "scipy-RK45", "scipy-Radau", "scipy-BDF", "scipy-LSODA")
+METHODS = (
+    "scipy-DOP853", "scipy-RK45", "scipy-Radau", "scipy-BDF", "scipy-LSODA", "sundials-BDF",
+    "sundials-Adams",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -36,7 +39,7 @@ def test_both_integrators_agree_on_a_scene_with_everything(method: str) -> None:
     assert run.statistics is not None and run.statistics.evaluations > 50
 
 
-@pytest.mark.parametrize("method", ["scipy-DOP853", "scipy-Radau", "scipy-LSODA"])
+@pytest.mark.parametrize("method", ["scipy-DOP853", "scipy-Radau", "scipy-LSODA", "sundials-BDF"])
 def test_a_release_by_time_and_a_stop_by_place(method: str) -> None:
     hinge = {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "rod",
              "drive": "0.5*sin(3*t)", "release": "t >= 1"}  # fmt: skip
@@ -159,6 +162,26 @@ def test_ctrl_c_ends_a_step_of_endless_trials(heard: None, monkeypatch: pytest.M
     monkeypatch.setattr(scipy.integrate, "RK45", Endless)
     run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, method="scipy-RK45")
     assert run.status is None and "interrupted at t = 0 s" in run.message and len(run.t) == 1
+
+
+def test_without_the_package_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
+    model = mstmm.compile(pins(1, [0.3]))
+    with pytest.raises(mstmm.EnvironmentFailure, match=r"pip install 'mstmm\[stiff\]'"):
+        model.simulate(1.0, method="sundials-BDF")
+
+
+def test_a_stiff_chain_takes_few_steps_of_bdf() -> None:
+    """Springs of 1e6 N m/rad in the hinges of an arm: explicit steps are held by stability."""
+    data = pins(3, [0.2, 0.1, 0.1]).model_dump(by_alias=True, exclude_unset=True)
+    for hinge in data["hinge"]:
+        hinge["law"] = {"stiffness": 1e6, "damping": 2e3}
+    model = mstmm.compile(mstmm.Scene.from_data(data), engine="looped")
+    exact = model.simulate(0.5, rtol=1e-10, atol=1e-12)
+    run = model.simulate(0.5, method="sundials-BDF", rtol=1e-6, atol=1e-9)
+    assert run.success and exact.statistics is not None and run.statistics is not None
+    np.testing.assert_allclose(run.q[-1], exact.q[-1], atol=1e-7)
+    assert run.statistics.evaluations < exact.statistics.evaluations / 20
 
 
 def test_settings_that_make_no_sense() -> None:

@@ -64,6 +64,7 @@ def get(name: str) -> Tableau:
     if name not in _registered:
         raise SceneError(
             f"method {name!r} is not known; there are: {', '.join(names())}, and SciPy's as "
-            "scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA"
+            "scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and SUNDIALS' as "
+            "sundials-BDF, sundials-Adams"
         )
     return _registered[name]
