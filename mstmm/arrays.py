@@ -81,7 +81,7 @@ def pair(name: str, value: Any) -> tuple[ArrayLike, ArrayLike]:
     return q, u
 
 
-def _row(array: Array, width: int | None) -> Array:
+def _row(array: Array, width: object) -> Array:
     """A number alone stands for the row that holds nothing else."""
     return array.reshape(1) if width == 1 and array.ndim == 0 else array
 
@@ -97,31 +97,36 @@ def one(name: str, value: ArrayLike, width: int, instead: str) -> Array:
 
 
 def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
-    """(whether it is one vector, its columns as rows (..., n, width)).
+    """(whether it is one vector, its columns (..., width, n)).
 
     As `numpy.linalg.solve` has it: (width,) is a vector, (..., width, n) holds n columns.
     """
     array = _row(numbers(name, value), width)
     if array.shape == (width,):
-        return True, array[None]
+        return True, array[:, None]
     if array.ndim < 2 or array.shape[-2] != width:
         raise SceneError(
             f"{name} has shape {array.shape}, expected ({width},) or (..., {width}, columns)"
         )
-    return False, np.ascontiguousarray(np.swapaxes(array, -1, -2))
+    return False, array
 
 
-def batch(*given: tuple[str, ArrayLike, int | None]) -> tuple[tuple[int, ...], list[Array]]:
+#: How many numbers there are per state: one, a row of so many, or an array of such a shape.
+Width = int | tuple[int, int] | None
+
+
+def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[Array]]:
     """Leading axes, and for each (name, value, width) a contiguous copy (n, width) over all states.
 
     The leading axes are broadcast against each other.  Width None stands for one number per state:
     then the copy is (n,).  SceneError for a misfit or for what is no finite number.
     """
     arrays = [_row(numbers(name, value), width) for name, value, width in given]
-    for (name, _, width), array in zip(given, arrays, strict=True):
-        if width is not None and (array.ndim == 0 or array.shape[-1] != width):
-            raise SceneError(f"{name} has shape {array.shape}, expected (..., {width})")
-    tails = [() if width is None else (width,) for _, _, width in given]
+    tails = [_tail(width) for _, _, width in given]
+    for (name, _, _), array, tail in zip(given, arrays, tails, strict=True):
+        if tail and array.shape[-len(tail) :] != tail:
+            expected = ", ".join(map(str, tail))
+            raise SceneError(f"{name} has shape {array.shape}, expected (..., {expected})")
     leads = [a.shape[: a.ndim - len(tail)] for a, tail in zip(arrays, tails, strict=True)]
     try:
         lead = leads[0] if len(set(leads)) == 1 else np.broadcast_shapes(*leads)
@@ -133,6 +138,13 @@ def batch(*given: tuple[str, ArrayLike, int | None]) -> tuple[tuple[int, ...], l
         _spread(array, lead + tail).reshape(n, *tail)
         for array, tail in zip(arrays, tails, strict=True)
     ]
+
+
+def _tail(width: Width) -> tuple[int, ...]:
+    """The axes behind those of the states."""
+    if width is None:
+        return ()
+    return width if isinstance(width, tuple) else (width,)
 
 
 def _spread(array: Array, shape: tuple[int, ...]) -> Array:

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
     """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
 
-    q (nq,) and u (nu,) of one state.  A quaternion without length is named as well.
+    q (nq,) and u (nu,) of one state.  A quaternion without length is named as well; an expression
+    that the engine does not evaluate is not.
     """
+    evaluated = engine.packed.model
     scene, layout = engine.packed.described, engine.packed.layout
     for first in layout.quaternions:
         if not np.linalg.norm(q[first : first + 4]) > 0:
@@ -32,16 +34,16 @@ def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
                 f"the quaternion that begins with {layout.q_name(int(first))} has no length at "
                 f"t = {t:.9g} s; no rotation is 1, 0, 0, 0"
             )
-    for where, drive in _drives(scene):
+    for where, drive in _drives(scene) if evaluated.n_drives else ():
         for kind, number in zip(("", " speed", " acceleration"), motion_at(drive, t), strict=True):
             if not math.isfinite(number):
                 return _sentence(f"{where}{kind}", drive, number, t)
     seen = _State(engine, t, q, u)
-    for where, expression, own in _efforts(scene):
+    for where, expression, own in _efforts(scene) if evaluated.n_values else ():
         number = expression.evaluate(partial(seen.of, own=own))
         if not math.isfinite(number):
             return _sentence(where, expression, number, t)
-    for spring in scene.spring:
+    for spring in scene.spring if evaluated.n_forces else ():
         effort = spring.law.effort
         if not effort.is_constant:
             number = effort.evaluate(partial(seen.of_spring, own=spring))

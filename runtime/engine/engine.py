@@ -95,10 +95,10 @@ class Engine(Calls):
             self.pointer(memory), self.pointer(columns), self.pointer(answers), failure,
         )  # fmt: skip
         if code:
-            raise self.failed(failure, 0.0, q, np.zeros(self.nu))
+            raise engine.failed(failure, 0.0, q, np.zeros(self.nu))
         if not np.isfinite(answers).all():
             name = self.packed.layout.u_name(int(np.nonzero(~np.isfinite(answers))[1][0]))
-            raise self.not_finite(f"the answer of {name}", 0.0, q, np.zeros(self.nu))
+            raise engine.not_finite(f"the answer of {name}", 0.0, q, np.zeros(self.nu))
         return answers
 
     def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:

@@ -132,12 +132,10 @@ class Model(Compiled):
         motion is undetermined.
         """
         alone, columns = columns_of("rhs", rhs, self.nu)
-        k = columns.shape[-2]
-        lead, (states, rows) = batch(
-            ("q", q, self.nq), ("rhs", columns.reshape(*columns.shape[:-2], -1), k * self.nu)
-        )
-        answers = self._solver.solve(states, rows.reshape(len(states), k, self.nu))
-        found = np.swapaxes(answers.reshape(*lead, k, self.nu), -1, -2)
+        k = columns.shape[-1]
+        lead, (states, columns) = batch(("q", q, self.nq), ("rhs", columns, (self.nu, k)))
+        answers = self._solver.solve(states, np.ascontiguousarray(columns.swapaxes(-1, -2)))
+        found = answers.swapaxes(-1, -2).reshape(*lead, self.nu, k)
         return np.ascontiguousarray(found[..., 0] if alone else found)
 
     @cached_property

@@ -135,6 +135,8 @@ def test_shapes_are_those_of_numpy() -> None:
     np.testing.assert_allclose(model.solve(q, each), np.linalg.solve(matrices, each))
     assert model.solve(q, one).shape == (3, 2)
     assert model.solve(q[0], np.empty((2, 0))).shape == (2, 0)
+    assert model.solve(np.empty((0, 2)), np.empty((0, 2, 3))).shape == (0, 2, 3)
+    assert model.solve(q[0], np.empty((0, 2, 3))).shape == (0, 2, 3)
 
 
 @pytest.mark.parametrize(
@@ -151,6 +153,11 @@ def test_what_does_not_fit_is_said(rhs: Any, said: str) -> None:
     assert str(error.value) == said
 
 
+def test_shapes_that_do_not_fit_are_told_as_they_were_given() -> None:
+    with pytest.raises(mstmm.SceneError, match=r"q \(3, 2\), rhs \(4, 2, 5\)"):
+        compiled(ARM).solve(np.zeros((3, 2)), np.zeros((4, 2, 5)))
+
+
 def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
     """A thin rod that turns into the first axis of its universal hinge, about which it has none."""
     rod = {"name": "rod", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0, 0.1, 0.1]}
@@ -158,7 +165,10 @@ def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
         "name": "cross", "type": "universal", "inboard": "ground", "outboard": "rod",
         "axis": [1, 0, 0], "axis2": [0, 0, 1], "initial": {"q": [0.0, 1.0]},
     }  # fmt: skip
-    scene = {"schema_version": 1, "gravity": [0, 0, 0], "body": [rod], "hinge": [joint]}
+    # A load that is no number at t = 0 has no part in it, and is not to blame.
+    wind = {"on": "rod", "force": ["1/t", 0, 0]}
+    scene = {"schema_version": 1, "gravity": [0, 0, 0], "body": [rod], "hinge": [joint],
+             "load": [wind]}  # fmt: skip
     for model in (compiled(scene), built(scene)):
         assert model.solve([0.0, 1.0], [1.0, 1.0]).shape == (2,)
         with pytest.raises(mstmm.NumericalFailure, match=r'hinge "cross".*undetermined'):
