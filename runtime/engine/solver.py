@@ -16,8 +16,10 @@ from .engine import Engine
 if TYPE_CHECKING:
     from ..kernels.columns import ColumnsLibrary
 
-#: Numbers of right-hand sides that are worth a compiler run: what it takes, by what one saves.
-WORTH_COMPILING = 300_000
+#: Seconds that a compiler takes, by speeds, and that its code saves a state and a number of the
+#: right-hand sides; measured.  Only ratios matter; fixed, so that the choice is always the same.
+_SECONDS, _SECONDS_PER_PAIR = 0.2, 0.005
+_SAVED_PER_STATE, _SAVED_PER_NUMBER = 1e-5, 3e-8
 
 
 class Solver:
@@ -26,7 +28,7 @@ class Solver:
     def __init__(self, engine: Engine, fusion: Fusing) -> None:
         self._engine, self._fusion = engine, fusion
         self._lock = threading.Lock()
-        self._expected = 0
+        self._saved = 0.0
         self._library: ColumnsLibrary | None = None
         self._looked = False
         self._obstacle = ""
@@ -38,7 +40,7 @@ class Solver:
         """
         if not columns.size:
             return columns.copy()
-        library = self._expect(len(q) * columns.shape[1])
+        library = self._expect(len(q), columns.size)
         if library is not None:
             answers = self._fused(library, q, columns)
             if answers is not None:
@@ -56,11 +58,11 @@ class Solver:
         """Whether code of the scene's own is in use."""
         return self._library is not None
 
-    def _expect(self, columns: int) -> ColumnsLibrary | None:
-        """The compiled code once it is there or as many columns have come as it takes to pay."""
+    def _expect(self, states: int, numbers: int) -> ColumnsLibrary | None:
+        """The compiled code once it is there or would have saved what the compiler takes."""
         with self._lock:
-            self._expected += columns * self._engine.nu
-            worth = self._expected > WORTH_COMPILING
+            self._saved += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
+            worth = self._saved > _SECONDS + _SECONDS_PER_PAIR * self._engine.nu**2
             if self._library is None and not self._obstacle and (worth or not self._looked):
                 self._looked = True
                 try:

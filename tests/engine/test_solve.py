@@ -179,6 +179,23 @@ def test_the_compiler_waits_until_it_pays(monkeypatch: pytest.MonkeyPatch) -> No
     model = mstmm.compile(mstmm.Scene(**ARM))
     model.solve([0.1, 0.2], np.eye(2))
     assert not model._solver.compiled
-    monkeypatch.setattr(solver, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(solver, "_SECONDS", 0.0)
+    monkeypatch.setattr(solver, "_SECONDS_PER_PAIR", 0.0)
     model.solve([0.1, 0.2], np.eye(2))
     assert model._solver.compiled
+
+
+def test_the_compiler_waits_longer_for_longer_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 20 balls it takes most of a minute; a million numbers come from the loop in an instant."""
+    model = mstmm.compile(mstmm.Scene(**balls(20)))
+    built: list[bool] = []
+    monkeypatch.setattr(model.fusion, "solution", lambda build: built.append(build))
+    model.solve(model.initial_state()[0], np.ones((model.nu, 1_000_000 // model.nu)))
+    assert built == [False]  # looked for, and no more
+
+
+def balls(count: int) -> dict[str, Any]:
+    link = {"mass": 1.0, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.01, 0.1, 0.1],
+            "ends": {"tip": [1, 0, 0.1]}}  # fmt: skip
+    rope = {"name": "rope", "count": count, "inboard": "ground", "body": [link]}
+    return {"gravity": [0, 0, 0], "chain": [rope | {"hinge": [{"type": "ball"}]}]}
