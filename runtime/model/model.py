@@ -125,8 +125,8 @@ class Model(Compiled):
 
         q (..., nq); rhs (nu,), one column for all states, or (..., nu, k), k columns (N, N*m), as
         `numpy.linalg.solve` has it.  M is never formed: the tree is factored once per state, and
-        each column is O(bodies).  Speeds that a drive or a hold imposes stay unaccelerated: their
-        rows of rhs are not read and their answers are zero.
+        each column is O(bodies).  Speeds that a drive or a hold imposes, released later or not,
+        stay unaccelerated: their rows of rhs are not read and their answers are zero.
 
         Raises SceneError for a shape that does not fit, NumericalFailure naming the hinge whose
         motion is undetermined.

@@ -70,6 +70,19 @@ def test_every_hinge_concerned_is_named_with_a_rotor_as_a_remedy() -> None:
     assert np.isfinite(model.accelerations(*model.initial_state())).all()
 
 
+def test_links_without_inertia_are_all_named() -> None:
+    """Point masses on pins through them: what is swept as links finds the hinges as well."""
+    point: dict[str, Any] = {"mass": 1.0, "inertia": [0, 0, 0]}
+    pin = {"type": "pin", "axis": [0, 0, 1], "inboard": "ground"}
+    scene = {
+        "gravity": [0, 0, -9.81],
+        "body": [point | {"name": f"b{k}"} for k in range(3)],
+        "hinge": [pin | {"name": f"h{k}", "outboard": f"b{k}"} for k in range(3)],
+    }
+    with pytest.raises(mstmm.SceneError, match='hinges "h0", "h1" and "h2"'):
+        compiled(scene)
+
+
 def test_of_many_hinges_some_are_named() -> None:
     body = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0, ROD, ROD],
             "ends": {"tip": [1.0, 0, 0]}}  # fmt: skip
