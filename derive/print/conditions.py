@@ -19,10 +19,10 @@ _TRAITS = {
 
 
 def condition(when: str) -> str:
-    """C expression of a condition."""
+    """C expression of a condition.  ValueError for one that the looped engine does not know."""
     words = []
     for word in when.split():
-        text = _TRAITS[word.lstrip("!")]
+        text = _trait(word)
         simple = "&&" not in text and "==" not in text
         if word.startswith("!"):
             text = f"!{text}" if simple and not text.startswith("!") else f"!({text})"
@@ -32,5 +32,12 @@ def condition(when: str) -> str:
 
 def condition_needs(when: str) -> set[str]:
     """Variables that it reads."""
-    texts = [_TRAITS[word.lstrip("!")] for word in when.split()]
+    texts = [_trait(word) for word in when.split()]
     return {name for name in VARIABLES for text in texts if reads(text, name)}
+
+
+def _trait(word: str) -> str:
+    found = _TRAITS.get(word.lstrip("!"))
+    if found is None:
+        raise ValueError(f"no condition {word!r}; there are {', '.join(_TRAITS)}")
+    return found

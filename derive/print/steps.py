@@ -19,6 +19,7 @@ from ..schedule.steps import (
     Step,
     inner,
 )
+from ..schedule.words import SLOTS
 from .callers import MOST_SPEEDS, Callee
 from .storage import VARIABLES, Place, place, size_of
 
@@ -36,7 +37,7 @@ class StepText:
     """
 
     def __init__(self, kernels: dict[str, Callee], whole: Pass) -> None:
-        self.kernels, self.subject = kernels, whole.subject
+        self.kernels, self.name, self.subject = kernels, whole.name, whole.subject
         self.given = {slot: word_of(slot) for slot in whole.given}
         self.locals = self._local_sizes(whole)
 
@@ -47,6 +48,8 @@ class StepText:
         if found is not None:
             return found
         name, _, picked = slot.partition("[")
+        if not name.startswith("local.") and name not in SLOTS:
+            raise ValueError(f"pass {self.name}: there is no slot {name!r} (schedule/words.py)")
         text = f"{word_of(name)} + {picked.rstrip(']')}" if picked else word_of(name)
         return Place(text)
 

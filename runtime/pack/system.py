@@ -37,8 +37,6 @@ class Arrays:
             np.array_equal(array, other.named[name]) for name, array in self.named.items()
         )  # fmt: skip
 
-    __hash__ = None  # type: ignore[assignment]
-
 
 @dataclass(frozen=True, slots=True)
 class ModalNumbers:
