@@ -30,11 +30,14 @@ from ..schedule.steps import (
     Step,
     Sweep,
 )
+from ..schedule.words import SLOTS
 from .inline import Nodes
 from .known import along_a_screw, screw_axis, unit_row
 from .slots import GROUND, Slots, Subject
 from .state import FusionState
 
+#: Lengths of the local slots that start from zeros.
+_LOCAL_SIZES = {"local.e_I": 6, "local.S_I": 21, "local.effort": 1}
 #: A pivot must exceed this share of the mean inertia of the body it moves.
 PIVOT_FLOOR = Fraction(1, 10**14)
 
@@ -229,11 +232,12 @@ class Replay(Slots):
 
     def _size(self, slot: str) -> int:
         """Length of a slot that is filled with zeros."""
-        if slot.startswith("modes."):
-            return self.modal.n
-        sizes = {"body.e": 6, "local.e_I": 6, "local.S_I": 21, "local.effort": 1}
-        found = sizes.get(slot)
-        return self.body.nu if found is None else found
+        if slot in _LOCAL_SIZES:
+            return _LOCAL_SIZES[slot]
+        size = SLOTS[slot].size
+        if size.isdigit():
+            return int(size)
+        return self.modal.n if size == "n" else self.body.nu
 
     def _add(self, step: Add) -> None:
         terms = self.get(step.source, 0)
