@@ -15,6 +15,10 @@ int mstmm_body_rigid_bias_load(const real *restrict p, const real *restrict moti
     real *restrict e);
 int mstmm_body_rigid_energy(const real *restrict p, const real *restrict v, const real *restrict w,
     real *restrict T);
+int mstmm_body_rigid_bias_load_slope(const real *restrict p, const real *restrict motion,
+    const real *restrict d_motion, real *restrict d_e);
+int mstmm_body_rigid_load_by_motion(const real *restrict p, const real *restrict motion,
+    real *restrict J);
 
 extern const mstmm_element mstmm_classical_acceleration;
 int mstmm_classical_acceleration_transfer(const real *restrict U, const real *restrict F_scale,
@@ -41,6 +45,14 @@ int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
     const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
     real *restrict M, real *restrict V, real *restrict P);
+int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
+    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
+    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
+    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
+    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
 
 extern const mstmm_element mstmm_hinge_ball;
 int mstmm_hinge_ball_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -57,6 +69,10 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_cylindrical;
 int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
@@ -73,6 +89,10 @@ int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restri
 int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_cylindrical_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_fixed;
 int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -89,6 +109,10 @@ int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_free;
 int mstmm_hinge_free_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -105,6 +129,10 @@ int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_gimbal;
 int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -123,6 +151,10 @@ int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
+int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_pin;
 int mstmm_hinge_pin_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -139,6 +171,10 @@ int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_planar;
 int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -155,6 +191,10 @@ int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_prismatic;
 int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
@@ -171,6 +211,10 @@ int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_screw;
 int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -187,6 +231,10 @@ int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_screw_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_hinge_universal;
 int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
@@ -203,6 +251,10 @@ int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 extern const mstmm_element mstmm_sweep_frames;
 int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
@@ -253,6 +305,50 @@ int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restri
     real *restrict omega, real *restrict f_C, real *restrict m_C);
 int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
     const real *restrict z, real *restrict delta);
+int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict S, real *restrict T, real *restrict S_I);
+int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, real *restrict z);
+int mstmm_sweep_frames_tangent_turned(const real *restrict Rc, const real *restrict d_Rc,
+    const real *restrict d_r, const real *restrict f, real *restrict G);
+int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
+    const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_A, real *restrict d_x);
+int mstmm_sweep_frames_velocity_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
+    const real *restrict d_Rc, const real *restrict d_r, const real *restrict d_v_I,
+    const real *restrict d_w_I, const real *restrict d_v_rel, real *restrict d_v);
+int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict delta,
+    const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
+    const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
+    real *restrict d_x_K, real *restrict d_v_K);
+int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+    const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
+    real *restrict d_w_K);
+int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
+    const real *restrict d_A, real *restrict d_A_end);
+int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M,
+    const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
+    const real *restrict d_M, real *restrict d_e);
+int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+    const real *restrict F, const real *restrict M, const real *restrict d_x_F,
+    const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
+    real *restrict d_F_back, real *restrict d_M_back);
+int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
+    const real *restrict d_e, real *restrict d_e_I);
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+    const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d);
+int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
+    const real *restrict d_v_F, const real *restrict d_x_T, const real *restrict d_v_T,
+    real *restrict d_l);
 
 extern const mstmm_element mstmm_sweep_generic0;
 int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict ro,
@@ -278,6 +374,15 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic1;
 int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
@@ -303,6 +408,15 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -328,6 +442,15 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -353,6 +476,15 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -378,6 +510,15 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -403,6 +544,15 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -428,6 +578,15 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -441,6 +600,20 @@ int mstmm_sweep_laws_rotation(const real *restrict p, const real *restrict q,
 int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict B, const real *restrict effort, const real *restrict twist_ref,
     real *restrict tau, real *restrict V, real *restrict P, real *restrict twist);
+int mstmm_sweep_laws_linear_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict effort, const real *restrict d_q,
+    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau);
+int mstmm_sweep_laws_full_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict effort, const real *restrict d_q,
+    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau);
+int mstmm_sweep_laws_rotation_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict B, const real *restrict effort,
+    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
+    const real *restrict d_effort, real *restrict d_tau);
+int mstmm_sweep_laws_six_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict B, const real *restrict effort,
+    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
+    const real *restrict d_effort, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_link_cylindrical;
 int mstmm_sweep_link_cylindrical_angle(const real *restrict link, const real *restrict q,
@@ -568,5 +741,85 @@ int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restric
 int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
     const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
     real *restrict work);
+int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
+    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
+    real *restrict d_e_f);
+int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, const real *restrict S_rf, const real *restrict A,
+    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
+    real *restrict d_h, real *restrict d_h_f);
+int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
+    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
+    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd);
+int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c);
+int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c);
+int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
+    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H);
+int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
+    const real *restrict d_c, real *restrict d_c_s);
+int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
+    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
+    real *restrict d_e, real *restrict d_e_f);
+int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
+    const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
+    const real *restrict d_e_f, real *restrict d_tau);
+
+extern const mstmm_element mstmm_sweep_tangent;
+int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
+    const real *restrict G, const real *restrict W, const real *restrict S, real *restrict V,
+    real *restrict D, real *restrict right, real *restrict gain, real *restrict S_c,
+    real *restrict work);
+int mstmm_sweep_tangent_node_own(int n, const real *restrict H, const real *restrict B,
+    const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
+    const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
+    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
+int mstmm_sweep_tangent_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
+    const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
+    real *restrict Z_z, real *restrict Z_x);
+int mstmm_sweep_tangent_push(int n, const real *restrict H, const real *restrict V,
+    const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
+    real *restrict y, real *restrict e_c, real *restrict work);
+int mstmm_sweep_tangent_answer(int n, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z);
+int mstmm_sweep_tangent_displaced(int n, const real *restrict B, const real *restrict x,
+    const real *restrict z_c, real *restrict z);
+int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict kappa,
+    const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
+    real *restrict work);
+int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
+    real *restrict dq);
 
 #endif

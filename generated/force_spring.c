@@ -13,6 +13,14 @@ int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
     const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
     real *restrict M, real *restrict V, real *restrict P);
+int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
+    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
+    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
+    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
+    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
 
 /* load of the spring-damper-actuator
  * in  p[3] parameters: stiffness [N/m], rest [m], damping [N*s/m]
@@ -214,6 +222,395 @@ static const mstmm_guard mstmm_force_spring_wrench_guards[] = {
     {2, "the direction of the force is undefined"},
 };
 
+/* wrench and its derivative along a direction
+ * in  p[3] parameters: stiffness [N/m], rest [m], damping [N*s/m]
+ * in  t[1] (s) time
+ * in  effort[1] given effort
+ * in  A_F[3][3] rotation, end axes to inertial axes
+ * in  x_F[3] position
+ * in  v_F[3] velocity, inertial axes
+ * in  w_F[3] angular velocity, inertial axes
+ * in  A_T[3][3] rotation, end axes to inertial axes
+ * in  x_T[3] position
+ * in  v_T[3] velocity, inertial axes
+ * in  w_T[3] angular velocity, inertial axes
+ * in  d_t[1] (s) derivative of t
+ * in  d_effort[1] derivative of effort
+ * in  d_A_F[3][3] derivative of A_F
+ * in  d_x_F[3] derivative of x_F
+ * in  d_v_F[3] derivative of v_F
+ * in  d_w_F[3] derivative of w_F
+ * in  d_A_T[3][3] derivative of A_T
+ * in  d_x_T[3] derivative of x_T
+ * in  d_v_T[3] derivative of v_T
+ * in  d_w_T[3] derivative of w_T
+ * out d_F[3] (N) derivative of F
+ * out d_M[3] (N*m) derivative of M
+ */
+int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
+    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
+    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
+    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
+    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M)
+{
+    (void)t;
+    (void)A_T;
+    (void)w_T;
+    (void)d_t;
+    (void)d_A_T;
+    (void)d_w_T;
+    const real t0 = x_T[0] - x_F[0];
+    const real t1 = t0 * A_F[2];
+    const real t2 = x_T[1] - x_F[1];
+    const real t3 = t2 * A_F[5];
+    const real t4 = t1 + t3;
+    const real t5 = x_T[2] - x_F[2];
+    const real t6 = t5 * A_F[8];
+    const real t7 = t4 + t6;
+    const real t8 = t7 * t7;
+    const real t9 = t0 * A_F[0];
+    const real t10 = t2 * A_F[3];
+    const real t11 = t9 + t10;
+    const real t12 = t5 * A_F[6];
+    const real t13 = t11 + t12;
+    const real t14 = t13 * t13;
+    const real t15 = t0 * A_F[1];
+    const real t16 = t2 * A_F[4];
+    const real t17 = t15 + t16;
+    const real t18 = t5 * A_F[7];
+    const real t19 = t17 + t18;
+    const real t20 = t19 * t19;
+    const real t21 = t14 + t20;
+    const real t22 = t8 + t21;
+    const real t23 = sqrt(t22);
+    const real t24 = 1.0 / t23;
+    const real t25 = t23 - p[1];
+    const real t26 = t25 * p[0];
+    const real t27 = A_F[1] * w_F[0];
+    const real t28 = A_F[4] * w_F[1];
+    const real t29 = t27 + t28;
+    const real t30 = A_F[7] * w_F[2];
+    const real t31 = t29 + t30;
+    const real t32 = t13 * t31;
+    const real t33 = A_F[0] * w_F[0];
+    const real t34 = A_F[3] * w_F[1];
+    const real t35 = t33 + t34;
+    const real t36 = A_F[6] * w_F[2];
+    const real t37 = t35 + t36;
+    const real t38 = t19 * t37;
+    const real t39 = t32 - t38;
+    const real t40 = v_T[0] - v_F[0];
+    const real t41 = A_F[2] * t40;
+    const real t42 = v_T[1] - v_F[1];
+    const real t43 = A_F[5] * t42;
+    const real t44 = t41 + t43;
+    const real t45 = v_T[2] - v_F[2];
+    const real t46 = A_F[8] * t45;
+    const real t47 = t44 + t46;
+    const real t48 = t39 + t47;
+    const real t49 = t7 * t48;
+    const real t50 = t24 * t49;
+    const real t51 = A_F[2] * w_F[0];
+    const real t52 = A_F[5] * w_F[1];
+    const real t53 = t51 + t52;
+    const real t54 = A_F[8] * w_F[2];
+    const real t55 = t53 + t54;
+    const real t56 = t19 * t55;
+    const real t57 = t7 * t31;
+    const real t58 = t56 - t57;
+    const real t59 = A_F[0] * t40;
+    const real t60 = A_F[3] * t42;
+    const real t61 = t59 + t60;
+    const real t62 = A_F[6] * t45;
+    const real t63 = t61 + t62;
+    const real t64 = t58 + t63;
+    const real t65 = t13 * t64;
+    const real t66 = t24 * t65;
+    const real t67 = t7 * t37;
+    const real t68 = t13 * t55;
+    const real t69 = t67 - t68;
+    const real t70 = A_F[1] * t40;
+    const real t71 = A_F[4] * t42;
+    const real t72 = t70 + t71;
+    const real t73 = A_F[7] * t45;
+    const real t74 = t72 + t73;
+    const real t75 = t69 + t74;
+    const real t76 = t19 * t75;
+    const real t77 = t24 * t76;
+    const real t78 = t66 + t77;
+    const real t79 = t50 + t78;
+    const real t80 = t79 * p[2];
+    const real t81 = t26 + t80;
+    const real t82 = effort[0] - t81;
+    const real t83 = t7 * t82;
+    const real t84 = t24 * t83;
+    const real t85 = t84 * d_A_F[2];
+    const real t86 = d_x_T[2] - d_x_F[2];
+    const real t87 = A_F[8] * t86;
+    const real t88 = t5 * d_A_F[8];
+    const real t89 = t87 + t88;
+    const real t90 = d_x_T[1] - d_x_F[1];
+    const real t91 = A_F[5] * t90;
+    const real t92 = t2 * d_A_F[5];
+    const real t93 = t91 + t92;
+    const real t94 = d_x_T[0] - d_x_F[0];
+    const real t95 = A_F[2] * t94;
+    const real t96 = t0 * d_A_F[2];
+    const real t97 = t95 + t96;
+    const real t98 = t93 + t97;
+    const real t99 = t89 + t98;
+    const real t100 = t82 * t99;
+    const real t101 = A_F[7] * t86;
+    const real t102 = t5 * d_A_F[7];
+    const real t103 = t101 + t102;
+    const real t104 = A_F[4] * t90;
+    const real t105 = t2 * d_A_F[4];
+    const real t106 = t104 + t105;
+    const real t107 = A_F[1] * t94;
+    const real t108 = t0 * d_A_F[1];
+    const real t109 = t107 + t108;
+    const real t110 = t106 + t109;
+    const real t111 = t103 + t110;
+    const real t112 = t75 * t111;
+    const real t113 = t45 * d_A_F[7];
+    const real t114 = d_v_T[2] - d_v_F[2];
+    const real t115 = A_F[7] * t114;
+    const real t116 = t113 + t115;
+    const real t117 = t42 * d_A_F[4];
+    const real t118 = d_v_T[1] - d_v_F[1];
+    const real t119 = A_F[4] * t118;
+    const real t120 = t117 + t119;
+    const real t121 = t40 * d_A_F[1];
+    const real t122 = d_v_T[0] - d_v_F[0];
+    const real t123 = A_F[1] * t122;
+    const real t124 = t121 + t123;
+    const real t125 = t120 + t124;
+    const real t126 = t116 + t125;
+    const real t127 = t37 * t99;
+    const real t128 = w_F[2] * d_A_F[6];
+    const real t129 = A_F[6] * d_w_F[2];
+    const real t130 = t128 + t129;
+    const real t131 = w_F[1] * d_A_F[3];
+    const real t132 = A_F[3] * d_w_F[1];
+    const real t133 = t131 + t132;
+    const real t134 = w_F[0] * d_A_F[0];
+    const real t135 = A_F[0] * d_w_F[0];
+    const real t136 = t134 + t135;
+    const real t137 = t133 + t136;
+    const real t138 = t130 + t137;
+    const real t139 = t7 * t138;
+    const real t140 = t127 + t139;
+    const real t141 = A_F[6] * t86;
+    const real t142 = t5 * d_A_F[6];
+    const real t143 = t141 + t142;
+    const real t144 = A_F[3] * t90;
+    const real t145 = t2 * d_A_F[3];
+    const real t146 = t144 + t145;
+    const real t147 = A_F[0] * t94;
+    const real t148 = t0 * d_A_F[0];
+    const real t149 = t147 + t148;
+    const real t150 = t146 + t149;
+    const real t151 = t143 + t150;
+    const real t152 = t55 * t151;
+    const real t153 = w_F[2] * d_A_F[8];
+    const real t154 = A_F[8] * d_w_F[2];
+    const real t155 = t153 + t154;
+    const real t156 = w_F[1] * d_A_F[5];
+    const real t157 = A_F[5] * d_w_F[1];
+    const real t158 = t156 + t157;
+    const real t159 = w_F[0] * d_A_F[2];
+    const real t160 = A_F[2] * d_w_F[0];
+    const real t161 = t159 + t160;
+    const real t162 = t158 + t161;
+    const real t163 = t155 + t162;
+    const real t164 = t13 * t163;
+    const real t165 = t152 + t164;
+    const real t166 = t140 - t165;
+    const real t167 = t126 + t166;
+    const real t168 = t19 * t167;
+    const real t169 = t112 + t168;
+    const real t170 = t24 * t169;
+    const real t171 = t19 * t111;
+    const real t172 = t171 + t171;
+    const real t173 = t13 * t151;
+    const real t174 = t173 + t173;
+    const real t175 = t172 + t174;
+    const real t176 = t7 * t99;
+    const real t177 = t176 + t176;
+    const real t178 = t175 + t177;
+    const real t179 = t23 * 2.0;
+    const real t180 = t178 / t179;
+    const real t181 = t24 * t180;
+    const real t182 = t181 / t23;
+    const real t183 = t76 * t182;
+    const real t184 = t170 - t183;
+    const real t185 = t64 * t151;
+    const real t186 = t45 * d_A_F[6];
+    const real t187 = A_F[6] * t114;
+    const real t188 = t186 + t187;
+    const real t189 = t42 * d_A_F[3];
+    const real t190 = A_F[3] * t118;
+    const real t191 = t189 + t190;
+    const real t192 = t40 * d_A_F[0];
+    const real t193 = A_F[0] * t122;
+    const real t194 = t192 + t193;
+    const real t195 = t191 + t194;
+    const real t196 = t188 + t195;
+    const real t197 = t55 * t111;
+    const real t198 = t19 * t163;
+    const real t199 = t197 + t198;
+    const real t200 = t31 * t99;
+    const real t201 = w_F[2] * d_A_F[7];
+    const real t202 = A_F[7] * d_w_F[2];
+    const real t203 = t201 + t202;
+    const real t204 = w_F[1] * d_A_F[4];
+    const real t205 = A_F[4] * d_w_F[1];
+    const real t206 = t204 + t205;
+    const real t207 = w_F[0] * d_A_F[1];
+    const real t208 = A_F[1] * d_w_F[0];
+    const real t209 = t207 + t208;
+    const real t210 = t206 + t209;
+    const real t211 = t203 + t210;
+    const real t212 = t7 * t211;
+    const real t213 = t200 + t212;
+    const real t214 = t199 - t213;
+    const real t215 = t196 + t214;
+    const real t216 = t13 * t215;
+    const real t217 = t185 + t216;
+    const real t218 = t24 * t217;
+    const real t219 = t65 * t182;
+    const real t220 = t218 - t219;
+    const real t221 = t184 + t220;
+    const real t222 = t48 * t99;
+    const real t223 = t45 * d_A_F[8];
+    const real t224 = A_F[8] * t114;
+    const real t225 = t223 + t224;
+    const real t226 = t42 * d_A_F[5];
+    const real t227 = A_F[5] * t118;
+    const real t228 = t226 + t227;
+    const real t229 = t40 * d_A_F[2];
+    const real t230 = A_F[2] * t122;
+    const real t231 = t229 + t230;
+    const real t232 = t228 + t231;
+    const real t233 = t225 + t232;
+    const real t234 = t31 * t151;
+    const real t235 = t13 * t211;
+    const real t236 = t234 + t235;
+    const real t237 = t37 * t111;
+    const real t238 = t19 * t138;
+    const real t239 = t237 + t238;
+    const real t240 = t236 - t239;
+    const real t241 = t233 + t240;
+    const real t242 = t7 * t241;
+    const real t243 = t222 + t242;
+    const real t244 = t24 * t243;
+    const real t245 = t49 * t182;
+    const real t246 = t244 - t245;
+    const real t247 = t221 + t246;
+    const real t248 = p[2] * t247;
+    const real t249 = p[0] * t180;
+    const real t250 = t248 + t249;
+    const real t251 = d_effort[0] - t250;
+    const real t252 = t7 * t251;
+    const real t253 = t100 + t252;
+    const real t254 = t24 * t253;
+    const real t255 = t83 * t182;
+    const real t256 = t254 - t255;
+    const real t257 = A_F[2] * t256;
+    const real t258 = t85 + t257;
+    const real t259 = t19 * t82;
+    const real t260 = t24 * t259;
+    const real t261 = t260 * d_A_F[1];
+    const real t262 = t82 * t111;
+    const real t263 = t19 * t251;
+    const real t264 = t262 + t263;
+    const real t265 = t24 * t264;
+    const real t266 = t259 * t182;
+    const real t267 = t265 - t266;
+    const real t268 = A_F[1] * t267;
+    const real t269 = t261 + t268;
+    const real t270 = t13 * t82;
+    const real t271 = t24 * t270;
+    const real t272 = t271 * d_A_F[0];
+    const real t273 = t82 * t151;
+    const real t274 = t13 * t251;
+    const real t275 = t273 + t274;
+    const real t276 = t24 * t275;
+    const real t277 = t270 * t182;
+    const real t278 = t276 - t277;
+    const real t279 = A_F[0] * t278;
+    const real t280 = t272 + t279;
+    const real t281 = t269 + t280;
+    const real t282 = t258 + t281;
+    d_F[0] = t282;
+    const real t283 = t84 * d_A_F[5];
+    const real t284 = A_F[5] * t256;
+    const real t285 = t283 + t284;
+    const real t286 = t260 * d_A_F[4];
+    const real t287 = A_F[4] * t267;
+    const real t288 = t286 + t287;
+    const real t289 = t271 * d_A_F[3];
+    const real t290 = A_F[3] * t278;
+    const real t291 = t289 + t290;
+    const real t292 = t288 + t291;
+    const real t293 = t285 + t292;
+    d_F[1] = t293;
+    const real t294 = t84 * d_A_F[8];
+    const real t295 = A_F[8] * t256;
+    const real t296 = t294 + t295;
+    const real t297 = t260 * d_A_F[7];
+    const real t298 = A_F[7] * t267;
+    const real t299 = t297 + t298;
+    const real t300 = t271 * d_A_F[6];
+    const real t301 = A_F[6] * t278;
+    const real t302 = t300 + t301;
+    const real t303 = t299 + t302;
+    const real t304 = t296 + t303;
+    d_F[2] = t304;
+    d_M[0] = 0.0;
+    d_M[1] = 0.0;
+    d_M[2] = 0.0;
+    return 0;
+}
+
+static int mstmm_force_spring_wrench_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_force_spring_wrench_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_force_spring_wrench_slope_inputs[] = {
+    {"p", 3, "", 0, 0},
+    {"t", 1, "s", 0, 0},
+    {"effort", 1, "", 0, 0},
+    {"A_F", 9, "", 0, 0},
+    {"x_F", 3, "", 0, 0},
+    {"v_F", 3, "", 0, 0},
+    {"w_F", 3, "", 0, 0},
+    {"A_T", 9, "", 0, 0},
+    {"x_T", 3, "", 0, 0},
+    {"v_T", 3, "", 0, 0},
+    {"w_T", 3, "", 0, 0},
+    {"d_t", 1, "s", 0, 0},
+    {"d_effort", 1, "", 0, 0},
+    {"d_A_F", 9, "", 0, 0},
+    {"d_x_F", 3, "", 0, 0},
+    {"d_v_F", 3, "", 0, 0},
+    {"d_w_F", 3, "", 0, 0},
+    {"d_A_T", 9, "", 0, 0},
+    {"d_x_T", 3, "", 0, 0},
+    {"d_v_T", 3, "", 0, 0},
+    {"d_w_T", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_force_spring_wrench_slope_outputs[] = {
+    {"d_F", 3, "N", 0, 0},
+    {"d_M", 3, "N*m", 0, 0},
+};
+
 static const char *const mstmm_force_spring_p_names[] = {
     "stiffness", "rest", "damping",
 };
@@ -235,13 +632,25 @@ static const mstmm_kernel mstmm_force_spring_kernels[] = {
         .n_guards = 1,
         .guards = mstmm_force_spring_wrench_guards,
     },
+    {
+        .name = "wrench_slope",
+        .function = (void (*)(void))mstmm_force_spring_wrench_slope,
+        .call = mstmm_force_spring_wrench_slope_call,
+        .n_inputs = 21,
+        .n_outputs = 2,
+        .inputs = mstmm_force_spring_wrench_slope_inputs,
+        .outputs = mstmm_force_spring_wrench_slope_outputs,
+        .ir_hash = "21bb06ddaa01f5f99116f6aacc4b01627a949491ab2b7c204b74ecc66979313a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_force_spring = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "spring",
-    .hash = "a0a2ecca952cdd24cc8f1ae8640af4ce183670ec824cd9e374b5a7da01855519",
+    .hash = "d4d1dbccb56f5d2d68b8419df5355abc8ac607d327730e7a537db4ca1144c3a2",
     .nq = 0,
     .nu = 0,
     .np = 3,
@@ -251,6 +660,6 @@ const mstmm_element mstmm_force_spring = {
     .u_units = NULL,
     .p_names = mstmm_force_spring_p_names,
     .p_units = mstmm_force_spring_p_units,
-    .n_kernels = 1,
+    .n_kernels = 2,
     .kernels = mstmm_force_spring_kernels,
 };

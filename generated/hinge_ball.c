@@ -24,6 +24,10 @@ int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1071,6 +1075,241 @@ static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
+ * in  d_q[4] derivative of q
+ * in  d_u[3] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][3] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[4] derivative of qdot
+ */
+int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    const real t0 = q[2] * q[2];
+    const real t1 = q[3] * q[3];
+    const real t2 = t0 + t1;
+    const real t3 = q[0] * q[0];
+    const real t4 = q[1] * q[1];
+    const real t5 = t3 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = t1 + t6;
+    const real t8 = 1.0 / t7;
+    const real t9 = q[1] * d_q[1];
+    const real t10 = t9 + t9;
+    const real t11 = q[0] * d_q[0];
+    const real t12 = t11 + t11;
+    const real t13 = t10 + t12;
+    const real t14 = q[2] * d_q[2];
+    const real t15 = t14 + t14;
+    const real t16 = t13 + t15;
+    const real t17 = q[3] * d_q[3];
+    const real t18 = t17 + t17;
+    const real t19 = t16 + t18;
+    const real t20 = t8 * t19;
+    const real t21 = t20 / t7;
+    const real t22 = 2.0 * t21;
+    const real t23 = t2 * t22;
+    const real t24 = t8 * 2.0;
+    const real t25 = t15 + t18;
+    const real t26 = t24 * t25;
+    const real t27 = t23 - t26;
+    d_R[0] = t27;
+    const real t28 = q[1] * d_q[2];
+    const real t29 = q[2] * d_q[1];
+    const real t30 = t28 + t29;
+    const real t31 = q[0] * d_q[3];
+    const real t32 = q[3] * d_q[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 - t33;
+    const real t35 = t24 * t34;
+    const real t36 = q[2] * q[1];
+    const real t37 = q[3] * q[0];
+    const real t38 = t36 - t37;
+    const real t39 = t38 * t22;
+    const real t40 = t35 - t39;
+    d_R[1] = t40;
+    const real t41 = q[1] * d_q[3];
+    const real t42 = q[3] * d_q[1];
+    const real t43 = t41 + t42;
+    const real t44 = q[0] * d_q[2];
+    const real t45 = q[2] * d_q[0];
+    const real t46 = t44 + t45;
+    const real t47 = t43 + t46;
+    const real t48 = t24 * t47;
+    const real t49 = q[2] * q[0];
+    const real t50 = q[3] * q[1];
+    const real t51 = t49 + t50;
+    const real t52 = t51 * t22;
+    const real t53 = t48 - t52;
+    d_R[2] = t53;
+    const real t54 = t33 + t30;
+    const real t55 = t24 * t54;
+    const real t56 = t36 + t37;
+    const real t57 = t56 * t22;
+    const real t58 = t55 - t57;
+    d_R[3] = t58;
+    const real t59 = t1 + t4;
+    const real t60 = t59 * t22;
+    const real t61 = t10 + t18;
+    const real t62 = t24 * t61;
+    const real t63 = t60 - t62;
+    d_R[4] = t63;
+    const real t64 = q[3] * d_q[2];
+    const real t65 = q[2] * d_q[3];
+    const real t66 = t64 + t65;
+    const real t67 = q[1] * d_q[0];
+    const real t68 = q[0] * d_q[1];
+    const real t69 = t67 + t68;
+    const real t70 = t66 - t69;
+    const real t71 = t24 * t70;
+    const real t72 = q[2] * q[3];
+    const real t73 = q[0] * q[1];
+    const real t74 = t72 - t73;
+    const real t75 = t74 * t22;
+    const real t76 = t71 - t75;
+    d_R[5] = t76;
+    const real t77 = t43 - t46;
+    const real t78 = t24 * t77;
+    const real t79 = t50 - t49;
+    const real t80 = t79 * t22;
+    const real t81 = t78 - t80;
+    d_R[6] = t81;
+    const real t82 = t69 + t66;
+    const real t83 = t24 * t82;
+    const real t84 = t72 + t73;
+    const real t85 = t84 * t22;
+    const real t86 = t83 - t85;
+    d_R[7] = t86;
+    const real t87 = t0 + t4;
+    const real t88 = t87 * t22;
+    const real t89 = t10 + t15;
+    const real t90 = t24 * t89;
+    const real t91 = t88 - t90;
+    d_R[8] = t91;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = 0.0;
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_H[6] = 0.0;
+    d_H[7] = 0.0;
+    d_H[8] = 0.0;
+    d_H[9] = 0.0;
+    d_H[10] = 0.0;
+    d_H[11] = 0.0;
+    d_H[12] = 0.0;
+    d_H[13] = 0.0;
+    d_H[14] = 0.0;
+    d_H[15] = 0.0;
+    d_H[16] = 0.0;
+    d_H[17] = 0.0;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = 0.0;
+    d_w[0] = d_u[0];
+    d_w[1] = d_u[1];
+    d_w[2] = d_u[2];
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    const real t92 = u[1] * d_q[2];
+    const real t93 = q[2] * d_u[1];
+    const real t94 = t92 + t93;
+    const real t95 = u[0] * d_q[1];
+    const real t96 = q[1] * d_u[0];
+    const real t97 = t95 + t96;
+    const real t98 = t94 + t97;
+    const real t99 = u[2] * d_q[3];
+    const real t100 = q[3] * d_u[2];
+    const real t101 = t99 + t100;
+    const real t102 = t98 + t101;
+    const real t103 = 0.5 * t102;
+    const real t104 = -t103;
+    d_qdot[0] = t104;
+    const real t105 = u[2] * d_q[2];
+    const real t106 = q[2] * d_u[2];
+    const real t107 = t105 + t106;
+    const real t108 = u[0] * d_q[0];
+    const real t109 = q[0] * d_u[0];
+    const real t110 = t108 + t109;
+    const real t111 = t107 + t110;
+    const real t112 = u[1] * d_q[3];
+    const real t113 = q[3] * d_u[1];
+    const real t114 = t112 + t113;
+    const real t115 = t111 - t114;
+    const real t116 = 0.5 * t115;
+    d_qdot[1] = t116;
+    const real t117 = u[1] * d_q[0];
+    const real t118 = q[0] * d_u[1];
+    const real t119 = t117 + t118;
+    const real t120 = u[2] * d_q[1];
+    const real t121 = q[1] * d_u[2];
+    const real t122 = t120 + t121;
+    const real t123 = t119 - t122;
+    const real t124 = u[0] * d_q[3];
+    const real t125 = q[3] * d_u[0];
+    const real t126 = t124 + t125;
+    const real t127 = t123 + t126;
+    const real t128 = 0.5 * t127;
+    d_qdot[2] = t128;
+    const real t129 = u[1] * d_q[1];
+    const real t130 = q[1] * d_u[1];
+    const real t131 = t129 + t130;
+    const real t132 = u[2] * d_q[0];
+    const real t133 = q[0] * d_u[2];
+    const real t134 = t132 + t133;
+    const real t135 = t131 + t134;
+    const real t136 = u[0] * d_q[2];
+    const real t137 = q[2] * d_u[0];
+    const real t138 = t136 + t137;
+    const real t139 = t135 - t138;
+    const real t140 = 0.5 * t139;
+    d_qdot[3] = t140;
+    return 0;
+}
+
+static int mstmm_hinge_ball_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_ball_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"d_q", 4, "", 0, 0},
+    {"d_u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 4, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
 };
@@ -1136,13 +1375,25 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_ball_hinge_slope,
+        .call = mstmm_hinge_ball_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_ball_hinge_slope_inputs,
+        .outputs = mstmm_hinge_ball_hinge_slope_outputs,
+        .ir_hash = "87c7a3a89f0eb3da74e1c84ffbf4b0235eb50c5cb125a95fc8166f28be762dfa",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "249fc97c6d5a6df892c06004f06e258ae54201779208f36cf21defe49249c3ca",
+    .hash = "30e693bb57627b47da7d634e9469b3823a380db15143378be2997e59f9887f5f",
     .nq = 4,
     .nu = 3,
     .np = 0,
@@ -1152,6 +1403,6 @@ const mstmm_element mstmm_hinge_ball = {
     .u_units = mstmm_hinge_ball_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_ball_kernels,
 };

@@ -22,6 +22,10 @@ int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the fixed hinge
  * in  p[0] parameters
@@ -814,6 +818,83 @@ static const mstmm_port mstmm_hinge_fixed_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[0] parameters
+ * in  q[0] coordinates
+ * in  u[0] speeds
+ * in  d_q[0] derivative of q
+ * in  d_u[0] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][0] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[0] derivative of qdot
+ */
+int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    (void)d_q;
+    (void)d_u;
+    (void)d_H;
+    (void)d_qdot;
+    d_R[0] = 0.0;
+    d_R[1] = 0.0;
+    d_R[2] = 0.0;
+    d_R[3] = 0.0;
+    d_R[4] = 0.0;
+    d_R[5] = 0.0;
+    d_R[6] = 0.0;
+    d_R[7] = 0.0;
+    d_R[8] = 0.0;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = 0.0;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = 0.0;
+    d_w[0] = 0.0;
+    d_w[1] = 0.0;
+    d_w[2] = 0.0;
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_fixed_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_fixed_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_fixed_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 0, "", 0, 0},
+    {"u", 0, "", 0, 0},
+    {"d_q", 0, "", 0, 0},
+    {"d_u", 0, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 0, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 0, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
     {
         .name = "hinge",
@@ -863,13 +944,25 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_fixed_hinge_slope,
+        .call = mstmm_hinge_fixed_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_fixed_hinge_slope_inputs,
+        .outputs = mstmm_hinge_fixed_hinge_slope_outputs,
+        .ir_hash = "e7d2d03b8ac34fe0392597c693857e5f66ed761abc6581f0a19f465473b76f61",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "a462e955833f6b268b56a30a2098caee1da312609d1b296429d01f2d2ed29077",
+    .hash = "c1f105f6d68a90bb1224c2abccd271601ce6e0ef37fdbcc585a5882abe88652b",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -879,6 +972,6 @@ const mstmm_element mstmm_hinge_fixed = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_fixed_kernels,
 };

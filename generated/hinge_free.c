@@ -23,6 +23,10 @@ int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the free hinge
  * in  p[0] parameters
@@ -1482,6 +1486,345 @@ static const mstmm_port mstmm_hinge_free_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[0] parameters
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
+ * in  d_q[7] derivative of q
+ * in  d_u[6] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][6] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[7] derivative of qdot
+ */
+int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    const real t0 = q[5] * q[5];
+    const real t1 = q[6] * q[6];
+    const real t2 = t0 + t1;
+    const real t3 = q[3] * q[3];
+    const real t4 = q[4] * q[4];
+    const real t5 = t3 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = t1 + t6;
+    const real t8 = 1.0 / t7;
+    const real t9 = q[4] * d_q[4];
+    const real t10 = t9 + t9;
+    const real t11 = q[3] * d_q[3];
+    const real t12 = t11 + t11;
+    const real t13 = t10 + t12;
+    const real t14 = q[5] * d_q[5];
+    const real t15 = t14 + t14;
+    const real t16 = t13 + t15;
+    const real t17 = q[6] * d_q[6];
+    const real t18 = t17 + t17;
+    const real t19 = t16 + t18;
+    const real t20 = t8 * t19;
+    const real t21 = t20 / t7;
+    const real t22 = 2.0 * t21;
+    const real t23 = t2 * t22;
+    const real t24 = t8 * 2.0;
+    const real t25 = t15 + t18;
+    const real t26 = t24 * t25;
+    const real t27 = t23 - t26;
+    d_R[0] = t27;
+    const real t28 = q[4] * d_q[5];
+    const real t29 = q[5] * d_q[4];
+    const real t30 = t28 + t29;
+    const real t31 = q[3] * d_q[6];
+    const real t32 = q[6] * d_q[3];
+    const real t33 = t31 + t32;
+    const real t34 = t30 - t33;
+    const real t35 = t24 * t34;
+    const real t36 = q[5] * q[4];
+    const real t37 = q[6] * q[3];
+    const real t38 = t36 - t37;
+    const real t39 = t38 * t22;
+    const real t40 = t35 - t39;
+    d_R[1] = t40;
+    const real t41 = q[4] * d_q[6];
+    const real t42 = q[6] * d_q[4];
+    const real t43 = t41 + t42;
+    const real t44 = q[3] * d_q[5];
+    const real t45 = q[5] * d_q[3];
+    const real t46 = t44 + t45;
+    const real t47 = t43 + t46;
+    const real t48 = t24 * t47;
+    const real t49 = q[5] * q[3];
+    const real t50 = q[6] * q[4];
+    const real t51 = t49 + t50;
+    const real t52 = t51 * t22;
+    const real t53 = t48 - t52;
+    d_R[2] = t53;
+    const real t54 = t33 + t30;
+    const real t55 = t24 * t54;
+    const real t56 = t36 + t37;
+    const real t57 = t56 * t22;
+    const real t58 = t55 - t57;
+    d_R[3] = t58;
+    const real t59 = t1 + t4;
+    const real t60 = t59 * t22;
+    const real t61 = t10 + t18;
+    const real t62 = t24 * t61;
+    const real t63 = t60 - t62;
+    d_R[4] = t63;
+    const real t64 = q[6] * d_q[5];
+    const real t65 = q[5] * d_q[6];
+    const real t66 = t64 + t65;
+    const real t67 = q[4] * d_q[3];
+    const real t68 = q[3] * d_q[4];
+    const real t69 = t67 + t68;
+    const real t70 = t66 - t69;
+    const real t71 = t24 * t70;
+    const real t72 = q[5] * q[6];
+    const real t73 = q[3] * q[4];
+    const real t74 = t72 - t73;
+    const real t75 = t74 * t22;
+    const real t76 = t71 - t75;
+    d_R[5] = t76;
+    const real t77 = t43 - t46;
+    const real t78 = t24 * t77;
+    const real t79 = t50 - t49;
+    const real t80 = t79 * t22;
+    const real t81 = t78 - t80;
+    d_R[6] = t81;
+    const real t82 = t69 + t66;
+    const real t83 = t24 * t82;
+    const real t84 = t72 + t73;
+    const real t85 = t84 * t22;
+    const real t86 = t83 - t85;
+    d_R[7] = t86;
+    const real t87 = t0 + t4;
+    const real t88 = t87 * t22;
+    const real t89 = t10 + t15;
+    const real t90 = t24 * t89;
+    const real t91 = t88 - t90;
+    d_R[8] = t91;
+    d_d[0] = d_q[0];
+    d_d[1] = d_q[1];
+    d_d[2] = d_q[2];
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_H[6] = 0.0;
+    d_H[7] = 0.0;
+    d_H[8] = 0.0;
+    d_H[9] = 0.0;
+    d_H[10] = 0.0;
+    d_H[11] = 0.0;
+    d_H[12] = 0.0;
+    d_H[13] = 0.0;
+    d_H[14] = 0.0;
+    d_H[15] = 0.0;
+    d_H[16] = 0.0;
+    d_H[17] = 0.0;
+    d_H[18] = 0.0;
+    d_H[19] = 0.0;
+    d_H[20] = 0.0;
+    d_H[21] = 0.0;
+    d_H[22] = 0.0;
+    d_H[23] = 0.0;
+    d_H[24] = 0.0;
+    d_H[25] = 0.0;
+    d_H[26] = 0.0;
+    d_H[27] = 0.0;
+    d_H[28] = 0.0;
+    d_H[29] = 0.0;
+    d_H[30] = 0.0;
+    d_H[31] = 0.0;
+    d_H[32] = 0.0;
+    d_H[33] = 0.0;
+    d_H[34] = 0.0;
+    d_H[35] = 0.0;
+    d_v[0] = d_u[0];
+    d_v[1] = d_u[1];
+    d_v[2] = d_u[2];
+    d_w[0] = d_u[3];
+    d_w[1] = d_u[4];
+    d_w[2] = d_u[5];
+    const real t92 = u[4] * d_u[2];
+    const real t93 = u[2] * d_u[4];
+    const real t94 = t92 + t93;
+    const real t95 = u[5] * d_u[1];
+    const real t96 = u[1] * d_u[5];
+    const real t97 = t95 + t96;
+    const real t98 = t94 - t97;
+    d_c[0] = t98;
+    const real t99 = u[5] * d_u[0];
+    const real t100 = u[0] * d_u[5];
+    const real t101 = t99 + t100;
+    const real t102 = u[3] * d_u[2];
+    const real t103 = u[2] * d_u[3];
+    const real t104 = t102 + t103;
+    const real t105 = t101 - t104;
+    d_c[1] = t105;
+    const real t106 = u[3] * d_u[1];
+    const real t107 = u[1] * d_u[3];
+    const real t108 = t106 + t107;
+    const real t109 = u[4] * d_u[0];
+    const real t110 = u[0] * d_u[4];
+    const real t111 = t109 + t110;
+    const real t112 = t108 - t111;
+    d_c[2] = t112;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    const real t113 = u[2] * t47;
+    const real t114 = t51 * d_u[2];
+    const real t115 = t113 + t114;
+    const real t116 = t24 * t115;
+    const real t117 = t51 * u[2];
+    const real t118 = t117 * t22;
+    const real t119 = t116 - t118;
+    const real t120 = u[0] * t27;
+    const real t121 = t2 * t24;
+    const real t122 = 1.0 - t121;
+    const real t123 = t122 * d_u[0];
+    const real t124 = t120 + t123;
+    const real t125 = t119 + t124;
+    const real t126 = u[1] * t34;
+    const real t127 = t38 * d_u[1];
+    const real t128 = t126 + t127;
+    const real t129 = t24 * t128;
+    const real t130 = t38 * u[1];
+    const real t131 = t130 * t22;
+    const real t132 = t129 - t131;
+    const real t133 = t125 + t132;
+    d_qdot[0] = t133;
+    const real t134 = u[2] * t70;
+    const real t135 = t74 * d_u[2];
+    const real t136 = t134 + t135;
+    const real t137 = t24 * t136;
+    const real t138 = t74 * u[2];
+    const real t139 = t138 * t22;
+    const real t140 = t137 - t139;
+    const real t141 = u[1] * t63;
+    const real t142 = t24 * t59;
+    const real t143 = 1.0 - t142;
+    const real t144 = t143 * d_u[1];
+    const real t145 = t141 + t144;
+    const real t146 = t140 + t145;
+    const real t147 = u[0] * t54;
+    const real t148 = t56 * d_u[0];
+    const real t149 = t147 + t148;
+    const real t150 = t24 * t149;
+    const real t151 = t56 * u[0];
+    const real t152 = t151 * t22;
+    const real t153 = t150 - t152;
+    const real t154 = t146 + t153;
+    d_qdot[1] = t154;
+    const real t155 = u[1] * t82;
+    const real t156 = t84 * d_u[1];
+    const real t157 = t155 + t156;
+    const real t158 = t24 * t157;
+    const real t159 = t84 * u[1];
+    const real t160 = t159 * t22;
+    const real t161 = t158 - t160;
+    const real t162 = u[2] * t91;
+    const real t163 = t24 * t87;
+    const real t164 = 1.0 - t163;
+    const real t165 = t164 * d_u[2];
+    const real t166 = t162 + t165;
+    const real t167 = t161 + t166;
+    const real t168 = u[0] * t77;
+    const real t169 = t79 * d_u[0];
+    const real t170 = t168 + t169;
+    const real t171 = t24 * t170;
+    const real t172 = t79 * u[0];
+    const real t173 = t172 * t22;
+    const real t174 = t171 - t173;
+    const real t175 = t167 + t174;
+    d_qdot[2] = t175;
+    const real t176 = u[4] * d_q[5];
+    const real t177 = q[5] * d_u[4];
+    const real t178 = t176 + t177;
+    const real t179 = u[3] * d_q[4];
+    const real t180 = q[4] * d_u[3];
+    const real t181 = t179 + t180;
+    const real t182 = t178 + t181;
+    const real t183 = u[5] * d_q[6];
+    const real t184 = q[6] * d_u[5];
+    const real t185 = t183 + t184;
+    const real t186 = t182 + t185;
+    const real t187 = 0.5 * t186;
+    const real t188 = -t187;
+    d_qdot[3] = t188;
+    const real t189 = u[5] * d_q[5];
+    const real t190 = q[5] * d_u[5];
+    const real t191 = t189 + t190;
+    const real t192 = u[3] * d_q[3];
+    const real t193 = q[3] * d_u[3];
+    const real t194 = t192 + t193;
+    const real t195 = t191 + t194;
+    const real t196 = u[4] * d_q[6];
+    const real t197 = q[6] * d_u[4];
+    const real t198 = t196 + t197;
+    const real t199 = t195 - t198;
+    const real t200 = 0.5 * t199;
+    d_qdot[4] = t200;
+    const real t201 = u[4] * d_q[3];
+    const real t202 = q[3] * d_u[4];
+    const real t203 = t201 + t202;
+    const real t204 = u[5] * d_q[4];
+    const real t205 = q[4] * d_u[5];
+    const real t206 = t204 + t205;
+    const real t207 = t203 - t206;
+    const real t208 = u[3] * d_q[6];
+    const real t209 = q[6] * d_u[3];
+    const real t210 = t208 + t209;
+    const real t211 = t207 + t210;
+    const real t212 = 0.5 * t211;
+    d_qdot[5] = t212;
+    const real t213 = u[4] * d_q[4];
+    const real t214 = q[4] * d_u[4];
+    const real t215 = t213 + t214;
+    const real t216 = u[5] * d_q[3];
+    const real t217 = q[3] * d_u[5];
+    const real t218 = t216 + t217;
+    const real t219 = t215 + t218;
+    const real t220 = u[3] * d_q[5];
+    const real t221 = q[5] * d_u[3];
+    const real t222 = t220 + t221;
+    const real t223 = t219 - t222;
+    const real t224 = 0.5 * t223;
+    d_qdot[6] = t224;
+    return 0;
+}
+
+static int mstmm_hinge_free_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_free_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_free_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 7, "", 0, 0},
+    {"u", 6, "", 0, 0},
+    {"d_q", 7, "", 0, 0},
+    {"d_u", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_free_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 36, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 7, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_free_q_names[] = {
     "x", "y", "z", "qw", "qx", "qy", "qz",
 };
@@ -1547,13 +1890,25 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_free_hinge_slope,
+        .call = mstmm_hinge_free_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_free_hinge_slope_inputs,
+        .outputs = mstmm_hinge_free_hinge_slope_outputs,
+        .ir_hash = "5e6423f8b0b3ace9fe5e808709416aa2612a5d6f61b2282d10dabfc1bf6abfe5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "b1cae6ca0ae4e2d91836673ff93fa6a4d4c45be74e402af8674faa0c2055aa16",
+    .hash = "7a587e4e9eb853f2498d91dc0a62d31bfee95592f3fa17084a83bd4493968ef5",
     .nq = 7,
     .nu = 6,
     .np = 0,
@@ -1563,6 +1918,6 @@ const mstmm_element mstmm_hinge_free = {
     .u_units = mstmm_hinge_free_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_free_kernels,
 };

@@ -25,6 +25,10 @@ int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
     real *restrict measure);
+int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the gimbal hinge (three angles)
  * in  p[0] parameters
@@ -1382,6 +1386,224 @@ static const mstmm_port mstmm_hinge_gimbal_singularity_outputs[] = {
     {"measure", 1, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
+ * in  d_q[3] derivative of q
+ * in  d_u[3] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][3] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[3] derivative of qdot
+ */
+int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    const real t0 = cos(q[2]);
+    const real t1 = sin(q[1]);
+    const real t2 = t1 * d_q[1];
+    const real t3 = t0 * t2;
+    const real t4 = cos(q[1]);
+    const real t5 = sin(q[2]);
+    const real t6 = t5 * d_q[2];
+    const real t7 = t4 * t6;
+    const real t8 = t3 + t7;
+    const real t9 = -t8;
+    d_R[0] = t9;
+    const real t10 = cos(q[0]);
+    const real t11 = t10 * d_q[0];
+    const real t12 = t1 * t11;
+    const real t13 = sin(q[0]);
+    const real t14 = t4 * d_q[1];
+    const real t15 = t13 * t14;
+    const real t16 = t12 + t15;
+    const real t17 = t0 * t16;
+    const real t18 = t13 * t1;
+    const real t19 = t18 * t6;
+    const real t20 = t17 - t19;
+    const real t21 = t0 * d_q[2];
+    const real t22 = t10 * t21;
+    const real t23 = t13 * d_q[0];
+    const real t24 = t5 * t23;
+    const real t25 = t22 - t24;
+    const real t26 = t20 - t25;
+    d_R[1] = t26;
+    const real t27 = t10 * t14;
+    const real t28 = t1 * t23;
+    const real t29 = t27 - t28;
+    const real t30 = t0 * t29;
+    const real t31 = t1 * t10;
+    const real t32 = t31 * t6;
+    const real t33 = t30 - t32;
+    const real t34 = t5 * t11;
+    const real t35 = t13 * t21;
+    const real t36 = t34 + t35;
+    const real t37 = t33 + t36;
+    d_R[2] = t37;
+    const real t38 = t4 * t21;
+    const real t39 = t5 * t2;
+    const real t40 = t38 - t39;
+    d_R[3] = t40;
+    const real t41 = t5 * t16;
+    const real t42 = t18 * t21;
+    const real t43 = t41 + t42;
+    const real t44 = t10 * t6;
+    const real t45 = t0 * t23;
+    const real t46 = t44 + t45;
+    const real t47 = t43 - t46;
+    d_R[4] = t47;
+    const real t48 = t5 * t14;
+    const real t49 = t1 * t21;
+    const real t50 = t48 + t49;
+    const real t51 = t10 * t50;
+    const real t52 = t1 * t5;
+    const real t53 = t52 * t23;
+    const real t54 = t51 - t53;
+    const real t55 = t0 * t11;
+    const real t56 = t13 * t6;
+    const real t57 = t55 - t56;
+    const real t58 = t54 - t57;
+    d_R[5] = t58;
+    const real t59 = -t14;
+    d_R[6] = t59;
+    const real t60 = t4 * t11;
+    const real t61 = t13 * t2;
+    const real t62 = t60 - t61;
+    d_R[7] = t62;
+    const real t63 = t10 * t2;
+    const real t64 = t4 * t23;
+    const real t65 = t63 + t64;
+    const real t66 = -t65;
+    d_R[8] = t66;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = 0.0;
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_H[6] = 0.0;
+    d_H[7] = 0.0;
+    d_H[8] = 0.0;
+    d_H[9] = 0.0;
+    d_H[10] = 0.0;
+    d_H[11] = t59;
+    d_H[12] = 0.0;
+    const real t67 = -t23;
+    d_H[13] = t67;
+    d_H[14] = t62;
+    d_H[15] = 0.0;
+    const real t68 = -t11;
+    d_H[16] = t68;
+    d_H[17] = t66;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = 0.0;
+    const real t69 = u[2] * t14;
+    const real t70 = t1 * d_u[2];
+    const real t71 = t69 + t70;
+    const real t72 = d_u[0] - t71;
+    d_w[0] = t72;
+    const real t73 = u[2] * t62;
+    const real t74 = t4 * t13;
+    const real t75 = t74 * d_u[2];
+    const real t76 = t73 + t75;
+    const real t77 = t10 * d_u[1];
+    const real t78 = u[1] * t23;
+    const real t79 = t77 - t78;
+    const real t80 = t76 + t79;
+    d_w[1] = t80;
+    const real t81 = t4 * t10;
+    const real t82 = t81 * d_u[2];
+    const real t83 = u[2] * t65;
+    const real t84 = t82 - t83;
+    const real t85 = u[1] * t11;
+    const real t86 = t13 * d_u[1];
+    const real t87 = t85 + t86;
+    const real t88 = t84 - t87;
+    d_w[2] = t88;
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    const real t89 = t4 * u[1];
+    const real t90 = t89 * d_u[2];
+    const real t91 = t4 * d_u[1];
+    const real t92 = u[1] * t2;
+    const real t93 = t91 - t92;
+    const real t94 = u[2] * t93;
+    const real t95 = t90 + t94;
+    const real t96 = -t95;
+    d_c[3] = t96;
+    const real t97 = t81 * u[2];
+    const real t98 = t13 * u[1];
+    const real t99 = t97 - t98;
+    const real t100 = t99 * d_u[0];
+    const real t101 = u[0] * t88;
+    const real t102 = t100 + t101;
+    const real t103 = t18 * u[1];
+    const real t104 = t103 * d_u[2];
+    const real t105 = u[1] * t16;
+    const real t106 = t18 * d_u[1];
+    const real t107 = t105 + t106;
+    const real t108 = u[2] * t107;
+    const real t109 = t104 + t108;
+    const real t110 = t102 - t109;
+    d_c[4] = t110;
+    const real t111 = t31 * u[1];
+    const real t112 = t111 * d_u[2];
+    const real t113 = u[1] * t29;
+    const real t114 = t31 * d_u[1];
+    const real t115 = t113 + t114;
+    const real t116 = u[2] * t115;
+    const real t117 = t112 + t116;
+    const real t118 = t10 * u[1];
+    const real t119 = t74 * u[2];
+    const real t120 = t118 + t119;
+    const real t121 = t120 * d_u[0];
+    const real t122 = u[0] * t80;
+    const real t123 = t121 + t122;
+    const real t124 = t117 + t123;
+    const real t125 = -t124;
+    d_c[5] = t125;
+    d_qdot[0] = d_u[0];
+    d_qdot[1] = d_u[1];
+    d_qdot[2] = d_u[2];
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"d_q", 3, "", 0, 0},
+    {"d_u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 3, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_gimbal_q_names[] = {
     "angle1", "angle2", "angle3",
 };
@@ -1459,13 +1681,25 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_gimbal_hinge_slope,
+        .call = mstmm_hinge_gimbal_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_gimbal_hinge_slope_inputs,
+        .outputs = mstmm_hinge_gimbal_hinge_slope_outputs,
+        .ir_hash = "2a5d8027188443898bd2a08d1e47967e1a76f8db941d8ae64a8171f65641358c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "89c855b223d77453285ffc8457140e4333a2f8fe8759a392516eb42f985c24ce",
+    .hash = "7dcf3b78321fb555d5665f5ff2596f41edf6adaf29dfe183e47b7735258cd91e",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1475,6 +1709,6 @@ const mstmm_element mstmm_hinge_gimbal = {
     .u_units = mstmm_hinge_gimbal_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 6,
     .kernels = mstmm_hinge_gimbal_kernels,
 };

@@ -24,6 +24,10 @@ int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
     const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
@@ -853,6 +857,92 @@ static const mstmm_port mstmm_hinge_pin_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
+ * in  p[0] parameters
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * in  d_q[1] derivative of q
+ * in  d_u[1] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[1] derivative of qdot
+ */
+int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    (void)u;
+    const real t0 = sin(q[0]);
+    const real t1 = t0 * d_q[0];
+    const real t2 = -t1;
+    d_R[0] = t2;
+    const real t3 = cos(q[0]);
+    const real t4 = t3 * d_q[0];
+    const real t5 = -t4;
+    d_R[1] = t5;
+    d_R[2] = 0.0;
+    d_R[3] = t4;
+    d_R[4] = t2;
+    d_R[5] = 0.0;
+    d_R[6] = 0.0;
+    d_R[7] = 0.0;
+    d_R[8] = 0.0;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = 0.0;
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = 0.0;
+    d_w[0] = 0.0;
+    d_w[1] = 0.0;
+    d_w[2] = d_u[0];
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    d_qdot[0] = d_u[0];
+    return 0;
+}
+
+static int mstmm_hinge_pin_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_pin_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_pin_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"d_q", 1, "", 0, 0},
+    {"d_u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_pin_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 1, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_pin_q_names[] = {
     "angle",
 };
@@ -918,13 +1008,25 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_pin_hinge_slope,
+        .call = mstmm_hinge_pin_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_pin_hinge_slope_inputs,
+        .outputs = mstmm_hinge_pin_hinge_slope_outputs,
+        .ir_hash = "3307cc5226bba84468699030adee6342767f21ea1aafb24960a4043d50edaeae",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "67698891f74e2265d10c6d6c4c3c5361fbbcd70c10cfef85a3070909090a84d8",
+    .hash = "75fd87dbc4078973ae6bc6ef9cd217b18807bbd586177bfa3b339b443a7697ca",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -934,6 +1036,6 @@ const mstmm_element mstmm_hinge_pin = {
     .u_units = mstmm_hinge_pin_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_pin_kernels,
 };

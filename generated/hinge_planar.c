@@ -23,6 +23,10 @@ int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
 int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the planar hinge
  * in  p[0] parameters
@@ -1222,6 +1226,118 @@ static const mstmm_port mstmm_hinge_planar_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
+ * in  d_q[3] derivative of q
+ * in  d_u[3] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][3] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[3] derivative of qdot
+ */
+int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    const real t0 = sin(q[2]);
+    const real t1 = t0 * d_q[2];
+    const real t2 = -t1;
+    d_R[0] = t2;
+    const real t3 = cos(q[2]);
+    const real t4 = t3 * d_q[2];
+    const real t5 = -t4;
+    d_R[1] = t5;
+    d_R[2] = 0.0;
+    d_R[3] = t4;
+    d_R[4] = t2;
+    d_R[5] = 0.0;
+    d_R[6] = 0.0;
+    d_R[7] = 0.0;
+    d_R[8] = 0.0;
+    d_d[0] = d_q[0];
+    d_d[1] = d_q[1];
+    d_d[2] = 0.0;
+    d_H[0] = t2;
+    d_H[1] = t4;
+    d_H[2] = 0.0;
+    d_H[3] = t5;
+    d_H[4] = t2;
+    d_H[5] = 0.0;
+    d_H[6] = 0.0;
+    d_H[7] = 0.0;
+    d_H[8] = 0.0;
+    d_H[9] = 0.0;
+    d_H[10] = 0.0;
+    d_H[11] = 0.0;
+    d_H[12] = 0.0;
+    d_H[13] = 0.0;
+    d_H[14] = 0.0;
+    d_H[15] = 0.0;
+    d_H[16] = 0.0;
+    d_H[17] = 0.0;
+    const real t6 = t3 * d_u[0];
+    const real t7 = u[0] * t1;
+    const real t8 = t6 - t7;
+    const real t9 = u[1] * t4;
+    const real t10 = t0 * d_u[1];
+    const real t11 = t9 + t10;
+    const real t12 = t8 + t11;
+    d_v[0] = t12;
+    const real t13 = t3 * d_u[1];
+    const real t14 = u[1] * t1;
+    const real t15 = t13 - t14;
+    const real t16 = u[0] * t4;
+    const real t17 = t0 * d_u[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 - t18;
+    d_v[1] = t19;
+    d_v[2] = 0.0;
+    d_w[0] = 0.0;
+    d_w[1] = 0.0;
+    d_w[2] = d_u[2];
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    d_qdot[0] = d_u[0];
+    d_qdot[1] = d_u[1];
+    d_qdot[2] = d_u[2];
+    return 0;
+}
+
+static int mstmm_hinge_planar_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_planar_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"d_q", 3, "", 0, 0},
+    {"d_u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 3, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_planar_q_names[] = {
     "x", "y", "angle",
 };
@@ -1287,13 +1403,25 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_planar_hinge_slope,
+        .call = mstmm_hinge_planar_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_planar_hinge_slope_inputs,
+        .outputs = mstmm_hinge_planar_hinge_slope_outputs,
+        .ir_hash = "0d25ffe1d69d18767b2158eb8ec5c8ff19d125b4f93dec0038c4a375387d6565",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "162d79cbd607a7831b8e2d7564575d022f51aa303da7cba7925f236f0a7e91af",
+    .hash = "2943b2afae7c6410fed5e5ea90c9f412d68d488ff2104dc7bfa1d372a54e255e",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1303,6 +1431,6 @@ const mstmm_element mstmm_hinge_planar = {
     .u_units = mstmm_hinge_planar_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_planar_kernels,
 };

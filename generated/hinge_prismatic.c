@@ -23,6 +23,10 @@ int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
@@ -850,6 +854,86 @@ static const mstmm_port mstmm_hinge_prismatic_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[0] parameters
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
+ * in  d_q[1] derivative of q
+ * in  d_u[1] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[1] derivative of qdot
+ */
+int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    d_R[0] = 0.0;
+    d_R[1] = 0.0;
+    d_R[2] = 0.0;
+    d_R[3] = 0.0;
+    d_R[4] = 0.0;
+    d_R[5] = 0.0;
+    d_R[6] = 0.0;
+    d_R[7] = 0.0;
+    d_R[8] = 0.0;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = d_q[0];
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = d_u[0];
+    d_w[0] = 0.0;
+    d_w[1] = 0.0;
+    d_w[2] = 0.0;
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    d_c[3] = 0.0;
+    d_c[4] = 0.0;
+    d_c[5] = 0.0;
+    d_qdot[0] = d_u[0];
+    return 0;
+}
+
+static int mstmm_hinge_prismatic_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_prismatic_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_prismatic_hinge_slope_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"d_q", 1, "", 0, 0},
+    {"d_u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_prismatic_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 1, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_prismatic_q_names[] = {
     "displacement",
 };
@@ -915,13 +999,25 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_prismatic_hinge_slope,
+        .call = mstmm_hinge_prismatic_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_prismatic_hinge_slope_inputs,
+        .outputs = mstmm_hinge_prismatic_hinge_slope_outputs,
+        .ir_hash = "d27afe4d33b3298dab9f8723fac19f4e80e88202374ca09f1e725c5c2888d1e5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "4ec391a65a675b2f6c6a17bd9fc7d6e537da45302eb1842205be0b65aa12677c",
+    .hash = "720a0ac66f5ef5facf4dae4b31638879f46a4130554c261030b08afea313aa1a",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -931,6 +1027,6 @@ const mstmm_element mstmm_hinge_prismatic = {
     .u_units = mstmm_hinge_prismatic_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_prismatic_kernels,
 };

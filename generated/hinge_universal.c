@@ -23,6 +23,10 @@ int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict
 int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
     const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot);
 
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
@@ -1131,6 +1135,159 @@ static const mstmm_port mstmm_hinge_universal_recover_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* hinge and its derivative along a direction
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
+ * in  d_q[2] derivative of q
+ * in  d_u[2] derivative of u
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H[6][2] derivative of H
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_qdot[2] derivative of qdot
+ */
+int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c, real *restrict d_qdot)
+{
+    const real t0 = cos(p[0]);
+    const real t1 = sin(q[1]);
+    const real t2 = cos(q[0]);
+    const real t3 = t2 * d_q[0];
+    const real t4 = t1 * t3;
+    const real t5 = sin(q[0]);
+    const real t6 = cos(q[1]);
+    const real t7 = t6 * d_q[1];
+    const real t8 = t5 * t7;
+    const real t9 = t4 + t8;
+    const real t10 = t0 * t9;
+    const real t11 = t5 * d_q[0];
+    const real t12 = t6 * t11;
+    const real t13 = t1 * d_q[1];
+    const real t14 = t2 * t13;
+    const real t15 = t12 + t14;
+    const real t16 = t10 + t15;
+    const real t17 = -t16;
+    d_R[0] = t17;
+    const real t18 = t0 * t3;
+    const real t19 = t6 * t18;
+    const real t20 = t5 * t0;
+    const real t21 = t20 * t13;
+    const real t22 = t19 - t21;
+    const real t23 = t2 * t7;
+    const real t24 = t1 * t11;
+    const real t25 = t23 - t24;
+    const real t26 = t22 + t25;
+    const real t27 = -t26;
+    d_R[1] = t27;
+    const real t28 = sin(p[0]);
+    const real t29 = t28 * t3;
+    d_R[2] = t29;
+    const real t30 = t0 * t7;
+    const real t31 = t2 * t30;
+    const real t32 = t1 * t0;
+    const real t33 = t32 * t11;
+    const real t34 = t31 - t33;
+    const real t35 = t6 * t3;
+    const real t36 = t5 * t13;
+    const real t37 = t35 - t36;
+    const real t38 = t34 + t37;
+    d_R[3] = t38;
+    const real t39 = t2 * t0;
+    const real t40 = t39 * t13;
+    const real t41 = t0 * t11;
+    const real t42 = t6 * t41;
+    const real t43 = t40 + t42;
+    const real t44 = t9 + t43;
+    const real t45 = -t44;
+    d_R[4] = t45;
+    const real t46 = t28 * t11;
+    d_R[5] = t46;
+    const real t47 = t28 * t7;
+    d_R[6] = t47;
+    const real t48 = t28 * t13;
+    const real t49 = -t48;
+    d_R[7] = t49;
+    d_R[8] = 0.0;
+    d_d[0] = 0.0;
+    d_d[1] = 0.0;
+    d_d[2] = 0.0;
+    d_H[0] = 0.0;
+    d_H[1] = 0.0;
+    d_H[2] = 0.0;
+    d_H[3] = 0.0;
+    d_H[4] = 0.0;
+    d_H[5] = 0.0;
+    d_H[6] = t47;
+    d_H[7] = 0.0;
+    d_H[8] = t49;
+    d_H[9] = 0.0;
+    d_H[10] = 0.0;
+    d_H[11] = 0.0;
+    d_v[0] = 0.0;
+    d_v[1] = 0.0;
+    d_v[2] = 0.0;
+    const real t50 = u[0] * t47;
+    const real t51 = t1 * t28;
+    const real t52 = t51 * d_u[0];
+    const real t53 = t50 + t52;
+    d_w[0] = t53;
+    const real t54 = t6 * t28;
+    const real t55 = t54 * d_u[0];
+    const real t56 = u[0] * t48;
+    const real t57 = t55 - t56;
+    d_w[1] = t57;
+    const real t58 = t0 * d_u[0];
+    const real t59 = d_u[1] + t58;
+    d_w[2] = t59;
+    d_c[0] = 0.0;
+    d_c[1] = 0.0;
+    d_c[2] = 0.0;
+    const real t60 = u[1] * t57;
+    const real t61 = t54 * u[0];
+    const real t62 = t61 * d_u[1];
+    const real t63 = t60 + t62;
+    d_c[3] = t63;
+    const real t64 = u[1] * t53;
+    const real t65 = t51 * u[0];
+    const real t66 = t65 * d_u[1];
+    const real t67 = t64 + t66;
+    const real t68 = -t67;
+    d_c[4] = t68;
+    d_c[5] = 0.0;
+    d_qdot[0] = d_u[0];
+    d_qdot[1] = d_u[1];
+    return 0;
+}
+
+static int mstmm_hinge_universal_hinge_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_hinge_universal_hinge_slope_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+    {"d_q", 2, "", 0, 0},
+    {"d_u", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_hinge_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H", 12, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_qdot", 2, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_universal_q_names[] = {
     "angle1", "angle2",
 };
@@ -1204,13 +1361,25 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "hinge_slope",
+        .function = (void (*)(void))mstmm_hinge_universal_hinge_slope,
+        .call = mstmm_hinge_universal_hinge_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 7,
+        .inputs = mstmm_hinge_universal_hinge_slope_inputs,
+        .outputs = mstmm_hinge_universal_hinge_slope_outputs,
+        .ir_hash = "62784c1b755e64a4d5f01ab6a770b499f3e3d1ac3e33757cdbd24384ea4a197a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "e572018f9c9fb8bf87bbe24687326a794a02688cd0661e992974b1af1a789b23",
+    .hash = "a644652754f84178d9ae07bcb49e3f954f0ac0dc5408c6027145146de80d31b7",
     .nq = 2,
     .nu = 2,
     .np = 1,
@@ -1220,6 +1389,6 @@ const mstmm_element mstmm_hinge_universal = {
     .u_units = mstmm_hinge_universal_u_units,
     .p_names = mstmm_hinge_universal_p_names,
     .p_units = mstmm_hinge_universal_p_units,
-    .n_kernels = 4,
+    .n_kernels = 5,
     .kernels = mstmm_hinge_universal_kernels,
 };

@@ -323,6 +323,233 @@ static inline int mstmm_frames_state_deviation_by(struct mstmm_frames_state_devi
 }
 #define mstmm_frames_state_deviation(...) mstmm_frames_state_deviation_by((struct mstmm_frames_state_deviation){__VA_ARGS__})
 
+struct mstmm_frames_tangent_carry {
+    const real *Rc;
+    const real *r;
+    const real *w_I;
+    const real *v;
+    const real *w;
+    const real *S;
+    real *T;
+    real *S_I;
+};
+static inline int mstmm_frames_tangent_carry_by(struct mstmm_frames_tangent_carry to)
+{
+    return mstmm_sweep_frames_tangent_carry(
+        to.Rc, to.r, to.w_I, to.v, to.w, to.S, to.T, to.S_I);
+}
+#define mstmm_frames_tangent_carry(...) mstmm_frames_tangent_carry_by((struct mstmm_frames_tangent_carry){__VA_ARGS__})
+
+struct mstmm_frames_tangent_moved {
+    const real *Rc;
+    const real *r;
+    const real *w_I;
+    const real *v;
+    const real *w;
+    const real *z_I;
+    real *z;
+};
+static inline int mstmm_frames_tangent_moved_by(struct mstmm_frames_tangent_moved to)
+{
+    return mstmm_sweep_frames_tangent_moved(
+        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.z);
+}
+#define mstmm_frames_tangent_moved(...) mstmm_frames_tangent_moved_by((struct mstmm_frames_tangent_moved){__VA_ARGS__})
+
+struct mstmm_frames_tangent_turned {
+    const real *Rc;
+    const real *d_Rc;
+    const real *d_r;
+    const real *f;
+    real *G;
+};
+static inline int mstmm_frames_tangent_turned_by(struct mstmm_frames_tangent_turned to)
+{
+    return mstmm_sweep_frames_tangent_turned(
+        to.Rc, to.d_Rc, to.d_r, to.f, to.G);
+}
+#define mstmm_frames_tangent_turned(...) mstmm_frames_tangent_turned_by((struct mstmm_frames_tangent_turned){__VA_ARGS__})
+
+struct mstmm_frames_pose_slope {
+    const real *A_I;
+    const real *x_I;
+    const real *Rc;
+    const real *r;
+    const real *d_A_I;
+    const real *d_x_I;
+    const real *d_Rc;
+    const real *d_r;
+    real *d_A;
+    real *d_x;
+};
+static inline int mstmm_frames_pose_slope_by(struct mstmm_frames_pose_slope to)
+{
+    return mstmm_sweep_frames_pose_slope(
+        to.A_I, to.x_I, to.Rc, to.r, to.d_A_I, to.d_x_I, to.d_Rc, to.d_r, to.d_A, to.d_x);
+}
+#define mstmm_frames_pose_slope(...) mstmm_frames_pose_slope_by((struct mstmm_frames_pose_slope){__VA_ARGS__})
+
+struct mstmm_frames_velocity_slope {
+    const real *Rc;
+    const real *r;
+    const real *v_I;
+    const real *w_I;
+    const real *v_rel;
+    const real *d_Rc;
+    const real *d_r;
+    const real *d_v_I;
+    const real *d_w_I;
+    const real *d_v_rel;
+    real *d_v;
+};
+static inline int mstmm_frames_velocity_slope_by(struct mstmm_frames_velocity_slope to)
+{
+    return mstmm_sweep_frames_velocity_slope(
+        to.Rc, to.r, to.v_I, to.w_I, to.v_rel, to.d_Rc, to.d_r, to.d_v_I, to.d_w_I, to.d_v_rel,
+        to.d_v);
+}
+#define mstmm_frames_velocity_slope(...) mstmm_frames_velocity_slope_by((struct mstmm_frames_velocity_slope){__VA_ARGS__})
+
+struct mstmm_frames_point_slope {
+    const real *A;
+    const real *x;
+    const real *v;
+    const real *motion;
+    const real *delta;
+    const real *offset;
+    const real *gravity;
+    const real *d_A;
+    const real *d_x;
+    const real *d_v;
+    const real *d_motion;
+    real *d_x_K;
+    real *d_v_K;
+};
+static inline int mstmm_frames_point_slope_by(struct mstmm_frames_point_slope to)
+{
+    return mstmm_sweep_frames_point_slope(
+        to.A, to.x, to.v, to.motion, to.delta, to.offset, to.gravity, to.d_A, to.d_x, to.d_v,
+        to.d_motion, to.d_x_K, to.d_v_K);
+}
+#define mstmm_frames_point_slope(...) mstmm_frames_point_slope_by((struct mstmm_frames_point_slope){__VA_ARGS__})
+
+struct mstmm_frames_turning_slope {
+    const real *A;
+    const real *motion;
+    const real *delta;
+    const real *d_A;
+    const real *d_motion;
+    real *d_w_K;
+};
+static inline int mstmm_frames_turning_slope_by(struct mstmm_frames_turning_slope to)
+{
+    return mstmm_sweep_frames_turning_slope(
+        to.A, to.motion, to.delta, to.d_A, to.d_motion, to.d_w_K);
+}
+#define mstmm_frames_turning_slope(...) mstmm_frames_turning_slope_by((struct mstmm_frames_turning_slope){__VA_ARGS__})
+
+struct mstmm_frames_end_frame_slope {
+    const real *A;
+    const real *R_end;
+    const real *d_A;
+    real *d_A_end;
+};
+static inline int mstmm_frames_end_frame_slope_by(struct mstmm_frames_end_frame_slope to)
+{
+    return mstmm_sweep_frames_end_frame_slope(
+        to.A, to.R_end, to.d_A, to.d_A_end);
+}
+#define mstmm_frames_end_frame_slope(...) mstmm_frames_end_frame_slope_by((struct mstmm_frames_end_frame_slope){__VA_ARGS__})
+
+struct mstmm_frames_applied_load_slope {
+    const real *A;
+    const real *A_F;
+    const real *offset;
+    const real *F;
+    const real *M;
+    const real *d_A;
+    const real *d_A_F;
+    const real *d_F;
+    const real *d_M;
+    real *d_e;
+};
+static inline int mstmm_frames_applied_load_slope_by(struct mstmm_frames_applied_load_slope to)
+{
+    return mstmm_sweep_frames_applied_load_slope(
+        to.A, to.A_F, to.offset, to.F, to.M, to.d_A, to.d_A_F, to.d_F, to.d_M, to.d_e);
+}
+#define mstmm_frames_applied_load_slope(...) mstmm_frames_applied_load_slope_by((struct mstmm_frames_applied_load_slope){__VA_ARGS__})
+
+struct mstmm_frames_opposite_slope {
+    const real *x_F;
+    const real *x_T;
+    const real *F;
+    const real *M;
+    const real *d_x_F;
+    const real *d_x_T;
+    const real *d_F;
+    const real *d_M;
+    real *d_F_back;
+    real *d_M_back;
+};
+static inline int mstmm_frames_opposite_slope_by(struct mstmm_frames_opposite_slope to)
+{
+    return mstmm_sweep_frames_opposite_slope(
+        to.x_F, to.x_T, to.F, to.M, to.d_x_F, to.d_x_T, to.d_F, to.d_M, to.d_F_back, to.d_M_back);
+}
+#define mstmm_frames_opposite_slope(...) mstmm_frames_opposite_slope_by((struct mstmm_frames_opposite_slope){__VA_ARGS__})
+
+struct mstmm_frames_transport_slope {
+    const real *Rc;
+    const real *r;
+    const real *e;
+    const real *d_Rc;
+    const real *d_r;
+    const real *d_e;
+    real *d_e_I;
+};
+static inline int mstmm_frames_transport_slope_by(struct mstmm_frames_transport_slope to)
+{
+    return mstmm_sweep_frames_transport_slope(
+        to.Rc, to.r, to.e, to.d_Rc, to.d_r, to.d_e, to.d_e_I);
+}
+#define mstmm_frames_transport_slope(...) mstmm_frames_transport_slope_by((struct mstmm_frames_transport_slope){__VA_ARGS__})
+
+struct mstmm_frames_driven_effort_slope {
+    const real *felt;
+    const real *J;
+    const real *udot;
+    const real *tau;
+    const real *d_felt;
+    const real *d_udot;
+    const real *d_tau;
+    real *d_tau_d;
+};
+static inline int mstmm_frames_driven_effort_slope_by(struct mstmm_frames_driven_effort_slope to)
+{
+    return mstmm_sweep_frames_driven_effort_slope(
+        to.felt, to.J, to.udot, to.tau, to.d_felt, to.d_udot, to.d_tau, to.d_tau_d);
+}
+#define mstmm_frames_driven_effort_slope(...) mstmm_frames_driven_effort_slope_by((struct mstmm_frames_driven_effort_slope){__VA_ARGS__})
+
+struct mstmm_frames_length_slope {
+    const real *x_F;
+    const real *v_F;
+    const real *x_T;
+    const real *v_T;
+    const real *d_x_F;
+    const real *d_v_F;
+    const real *d_x_T;
+    const real *d_v_T;
+    real *d_l;
+};
+static inline int mstmm_frames_length_slope_by(struct mstmm_frames_length_slope to)
+{
+    return mstmm_sweep_frames_length_slope(
+        to.x_F, to.v_F, to.x_T, to.v_T, to.d_x_F, to.d_v_F, to.d_x_T, to.d_v_T, to.d_l);
+}
+#define mstmm_frames_length_slope(...) mstmm_frames_length_slope_by((struct mstmm_frames_length_slope){__VA_ARGS__})
+
 struct mstmm_modal_residual {
     int n;
     const real *p;
@@ -663,6 +890,399 @@ static inline int mstmm_modal_answer_by(struct mstmm_modal_answer to)
 }
 #define mstmm_modal_answer(...) mstmm_modal_answer_by((struct mstmm_modal_answer){__VA_ARGS__})
 
+struct mstmm_modal_residual_slope {
+    int n;
+    const real *p;
+    const real *C;
+    const real *P;
+    const real *B;
+    const real *Z_xx;
+    const real *Z_xy;
+    const real *Z_xz;
+    const real *Z_yy;
+    const real *Z_yz;
+    const real *Z_zz;
+    const real *Y_x;
+    const real *Y_y;
+    const real *Y_z;
+    const real *G_x;
+    const real *G_y;
+    const real *G_z;
+    const real *M;
+    const real *K;
+    const real *D;
+    const real *eta;
+    const real *etad;
+    const real *motion;
+    const real *S_rf;
+    const real *A;
+    const real *d_eta;
+    const real *d_etad;
+    const real *d_motion;
+    real *d_S_rf;
+    real *d_A;
+    real *d_e;
+    real *d_e_f;
+};
+static inline int mstmm_modal_residual_slope_by(struct mstmm_modal_residual_slope to)
+{
+    return mstmm_sweep_modal_residual_slope(
+        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
+        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.K, to.D, to.eta, to.etad,
+        to.motion, to.S_rf, to.A, to.d_eta, to.d_etad, to.d_motion, to.d_S_rf, to.d_A, to.d_e,
+        to.d_e_f);
+}
+#define mstmm_modal_residual_slope(...) mstmm_modal_residual_slope_by((struct mstmm_modal_residual_slope){__VA_ARGS__})
+
+struct mstmm_modal_momentum_slope {
+    int n;
+    const real *p;
+    const real *C;
+    const real *P;
+    const real *B;
+    const real *Z_xx;
+    const real *Z_xy;
+    const real *Z_xz;
+    const real *Z_yy;
+    const real *Z_yz;
+    const real *Z_zz;
+    const real *Y_x;
+    const real *Y_y;
+    const real *Y_z;
+    const real *G_x;
+    const real *G_y;
+    const real *G_z;
+    const real *M;
+    const real *eta;
+    const real *etad;
+    const real *v;
+    const real *w;
+    const real *S_rf;
+    const real *A;
+    const real *h_f;
+    const real *d_eta;
+    const real *d_etad;
+    const real *d_v;
+    const real *d_w;
+    real *d_S_rf;
+    real *d_A;
+    real *d_h;
+    real *d_h_f;
+};
+static inline int mstmm_modal_momentum_slope_by(struct mstmm_modal_momentum_slope to)
+{
+    return mstmm_sweep_modal_momentum_slope(
+        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
+        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.eta, to.etad, to.v, to.w,
+        to.S_rf, to.A, to.h_f, to.d_eta, to.d_etad, to.d_v, to.d_w, to.d_S_rf, to.d_A, to.d_h,
+        to.d_h_f);
+}
+#define mstmm_modal_momentum_slope(...) mstmm_modal_momentum_slope_by((struct mstmm_modal_momentum_slope){__VA_ARGS__})
+
+struct mstmm_modal_section_slope {
+    int n;
+    const real *r;
+    const real *phi;
+    const real *theta;
+    const real *g_x;
+    const real *g_y;
+    const real *g_z;
+    const real *h_x;
+    const real *h_y;
+    const real *h_z;
+    const real *eta;
+    const real *etad;
+    const real *Phi;
+    const real *d_eta;
+    const real *d_etad;
+    real *d_Phi;
+    real *d_x;
+    real *d_Psi;
+    real *d_xd;
+    real *d_Psid;
+    real *d_xdd;
+    real *d_Psidd;
+};
+static inline int mstmm_modal_section_slope_by(struct mstmm_modal_section_slope to)
+{
+    return mstmm_sweep_modal_section_slope(
+        to.n, to.r, to.phi, to.theta, to.g_x, to.g_y, to.g_z, to.h_x, to.h_y, to.h_z, to.eta,
+        to.etad, to.Phi, to.d_eta, to.d_etad, to.d_Phi, to.d_x, to.d_Psi, to.d_xd, to.d_Psid,
+        to.d_xdd, to.d_Psidd);
+}
+#define mstmm_modal_section_slope(...) mstmm_modal_section_slope_by((struct mstmm_modal_section_slope){__VA_ARGS__})
+
+struct mstmm_modal_outward_slope {
+    const real *R_end;
+    const real *x;
+    const real *Psi;
+    const real *xd;
+    const real *Psid;
+    const real *xdd;
+    const real *Psidd;
+    const real *d_x;
+    const real *d_Psi;
+    const real *d_xd;
+    const real *d_Psid;
+    const real *d_xdd;
+    const real *d_Psidd;
+    real *d_R;
+    real *d_d;
+    real *d_H6;
+    real *d_v;
+    real *d_w;
+    real *d_c;
+};
+static inline int mstmm_modal_outward_slope_by(struct mstmm_modal_outward_slope to)
+{
+    return mstmm_sweep_modal_outward_slope(
+        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
+        to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
+}
+#define mstmm_modal_outward_slope(...) mstmm_modal_outward_slope_by((struct mstmm_modal_outward_slope){__VA_ARGS__})
+
+struct mstmm_modal_inward_slope {
+    const real *R_end;
+    const real *x;
+    const real *Psi;
+    const real *xd;
+    const real *Psid;
+    const real *xdd;
+    const real *Psidd;
+    const real *d_x;
+    const real *d_Psi;
+    const real *d_xd;
+    const real *d_Psid;
+    const real *d_xdd;
+    const real *d_Psidd;
+    real *d_R;
+    real *d_d;
+    real *d_H6;
+    real *d_v;
+    real *d_w;
+    real *d_c;
+};
+static inline int mstmm_modal_inward_slope_by(struct mstmm_modal_inward_slope to)
+{
+    return mstmm_sweep_modal_inward_slope(
+        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
+        to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
+}
+#define mstmm_modal_inward_slope(...) mstmm_modal_inward_slope_by((struct mstmm_modal_inward_slope){__VA_ARGS__})
+
+struct mstmm_modal_subspace_slope {
+    int n;
+    const real *H6;
+    const real *Phi;
+    const real *d_H6;
+    const real *d_Phi;
+    real *d_H;
+};
+static inline int mstmm_modal_subspace_slope_by(struct mstmm_modal_subspace_slope to)
+{
+    return mstmm_sweep_modal_subspace_slope(
+        to.n, to.H6, to.Phi, to.d_H6, to.d_Phi, to.d_H);
+}
+#define mstmm_modal_subspace_slope(...) mstmm_modal_subspace_slope_by((struct mstmm_modal_subspace_slope){__VA_ARGS__})
+
+struct mstmm_modal_imposed_slope {
+    int n;
+    const real *H;
+    const real *s;
+    const real *c;
+    const real *d_H;
+    const real *d_s;
+    const real *d_c;
+    real *d_c_s;
+};
+static inline int mstmm_modal_imposed_slope_by(struct mstmm_modal_imposed_slope to)
+{
+    return mstmm_sweep_modal_imposed_slope(
+        to.n, to.H, to.s, to.c, to.d_H, to.d_s, to.d_c, to.d_c_s);
+}
+#define mstmm_modal_imposed_slope(...) mstmm_modal_imposed_slope_by((struct mstmm_modal_imposed_slope){__VA_ARGS__})
+
+struct mstmm_modal_prescribed_slope {
+    int n;
+    const real *S_rf;
+    const real *S_ff;
+    const real *s;
+    const real *d_S_rf;
+    const real *d_s;
+    real *d_e;
+    real *d_e_f;
+};
+static inline int mstmm_modal_prescribed_slope_by(struct mstmm_modal_prescribed_slope to)
+{
+    return mstmm_sweep_modal_prescribed_slope(
+        to.n, to.S_rf, to.S_ff, to.s, to.d_S_rf, to.d_s, to.d_e, to.d_e_f);
+}
+#define mstmm_modal_prescribed_slope(...) mstmm_modal_prescribed_slope_by((struct mstmm_modal_prescribed_slope){__VA_ARGS__})
+
+struct mstmm_modal_modal_effort_slope {
+    int n;
+    const real *H;
+    const real *e;
+    const real *e_f;
+    const real *d_H;
+    const real *d_e;
+    const real *d_e_f;
+    real *d_tau;
+};
+static inline int mstmm_modal_modal_effort_slope_by(struct mstmm_modal_modal_effort_slope to)
+{
+    return mstmm_sweep_modal_modal_effort_slope(
+        to.n, to.H, to.e, to.e_f, to.d_H, to.d_e, to.d_e_f, to.d_tau);
+}
+#define mstmm_modal_modal_effort_slope(...) mstmm_modal_modal_effort_slope_by((struct mstmm_modal_modal_effort_slope){__VA_ARGS__})
+
+struct mstmm_tangent_node {
+    int n;
+    const real *H;
+    const real *B;
+    const real *G;
+    const real *W;
+    const real *S;
+    real *V;
+    real *D;
+    real *right;
+    real *gain;
+    real *S_c;
+    real *work;
+};
+static inline int mstmm_tangent_node_by(struct mstmm_tangent_node to)
+{
+    return mstmm_sweep_tangent_node(
+        to.n, to.H, to.B, to.G, to.W, to.S, to.V, to.D, to.right, to.gain, to.S_c, to.work);
+}
+#define mstmm_tangent_node(...) mstmm_tangent_node_by((struct mstmm_tangent_node){__VA_ARGS__})
+
+struct mstmm_tangent_node_own {
+    int n;
+    const real *H;
+    const real *B;
+    const real *G;
+    const real *W;
+    const real *S;
+    const real *K;
+    const real *Z_z;
+    const real *Z_x;
+    real *V;
+    real *D;
+    real *right;
+    real *gain;
+    real *S_c;
+    real *work;
+};
+static inline int mstmm_tangent_node_own_by(struct mstmm_tangent_node_own to)
+{
+    return mstmm_sweep_tangent_node_own(
+        to.n, to.H, to.B, to.G, to.W, to.S, to.K, to.Z_z, to.Z_x, to.V, to.D, to.right, to.gain,
+        to.S_c, to.work);
+}
+#define mstmm_tangent_node_own(...) mstmm_tangent_node_own_by((struct mstmm_tangent_node_own){__VA_ARGS__})
+
+struct mstmm_tangent_absorb {
+    int n;
+    const real *Rc;
+    const real *r;
+    const real *H;
+    const real *B;
+    const real *G;
+    const real *W;
+    const real *S;
+    const real *T;
+    real *K_x;
+    real *K;
+    real *Z_z;
+    real *Z_x;
+};
+static inline int mstmm_tangent_absorb_by(struct mstmm_tangent_absorb to)
+{
+    return mstmm_sweep_tangent_absorb(
+        to.n, to.Rc, to.r, to.H, to.B, to.G, to.W, to.S, to.T, to.K_x, to.K, to.Z_z, to.Z_x);
+}
+#define mstmm_tangent_absorb(...) mstmm_tangent_absorb_by((struct mstmm_tangent_absorb){__VA_ARGS__})
+
+struct mstmm_tangent_push {
+    int n;
+    const real *H;
+    const real *V;
+    const real *D;
+    const real *e;
+    const real *e_f;
+    real *rest;
+    real *y;
+    real *e_c;
+    real *work;
+};
+static inline int mstmm_tangent_push_by(struct mstmm_tangent_push to)
+{
+    return mstmm_sweep_tangent_push(
+        to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y, to.e_c, to.work);
+}
+#define mstmm_tangent_push(...) mstmm_tangent_push_by((struct mstmm_tangent_push){__VA_ARGS__})
+
+struct mstmm_tangent_answer {
+    int n;
+    const real *B;
+    const real *gain;
+    const real *y;
+    const real *z_c;
+    real *x;
+    real *z;
+};
+static inline int mstmm_tangent_answer_by(struct mstmm_tangent_answer to)
+{
+    return mstmm_sweep_tangent_answer(
+        to.n, to.B, to.gain, to.y, to.z_c, to.x, to.z);
+}
+#define mstmm_tangent_answer(...) mstmm_tangent_answer_by((struct mstmm_tangent_answer){__VA_ARGS__})
+
+struct mstmm_tangent_displaced {
+    int n;
+    const real *B;
+    const real *x;
+    const real *z_c;
+    real *z;
+};
+static inline int mstmm_tangent_displaced_by(struct mstmm_tangent_displaced to)
+{
+    return mstmm_sweep_tangent_displaced(
+        to.n, to.B, to.x, to.z_c, to.z);
+}
+#define mstmm_tangent_displaced(...) mstmm_tangent_displaced_by((struct mstmm_tangent_displaced){__VA_ARGS__})
+
+struct mstmm_tangent_lag {
+    int n;
+    const real *sq;
+    const real *kappa;
+    const real *one;
+    const real *g_q;
+    real *A;
+    real *Q;
+    real *work;
+};
+static inline int mstmm_tangent_lag_by(struct mstmm_tangent_lag to)
+{
+    return mstmm_sweep_tangent_lag(
+        to.n, to.sq, to.kappa, to.one, to.g_q, to.A, to.Q, to.work);
+}
+#define mstmm_tangent_lag(...) mstmm_tangent_lag_by((struct mstmm_tangent_lag){__VA_ARGS__})
+
+struct mstmm_tangent_lagged {
+    int n;
+    const real *Q;
+    const real *rate;
+    real *dq;
+};
+static inline int mstmm_tangent_lagged_by(struct mstmm_tangent_lagged to)
+{
+    return mstmm_sweep_tangent_lagged(
+        to.n, to.Q, to.rate, to.dq);
+}
+#define mstmm_tangent_lagged(...) mstmm_tangent_lagged_by((struct mstmm_tangent_lagged){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;
@@ -898,6 +1518,62 @@ static inline int mstmm_generic_answer_by(int speeds, struct mstmm_generic_answe
 }
 #define mstmm_generic_answer(speeds, ...) mstmm_generic_answer_by(speeds, (struct mstmm_generic_answer){__VA_ARGS__})
 
+struct mstmm_generic_forward_slope {
+    const real *Rt;
+    const real *ro;
+    const real *R;
+    const real *d;
+    const real *H;
+    const real *v;
+    const real *w;
+    const real *c;
+    const real *s;
+    const real *motion_I;
+    const real *d_R;
+    const real *d_d;
+    const real *d_H;
+    const real *d_v;
+    const real *d_w;
+    const real *d_c;
+    const real *d_s;
+    const real *d_motion_I;
+    real *d_Rc;
+    real *d_r;
+    real *d_motion;
+};
+typedef int mstmm_generic_forward_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[];
+static inline int mstmm_generic_forward_slope_by(int speeds, struct mstmm_generic_forward_slope to)
+{
+    return mstmm_generic_forward_slope_table[speeds](
+        to.Rt, to.ro, to.R, to.d, to.H, to.v, to.w, to.c, to.s, to.motion_I, to.d_R, to.d_d,
+        to.d_H, to.d_v, to.d_w, to.d_c, to.d_s, to.d_motion_I, to.d_Rc, to.d_r, to.d_motion);
+}
+#define mstmm_generic_forward_slope(speeds, ...) mstmm_generic_forward_slope_by(speeds, (struct mstmm_generic_forward_slope){__VA_ARGS__})
+
+struct mstmm_generic_effort_slope {
+    const real *H;
+    const real *f;
+    const real *d_H;
+    const real *d_f;
+    real *d_tau;
+};
+typedef int mstmm_generic_effort_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict);
+extern mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[];
+static inline int mstmm_generic_effort_slope_by(int speeds, struct mstmm_generic_effort_slope to)
+{
+    return mstmm_generic_effort_slope_table[speeds](
+        to.H, to.f, to.d_H, to.d_f, to.d_tau);
+}
+#define mstmm_generic_effort_slope(speeds, ...) mstmm_generic_effort_slope_by(speeds, (struct mstmm_generic_effort_slope){__VA_ARGS__})
+
 struct mstmm_hinge_hinge {
     const real *p;
     const real *q;
@@ -1006,6 +1682,49 @@ static inline int mstmm_hinge_recover_by(void (*kernel)(void), struct mstmm_hing
 }
 #define mstmm_hinge_recover(kernel, ...) mstmm_hinge_recover_by(kernel, (struct mstmm_hinge_recover){__VA_ARGS__})
 
+struct mstmm_hinge_hinge_slope {
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *d_q;
+    const real *d_u;
+    real *d_R;
+    real *d_d;
+    real *d_H;
+    real *d_v;
+    real *d_w;
+    real *d_c;
+    real *d_qdot;
+};
+typedef int mstmm_hinge_hinge_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, real *restrict, real *restrict, real *restrict, real *restrict,
+    real *restrict, real *restrict, real *restrict);
+static inline int mstmm_hinge_hinge_slope_by(void (*kernel)(void), struct mstmm_hinge_hinge_slope to)
+{
+    return ((mstmm_hinge_hinge_slope_kernel *)kernel)(
+        to.p, to.q, to.u, to.d_q, to.d_u, to.d_R, to.d_d, to.d_H, to.d_v, to.d_w, to.d_c,
+        to.d_qdot);
+}
+#define mstmm_hinge_hinge_slope(kernel, ...) mstmm_hinge_hinge_slope_by(kernel, (struct mstmm_hinge_hinge_slope){__VA_ARGS__})
+#define MSTMM_HINGE_HINGE_SLOPE_INPUTS 5
+#define MSTMM_HINGE_HINGE_SLOPE_OUTPUTS 7
+static inline void mstmm_hinge_hinge_slope_arrays(struct mstmm_hinge_hinge_slope to, const real **inputs, real **outputs)
+{
+    inputs[0] = to.p;
+    inputs[1] = to.q;
+    inputs[2] = to.u;
+    inputs[3] = to.d_q;
+    inputs[4] = to.d_u;
+    outputs[0] = to.d_R;
+    outputs[1] = to.d_d;
+    outputs[2] = to.d_H;
+    outputs[3] = to.d_v;
+    outputs[4] = to.d_w;
+    outputs[5] = to.d_c;
+    outputs[6] = to.d_qdot;
+}
+
 struct mstmm_body_inertia {
     const real *p;
     real *S;
@@ -1047,6 +1766,35 @@ static inline int mstmm_body_energy_by(void (*kernel)(void), struct mstmm_body_e
         to.p, to.v, to.w, to.T);
 }
 #define mstmm_body_energy(kernel, ...) mstmm_body_energy_by(kernel, (struct mstmm_body_energy){__VA_ARGS__})
+
+struct mstmm_body_bias_load_slope {
+    const real *p;
+    const real *motion;
+    const real *d_motion;
+    real *d_e;
+};
+typedef int mstmm_body_bias_load_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+static inline int mstmm_body_bias_load_slope_by(void (*kernel)(void), struct mstmm_body_bias_load_slope to)
+{
+    return ((mstmm_body_bias_load_slope_kernel *)kernel)(
+        to.p, to.motion, to.d_motion, to.d_e);
+}
+#define mstmm_body_bias_load_slope(kernel, ...) mstmm_body_bias_load_slope_by(kernel, (struct mstmm_body_bias_load_slope){__VA_ARGS__})
+
+struct mstmm_body_load_by_motion {
+    const real *p;
+    const real *motion;
+    real *J;
+};
+typedef int mstmm_body_load_by_motion_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+static inline int mstmm_body_load_by_motion_by(void (*kernel)(void), struct mstmm_body_load_by_motion to)
+{
+    return ((mstmm_body_load_by_motion_kernel *)kernel)(
+        to.p, to.motion, to.J);
+}
+#define mstmm_body_load_by_motion(kernel, ...) mstmm_body_load_by_motion_by(kernel, (struct mstmm_body_load_by_motion){__VA_ARGS__})
 
 struct mstmm_law_coordinate {
     const real *p;
@@ -1090,6 +1838,49 @@ static inline int mstmm_law_quaternion_by(void (*kernel)(void), struct mstmm_law
 }
 #define mstmm_law_quaternion(kernel, ...) mstmm_law_quaternion_by(kernel, (struct mstmm_law_quaternion){__VA_ARGS__})
 
+struct mstmm_law_coordinate_slope {
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *effort;
+    const real *d_q;
+    const real *d_u;
+    const real *d_effort;
+    real *d_tau;
+};
+typedef int mstmm_law_coordinate_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+static inline int mstmm_law_coordinate_slope_by(void (*kernel)(void), struct mstmm_law_coordinate_slope to)
+{
+    return ((mstmm_law_coordinate_slope_kernel *)kernel)(
+        to.p, to.q, to.u, to.effort, to.d_q, to.d_u, to.d_effort, to.d_tau);
+}
+#define mstmm_law_coordinate_slope(kernel, ...) mstmm_law_coordinate_slope_by(kernel, (struct mstmm_law_coordinate_slope){__VA_ARGS__})
+
+struct mstmm_law_quaternion_slope {
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *B;
+    const real *effort;
+    const real *twist_ref;
+    const real *d_q;
+    const real *d_u;
+    const real *d_effort;
+    real *d_tau;
+};
+typedef int mstmm_law_quaternion_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, real *restrict);
+static inline int mstmm_law_quaternion_slope_by(void (*kernel)(void), struct mstmm_law_quaternion_slope to)
+{
+    return ((mstmm_law_quaternion_slope_kernel *)kernel)(
+        to.p, to.q, to.u, to.B, to.effort, to.twist_ref, to.d_q, to.d_u, to.d_effort, to.d_tau);
+}
+#define mstmm_law_quaternion_slope(kernel, ...) mstmm_law_quaternion_slope_by(kernel, (struct mstmm_law_quaternion_slope){__VA_ARGS__})
+
 struct mstmm_force_wrench {
     const real *p;
     const real *t;
@@ -1119,6 +1910,47 @@ static inline int mstmm_force_wrench_by(void (*kernel)(void), struct mstmm_force
         to.F, to.M, to.V, to.P);
 }
 #define mstmm_force_wrench(kernel, ...) mstmm_force_wrench_by(kernel, (struct mstmm_force_wrench){__VA_ARGS__})
+
+struct mstmm_force_wrench_slope {
+    const real *p;
+    const real *t;
+    const real *effort;
+    const real *A_F;
+    const real *x_F;
+    const real *v_F;
+    const real *w_F;
+    const real *A_T;
+    const real *x_T;
+    const real *v_T;
+    const real *w_T;
+    const real *d_t;
+    const real *d_effort;
+    const real *d_A_F;
+    const real *d_x_F;
+    const real *d_v_F;
+    const real *d_w_F;
+    const real *d_A_T;
+    const real *d_x_T;
+    const real *d_v_T;
+    const real *d_w_T;
+    real *d_F;
+    real *d_M;
+};
+typedef int mstmm_force_wrench_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, real *restrict, real *restrict);
+static inline int mstmm_force_wrench_slope_by(void (*kernel)(void), struct mstmm_force_wrench_slope to)
+{
+    return ((mstmm_force_wrench_slope_kernel *)kernel)(
+        to.p, to.t, to.effort, to.A_F, to.x_F, to.v_F, to.w_F, to.A_T, to.x_T, to.v_T, to.w_T,
+        to.d_t, to.d_effort, to.d_A_F, to.d_x_F, to.d_v_F, to.d_w_F, to.d_A_T, to.d_x_T, to.d_v_T,
+        to.d_w_T, to.d_F, to.d_M);
+}
+#define mstmm_force_wrench_slope(kernel, ...) mstmm_force_wrench_slope_by(kernel, (struct mstmm_force_wrench_slope){__VA_ARGS__})
 
 struct mstmm_link_angle {
     const real *link;

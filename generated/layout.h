@@ -35,7 +35,8 @@
 #define MSTMM_MODES_A_PER_MODE 12
 #define MSTMM_MODES_RIGHT_PER_MODE 18
 #define MSTMM_MODES_GAIN_PER_MODE 25
-#define MSTMM_MODES_S_FF_PER_MODE 32
+#define MSTMM_MODES_A_DRAG_PER_MODE 32
+#define MSTMM_MODES_S_FF_PER_MODE 38
 #define MSTMM_SECTION_PHI_PER_MODE 0
 #define MSTMM_SECTION_H_PER_MODE 6
 #define MSTMM_SECTION_PUSH_PER_MODE 12
@@ -48,10 +49,11 @@
 #define MSTMM_MODES_A(n) (12 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_MODES_RIGHT(n) (18 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_MODES_GAIN(n) (25 * (size_t)(n) + 0 * (size_t)(n) * (n))
-#define MSTMM_MODES_S_FF(n) (32 * (size_t)(n) + 0 * (size_t)(n) * (n))
-#define MSTMM_MODES_WORK(n) (32 * (size_t)(n) + 1 * (size_t)(n) * (n))
-#define MSTMM_MODES_E_F(n) (32 * (size_t)(n) + 2 * (size_t)(n) * (n))
-#define MSTMM_MODES_ETADD(n) (33 * (size_t)(n) + 2 * (size_t)(n) * (n))
+#define MSTMM_MODES_A_DRAG(n) (32 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_MODES_S_FF(n) (38 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_MODES_WORK(n) (38 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_MODES_E_F(n) (38 * (size_t)(n) + 2 * (size_t)(n) * (n))
+#define MSTMM_MODES_ETADD(n) (39 * (size_t)(n) + 2 * (size_t)(n) * (n))
 #define MSTMM_SECTION_PHI(n) (0 * (size_t)(n) + 0)
 #define MSTMM_SECTION_H(n) (6 * (size_t)(n) + 0)
 #define MSTMM_SECTION_PUSH(n) (12 * (size_t)(n) + 0)
@@ -62,5 +64,44 @@
 #define MSTMM_SECTION_PSID(n) (18 * (size_t)(n) + 45)
 #define MSTMM_SECTION_XDD(n) (18 * (size_t)(n) + 48)
 #define MSTMM_SECTION_PSIDD(n) (18 * (size_t)(n) + 51)
+/* What the tangent keeps of a body, of a flexible one, of a section. */
+#define MSTMM_TANGENT_S(nu, nq) (0)
+#define MSTMM_TANGENT_B(nu, nq) (54 * 1)
+#define MSTMM_TANGENT_G(nu, nq) (54 * 1 + 9 * (nu))
+#define MSTMM_TANGENT_W(nu, nq) (54 * 1 + 15 * (nu))
+#define MSTMM_TANGENT_LAWS(nu, nq) (54 * 1 + 15 * (nu) + 1 * (nu) * (nu))
+#define MSTMM_TANGENT_H(nu, nq) (54 * 1 + 15 * (nu) + 2 * (nu) * (nu))
+#define MSTMM_TANGENT_V(nu, nq) (54 * 1 + 21 * (nu) + 2 * (nu) * (nu))
+#define MSTMM_TANGENT_D(nu, nq) (54 * 1 + 27 * (nu) + 2 * (nu) * (nu))
+#define MSTMM_TANGENT_RIGHT(nu, nq) (54 * 1 + 27 * (nu) + 3 * (nu) * (nu))
+#define MSTMM_TANGENT_GAIN(nu, nq) (54 * 1 + 36 * (nu) + 3 * (nu) * (nu))
+#define MSTMM_TANGENT_WORK(nu, nq) (54 * 1 + 45 * (nu) + 3 * (nu) * (nu))
+#define MSTMM_TANGENT_REST(nu, nq) (54 * 1 + 45 * (nu) + 4 * (nu) * (nu))
+#define MSTMM_TANGENT_Y(nu, nq) (54 * 1 + 46 * (nu) + 4 * (nu) * (nu))
+#define MSTMM_TANGENT_ALONG(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu))
+#define MSTMM_TANGENT_TURNS(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_UNIT(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 1 * (nq) * (nq) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_RATES(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 2 * (nq) * (nq) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_LAG(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 3 * (nq) * (nq) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_LAG_WORK(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 4 * (nq) * (nq) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_NUMBERS(nu, nq) (54 * 1 + 47 * (nu) + 4 * (nu) * (nu) + 5 * (nq) * (nq) + 1 * (nq) * (nu))
+#define MSTMM_BEND_B(n) (0 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_BEND_G(n) (9 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_BEND_W(n) (15 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_BEND_STILL(n) (15 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_BEND_K(n) (21 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_BEND_Z_Z(n) (27 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_BEND_Z_X(n) (36 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_BEND_V(n) (36 * (size_t)(n) + 2 * (size_t)(n) * (n))
+#define MSTMM_BEND_D(n) (42 * (size_t)(n) + 2 * (size_t)(n) * (n))
+#define MSTMM_BEND_RIGHT(n) (42 * (size_t)(n) + 3 * (size_t)(n) * (n))
+#define MSTMM_BEND_GAIN(n) (51 * (size_t)(n) + 3 * (size_t)(n) * (n))
+#define MSTMM_BEND_WORK(n) (60 * (size_t)(n) + 3 * (size_t)(n) * (n))
+#define MSTMM_BEND_REST(n) (60 * (size_t)(n) + 4 * (size_t)(n) * (n))
+#define MSTMM_BEND_Y(n) (61 * (size_t)(n) + 4 * (size_t)(n) * (n))
+#define MSTMM_PORT_B(n) (0 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_PORT_G(n) (9 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_PORT_W(n) (15 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_PORT_K(n) (15 * (size_t)(n) + 1 * (size_t)(n) * (n))
 
 #endif

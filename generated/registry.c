@@ -34,7 +34,8 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_link_prismatic,
     &mstmm_sweep_link_screw,
     &mstmm_sweep_modal,
+    &mstmm_sweep_tangent,
     NULL,
 };
 
-const int mstmm_element_count = 30;
+const int mstmm_element_count = 31;

@@ -56,6 +56,50 @@ int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restri
     real *restrict omega, real *restrict f_C, real *restrict m_C);
 int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
     const real *restrict z, real *restrict delta);
+int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict S, real *restrict T, real *restrict S_I);
+int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, real *restrict z);
+int mstmm_sweep_frames_tangent_turned(const real *restrict Rc, const real *restrict d_Rc,
+    const real *restrict d_r, const real *restrict f, real *restrict G);
+int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
+    const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_A, real *restrict d_x);
+int mstmm_sweep_frames_velocity_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
+    const real *restrict d_Rc, const real *restrict d_r, const real *restrict d_v_I,
+    const real *restrict d_w_I, const real *restrict d_v_rel, real *restrict d_v);
+int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict delta,
+    const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
+    const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
+    real *restrict d_x_K, real *restrict d_v_K);
+int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+    const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
+    real *restrict d_w_K);
+int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
+    const real *restrict d_A, real *restrict d_A_end);
+int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M,
+    const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
+    const real *restrict d_M, real *restrict d_e);
+int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+    const real *restrict F, const real *restrict M, const real *restrict d_x_F,
+    const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
+    real *restrict d_F_back, real *restrict d_M_back);
+int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
+    const real *restrict d_e, real *restrict d_e_I);
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+    const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d);
+int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
+    const real *restrict d_v_F, const real *restrict d_x_T, const real *restrict d_v_T,
+    real *restrict d_l);
 
 /* pose of a body
  * in  A_I[3][3] rotation, parent axes to inertial axes
@@ -1924,6 +1968,2713 @@ static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* change of a load carried to the parent
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out T[9][6] S Th, a row an entry
+ * out S_I[9][6] that of the parent, added to what is there
+ */
+int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict S, real *restrict T, real *restrict S_I)
+{
+    const real t0 = w[1] * S[30];
+    const real t1 = w[2] * S[24];
+    const real t2 = t0 - t1;
+    const real t3 = v[2] * S[42];
+    const real t4 = v[1] * S[48];
+    const real t5 = t3 - t4;
+    const real t6 = t5 * 2.0;
+    const real t7 = t2 - t6;
+    const real t8 = S[0] + t7;
+    const real t9 = Rc[0] * t8;
+    const real t10 = w[2] * S[18];
+    const real t11 = w[0] * S[30];
+    const real t12 = t10 - t11;
+    const real t13 = v[0] * S[48];
+    const real t14 = v[2] * S[36];
+    const real t15 = t13 - t14;
+    const real t16 = t15 * 2.0;
+    const real t17 = t12 - t16;
+    const real t18 = S[6] + t17;
+    const real t19 = Rc[1] * t18;
+    const real t20 = t9 + t19;
+    const real t21 = w[0] * S[24];
+    const real t22 = w[1] * S[18];
+    const real t23 = t21 - t22;
+    const real t24 = v[1] * S[36];
+    const real t25 = v[0] * S[42];
+    const real t26 = t24 - t25;
+    const real t27 = t26 * 2.0;
+    const real t28 = t23 - t27;
+    const real t29 = S[12] + t28;
+    const real t30 = Rc[2] * t29;
+    const real t31 = t20 + t30;
+    const real t32 = Rc[3] * S[36];
+    const real t33 = Rc[4] * S[42];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[5] * S[48];
+    const real t36 = t34 + t35;
+    const real t37 = r[1] * w_I[0];
+    const real t38 = 2.0 * t37;
+    const real t39 = r[0] * w_I[1];
+    const real t40 = t38 - t39;
+    const real t41 = t36 * t40;
+    const real t42 = Rc[0] * S[36];
+    const real t43 = Rc[1] * S[42];
+    const real t44 = t42 + t43;
+    const real t45 = Rc[2] * S[48];
+    const real t46 = t44 + t45;
+    const real t47 = r[1] * w_I[1];
+    const real t48 = r[2] * w_I[2];
+    const real t49 = t47 + t48;
+    const real t50 = t46 * t49;
+    const real t51 = t41 - t50;
+    const real t52 = Rc[6] * S[36];
+    const real t53 = Rc[7] * S[42];
+    const real t54 = t52 + t53;
+    const real t55 = Rc[8] * S[48];
+    const real t56 = t54 + t55;
+    const real t57 = r[2] * w_I[0];
+    const real t58 = 2.0 * t57;
+    const real t59 = r[0] * w_I[2];
+    const real t60 = t58 - t59;
+    const real t61 = t56 * t60;
+    const real t62 = t51 + t61;
+    const real t63 = t31 - t62;
+    T[0] = t63;
+    const real t64 = w[1] * S[31];
+    const real t65 = w[2] * S[25];
+    const real t66 = t64 - t65;
+    const real t67 = v[2] * S[43];
+    const real t68 = v[1] * S[49];
+    const real t69 = t67 - t68;
+    const real t70 = t69 * 2.0;
+    const real t71 = t66 - t70;
+    const real t72 = S[1] + t71;
+    const real t73 = Rc[0] * t72;
+    const real t74 = w[2] * S[19];
+    const real t75 = w[0] * S[31];
+    const real t76 = t74 - t75;
+    const real t77 = v[0] * S[49];
+    const real t78 = v[2] * S[37];
+    const real t79 = t77 - t78;
+    const real t80 = t79 * 2.0;
+    const real t81 = t76 - t80;
+    const real t82 = S[7] + t81;
+    const real t83 = Rc[1] * t82;
+    const real t84 = t73 + t83;
+    const real t85 = w[0] * S[25];
+    const real t86 = w[1] * S[19];
+    const real t87 = t85 - t86;
+    const real t88 = v[1] * S[37];
+    const real t89 = v[0] * S[43];
+    const real t90 = t88 - t89;
+    const real t91 = t90 * 2.0;
+    const real t92 = t87 - t91;
+    const real t93 = S[13] + t92;
+    const real t94 = Rc[2] * t93;
+    const real t95 = t84 + t94;
+    const real t96 = Rc[3] * S[37];
+    const real t97 = Rc[4] * S[43];
+    const real t98 = t96 + t97;
+    const real t99 = Rc[5] * S[49];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * t40;
+    const real t102 = Rc[0] * S[37];
+    const real t103 = Rc[1] * S[43];
+    const real t104 = t102 + t103;
+    const real t105 = Rc[2] * S[49];
+    const real t106 = t104 + t105;
+    const real t107 = t106 * t49;
+    const real t108 = t101 - t107;
+    const real t109 = Rc[6] * S[37];
+    const real t110 = Rc[7] * S[43];
+    const real t111 = t109 + t110;
+    const real t112 = Rc[8] * S[49];
+    const real t113 = t111 + t112;
+    const real t114 = t113 * t60;
+    const real t115 = t108 + t114;
+    const real t116 = t95 - t115;
+    T[1] = t116;
+    const real t117 = w[1] * S[32];
+    const real t118 = w[2] * S[26];
+    const real t119 = t117 - t118;
+    const real t120 = v[2] * S[44];
+    const real t121 = v[1] * S[50];
+    const real t122 = t120 - t121;
+    const real t123 = t122 * 2.0;
+    const real t124 = t119 - t123;
+    const real t125 = S[2] + t124;
+    const real t126 = Rc[0] * t125;
+    const real t127 = w[2] * S[20];
+    const real t128 = w[0] * S[32];
+    const real t129 = t127 - t128;
+    const real t130 = v[0] * S[50];
+    const real t131 = v[2] * S[38];
+    const real t132 = t130 - t131;
+    const real t133 = t132 * 2.0;
+    const real t134 = t129 - t133;
+    const real t135 = S[8] + t134;
+    const real t136 = Rc[1] * t135;
+    const real t137 = t126 + t136;
+    const real t138 = w[0] * S[26];
+    const real t139 = w[1] * S[20];
+    const real t140 = t138 - t139;
+    const real t141 = v[1] * S[38];
+    const real t142 = v[0] * S[44];
+    const real t143 = t141 - t142;
+    const real t144 = t143 * 2.0;
+    const real t145 = t140 - t144;
+    const real t146 = S[14] + t145;
+    const real t147 = Rc[2] * t146;
+    const real t148 = t137 + t147;
+    const real t149 = Rc[3] * S[38];
+    const real t150 = Rc[4] * S[44];
+    const real t151 = t149 + t150;
+    const real t152 = Rc[5] * S[50];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * t40;
+    const real t155 = Rc[0] * S[38];
+    const real t156 = Rc[1] * S[44];
+    const real t157 = t155 + t156;
+    const real t158 = Rc[2] * S[50];
+    const real t159 = t157 + t158;
+    const real t160 = t159 * t49;
+    const real t161 = t154 - t160;
+    const real t162 = Rc[6] * S[38];
+    const real t163 = Rc[7] * S[44];
+    const real t164 = t162 + t163;
+    const real t165 = Rc[8] * S[50];
+    const real t166 = t164 + t165;
+    const real t167 = t166 * t60;
+    const real t168 = t161 + t167;
+    const real t169 = t148 - t168;
+    T[2] = t169;
+    const real t170 = w[1] * S[33];
+    const real t171 = w[2] * S[27];
+    const real t172 = t170 - t171;
+    const real t173 = v[2] * S[45];
+    const real t174 = v[1] * S[51];
+    const real t175 = t173 - t174;
+    const real t176 = t175 * 2.0;
+    const real t177 = t172 - t176;
+    const real t178 = S[3] + t177;
+    const real t179 = Rc[0] * t178;
+    const real t180 = w[2] * S[21];
+    const real t181 = w[0] * S[33];
+    const real t182 = t180 - t181;
+    const real t183 = v[0] * S[51];
+    const real t184 = v[2] * S[39];
+    const real t185 = t183 - t184;
+    const real t186 = t185 * 2.0;
+    const real t187 = t182 - t186;
+    const real t188 = S[9] + t187;
+    const real t189 = Rc[1] * t188;
+    const real t190 = t179 + t189;
+    const real t191 = w[0] * S[27];
+    const real t192 = w[1] * S[21];
+    const real t193 = t191 - t192;
+    const real t194 = v[1] * S[39];
+    const real t195 = v[0] * S[45];
+    const real t196 = t194 - t195;
+    const real t197 = t196 * 2.0;
+    const real t198 = t193 - t197;
+    const real t199 = S[15] + t198;
+    const real t200 = Rc[2] * t199;
+    const real t201 = t190 + t200;
+    const real t202 = Rc[3] * S[39];
+    const real t203 = Rc[4] * S[45];
+    const real t204 = t202 + t203;
+    const real t205 = Rc[5] * S[51];
+    const real t206 = t204 + t205;
+    const real t207 = t206 * t40;
+    const real t208 = Rc[0] * S[39];
+    const real t209 = Rc[1] * S[45];
+    const real t210 = t208 + t209;
+    const real t211 = Rc[2] * S[51];
+    const real t212 = t210 + t211;
+    const real t213 = t212 * t49;
+    const real t214 = t207 - t213;
+    const real t215 = Rc[6] * S[39];
+    const real t216 = Rc[7] * S[45];
+    const real t217 = t215 + t216;
+    const real t218 = Rc[8] * S[51];
+    const real t219 = t217 + t218;
+    const real t220 = t219 * t60;
+    const real t221 = t214 + t220;
+    const real t222 = t201 - t221;
+    T[3] = t222;
+    const real t223 = w[1] * S[34];
+    const real t224 = w[2] * S[28];
+    const real t225 = t223 - t224;
+    const real t226 = v[2] * S[46];
+    const real t227 = v[1] * S[52];
+    const real t228 = t226 - t227;
+    const real t229 = t228 * 2.0;
+    const real t230 = t225 - t229;
+    const real t231 = S[4] + t230;
+    const real t232 = Rc[0] * t231;
+    const real t233 = w[2] * S[22];
+    const real t234 = w[0] * S[34];
+    const real t235 = t233 - t234;
+    const real t236 = v[0] * S[52];
+    const real t237 = v[2] * S[40];
+    const real t238 = t236 - t237;
+    const real t239 = t238 * 2.0;
+    const real t240 = t235 - t239;
+    const real t241 = S[10] + t240;
+    const real t242 = Rc[1] * t241;
+    const real t243 = t232 + t242;
+    const real t244 = w[0] * S[28];
+    const real t245 = w[1] * S[22];
+    const real t246 = t244 - t245;
+    const real t247 = v[1] * S[40];
+    const real t248 = v[0] * S[46];
+    const real t249 = t247 - t248;
+    const real t250 = t249 * 2.0;
+    const real t251 = t246 - t250;
+    const real t252 = S[16] + t251;
+    const real t253 = Rc[2] * t252;
+    const real t254 = t243 + t253;
+    const real t255 = Rc[3] * S[40];
+    const real t256 = Rc[4] * S[46];
+    const real t257 = t255 + t256;
+    const real t258 = Rc[5] * S[52];
+    const real t259 = t257 + t258;
+    const real t260 = t259 * t40;
+    const real t261 = Rc[0] * S[40];
+    const real t262 = Rc[1] * S[46];
+    const real t263 = t261 + t262;
+    const real t264 = Rc[2] * S[52];
+    const real t265 = t263 + t264;
+    const real t266 = t265 * t49;
+    const real t267 = t260 - t266;
+    const real t268 = Rc[6] * S[40];
+    const real t269 = Rc[7] * S[46];
+    const real t270 = t268 + t269;
+    const real t271 = Rc[8] * S[52];
+    const real t272 = t270 + t271;
+    const real t273 = t272 * t60;
+    const real t274 = t267 + t273;
+    const real t275 = t254 - t274;
+    T[4] = t275;
+    const real t276 = w[1] * S[35];
+    const real t277 = w[2] * S[29];
+    const real t278 = t276 - t277;
+    const real t279 = v[2] * S[47];
+    const real t280 = v[1] * S[53];
+    const real t281 = t279 - t280;
+    const real t282 = t281 * 2.0;
+    const real t283 = t278 - t282;
+    const real t284 = S[5] + t283;
+    const real t285 = Rc[0] * t284;
+    const real t286 = w[2] * S[23];
+    const real t287 = w[0] * S[35];
+    const real t288 = t286 - t287;
+    const real t289 = v[0] * S[53];
+    const real t290 = v[2] * S[41];
+    const real t291 = t289 - t290;
+    const real t292 = t291 * 2.0;
+    const real t293 = t288 - t292;
+    const real t294 = S[11] + t293;
+    const real t295 = Rc[1] * t294;
+    const real t296 = t285 + t295;
+    const real t297 = w[0] * S[29];
+    const real t298 = w[1] * S[23];
+    const real t299 = t297 - t298;
+    const real t300 = v[1] * S[41];
+    const real t301 = v[0] * S[47];
+    const real t302 = t300 - t301;
+    const real t303 = t302 * 2.0;
+    const real t304 = t299 - t303;
+    const real t305 = S[17] + t304;
+    const real t306 = Rc[2] * t305;
+    const real t307 = t296 + t306;
+    const real t308 = Rc[3] * S[41];
+    const real t309 = Rc[4] * S[47];
+    const real t310 = t308 + t309;
+    const real t311 = Rc[5] * S[53];
+    const real t312 = t310 + t311;
+    const real t313 = t312 * t40;
+    const real t314 = Rc[0] * S[41];
+    const real t315 = Rc[1] * S[47];
+    const real t316 = t314 + t315;
+    const real t317 = Rc[2] * S[53];
+    const real t318 = t316 + t317;
+    const real t319 = t318 * t49;
+    const real t320 = t313 - t319;
+    const real t321 = Rc[6] * S[41];
+    const real t322 = Rc[7] * S[47];
+    const real t323 = t321 + t322;
+    const real t324 = Rc[8] * S[53];
+    const real t325 = t323 + t324;
+    const real t326 = t325 * t60;
+    const real t327 = t320 + t326;
+    const real t328 = t307 - t327;
+    T[5] = t328;
+    const real t329 = Rc[3] * t8;
+    const real t330 = Rc[4] * t18;
+    const real t331 = t329 + t330;
+    const real t332 = Rc[5] * t29;
+    const real t333 = t331 + t332;
+    const real t334 = 2.0 * t39;
+    const real t335 = t334 - t37;
+    const real t336 = t46 * t335;
+    const real t337 = r[0] * w_I[0];
+    const real t338 = t48 + t337;
+    const real t339 = t36 * t338;
+    const real t340 = t336 - t339;
+    const real t341 = r[2] * w_I[1];
+    const real t342 = 2.0 * t341;
+    const real t343 = r[1] * w_I[2];
+    const real t344 = t342 - t343;
+    const real t345 = t56 * t344;
+    const real t346 = t340 + t345;
+    const real t347 = t333 - t346;
+    T[6] = t347;
+    const real t348 = Rc[3] * t72;
+    const real t349 = Rc[4] * t82;
+    const real t350 = t348 + t349;
+    const real t351 = Rc[5] * t93;
+    const real t352 = t350 + t351;
+    const real t353 = t106 * t335;
+    const real t354 = t100 * t338;
+    const real t355 = t353 - t354;
+    const real t356 = t113 * t344;
+    const real t357 = t355 + t356;
+    const real t358 = t352 - t357;
+    T[7] = t358;
+    const real t359 = Rc[3] * t125;
+    const real t360 = Rc[4] * t135;
+    const real t361 = t359 + t360;
+    const real t362 = Rc[5] * t146;
+    const real t363 = t361 + t362;
+    const real t364 = t159 * t335;
+    const real t365 = t153 * t338;
+    const real t366 = t364 - t365;
+    const real t367 = t166 * t344;
+    const real t368 = t366 + t367;
+    const real t369 = t363 - t368;
+    T[8] = t369;
+    const real t370 = Rc[3] * t178;
+    const real t371 = Rc[4] * t188;
+    const real t372 = t370 + t371;
+    const real t373 = Rc[5] * t199;
+    const real t374 = t372 + t373;
+    const real t375 = t212 * t335;
+    const real t376 = t206 * t338;
+    const real t377 = t375 - t376;
+    const real t378 = t219 * t344;
+    const real t379 = t377 + t378;
+    const real t380 = t374 - t379;
+    T[9] = t380;
+    const real t381 = Rc[3] * t231;
+    const real t382 = Rc[4] * t241;
+    const real t383 = t381 + t382;
+    const real t384 = Rc[5] * t252;
+    const real t385 = t383 + t384;
+    const real t386 = t265 * t335;
+    const real t387 = t259 * t338;
+    const real t388 = t386 - t387;
+    const real t389 = t272 * t344;
+    const real t390 = t388 + t389;
+    const real t391 = t385 - t390;
+    T[10] = t391;
+    const real t392 = Rc[3] * t284;
+    const real t393 = Rc[4] * t294;
+    const real t394 = t392 + t393;
+    const real t395 = Rc[5] * t305;
+    const real t396 = t394 + t395;
+    const real t397 = t318 * t335;
+    const real t398 = t312 * t338;
+    const real t399 = t397 - t398;
+    const real t400 = t325 * t344;
+    const real t401 = t399 + t400;
+    const real t402 = t396 - t401;
+    T[11] = t402;
+    const real t403 = Rc[6] * t8;
+    const real t404 = Rc[7] * t18;
+    const real t405 = t403 + t404;
+    const real t406 = Rc[8] * t29;
+    const real t407 = t405 + t406;
+    const real t408 = t47 + t337;
+    const real t409 = t56 * t408;
+    const real t410 = 2.0 * t59;
+    const real t411 = t410 - t57;
+    const real t412 = t46 * t411;
+    const real t413 = 2.0 * t343;
+    const real t414 = t413 - t341;
+    const real t415 = t36 * t414;
+    const real t416 = t412 + t415;
+    const real t417 = t409 - t416;
+    const real t418 = t407 + t417;
+    T[12] = t418;
+    const real t419 = Rc[6] * t72;
+    const real t420 = Rc[7] * t82;
+    const real t421 = t419 + t420;
+    const real t422 = Rc[8] * t93;
+    const real t423 = t421 + t422;
+    const real t424 = t113 * t408;
+    const real t425 = t106 * t411;
+    const real t426 = t100 * t414;
+    const real t427 = t425 + t426;
+    const real t428 = t424 - t427;
+    const real t429 = t423 + t428;
+    T[13] = t429;
+    const real t430 = Rc[6] * t125;
+    const real t431 = Rc[7] * t135;
+    const real t432 = t430 + t431;
+    const real t433 = Rc[8] * t146;
+    const real t434 = t432 + t433;
+    const real t435 = t166 * t408;
+    const real t436 = t159 * t411;
+    const real t437 = t153 * t414;
+    const real t438 = t436 + t437;
+    const real t439 = t435 - t438;
+    const real t440 = t434 + t439;
+    T[14] = t440;
+    const real t441 = Rc[6] * t178;
+    const real t442 = Rc[7] * t188;
+    const real t443 = t441 + t442;
+    const real t444 = Rc[8] * t199;
+    const real t445 = t443 + t444;
+    const real t446 = t219 * t408;
+    const real t447 = t212 * t411;
+    const real t448 = t206 * t414;
+    const real t449 = t447 + t448;
+    const real t450 = t446 - t449;
+    const real t451 = t445 + t450;
+    T[15] = t451;
+    const real t452 = Rc[6] * t231;
+    const real t453 = Rc[7] * t241;
+    const real t454 = t452 + t453;
+    const real t455 = Rc[8] * t252;
+    const real t456 = t454 + t455;
+    const real t457 = t272 * t408;
+    const real t458 = t265 * t411;
+    const real t459 = t259 * t414;
+    const real t460 = t458 + t459;
+    const real t461 = t457 - t460;
+    const real t462 = t456 + t461;
+    T[16] = t462;
+    const real t463 = Rc[6] * t284;
+    const real t464 = Rc[7] * t294;
+    const real t465 = t463 + t464;
+    const real t466 = Rc[8] * t305;
+    const real t467 = t465 + t466;
+    const real t468 = t325 * t408;
+    const real t469 = t318 * t411;
+    const real t470 = t312 * t414;
+    const real t471 = t469 + t470;
+    const real t472 = t468 - t471;
+    const real t473 = t467 + t472;
+    T[17] = t473;
+    const real t474 = Rc[0] * S[18];
+    const real t475 = Rc[1] * S[24];
+    const real t476 = t474 + t475;
+    const real t477 = Rc[2] * S[30];
+    const real t478 = t476 + t477;
+    const real t479 = r[1] * t56;
+    const real t480 = r[2] * t36;
+    const real t481 = t479 - t480;
+    const real t482 = t478 + t481;
+    T[18] = t482;
+    const real t483 = Rc[0] * S[19];
+    const real t484 = Rc[1] * S[25];
+    const real t485 = t483 + t484;
+    const real t486 = Rc[2] * S[31];
+    const real t487 = t485 + t486;
+    const real t488 = r[1] * t113;
+    const real t489 = r[2] * t100;
+    const real t490 = t488 - t489;
+    const real t491 = t487 + t490;
+    T[19] = t491;
+    const real t492 = Rc[0] * S[20];
+    const real t493 = Rc[1] * S[26];
+    const real t494 = t492 + t493;
+    const real t495 = Rc[2] * S[32];
+    const real t496 = t494 + t495;
+    const real t497 = r[1] * t166;
+    const real t498 = r[2] * t153;
+    const real t499 = t497 - t498;
+    const real t500 = t496 + t499;
+    T[20] = t500;
+    const real t501 = Rc[0] * S[21];
+    const real t502 = Rc[1] * S[27];
+    const real t503 = t501 + t502;
+    const real t504 = Rc[2] * S[33];
+    const real t505 = t503 + t504;
+    const real t506 = r[1] * t219;
+    const real t507 = r[2] * t206;
+    const real t508 = t506 - t507;
+    const real t509 = t505 + t508;
+    T[21] = t509;
+    const real t510 = Rc[0] * S[22];
+    const real t511 = Rc[1] * S[28];
+    const real t512 = t510 + t511;
+    const real t513 = Rc[2] * S[34];
+    const real t514 = t512 + t513;
+    const real t515 = r[1] * t272;
+    const real t516 = r[2] * t259;
+    const real t517 = t515 - t516;
+    const real t518 = t514 + t517;
+    T[22] = t518;
+    const real t519 = Rc[0] * S[23];
+    const real t520 = Rc[1] * S[29];
+    const real t521 = t519 + t520;
+    const real t522 = Rc[2] * S[35];
+    const real t523 = t521 + t522;
+    const real t524 = r[1] * t325;
+    const real t525 = r[2] * t312;
+    const real t526 = t524 - t525;
+    const real t527 = t523 + t526;
+    T[23] = t527;
+    const real t528 = Rc[3] * S[18];
+    const real t529 = Rc[4] * S[24];
+    const real t530 = t528 + t529;
+    const real t531 = Rc[5] * S[30];
+    const real t532 = t530 + t531;
+    const real t533 = r[2] * t46;
+    const real t534 = r[0] * t56;
+    const real t535 = t533 - t534;
+    const real t536 = t532 + t535;
+    T[24] = t536;
+    const real t537 = Rc[3] * S[19];
+    const real t538 = Rc[4] * S[25];
+    const real t539 = t537 + t538;
+    const real t540 = Rc[5] * S[31];
+    const real t541 = t539 + t540;
+    const real t542 = r[2] * t106;
+    const real t543 = r[0] * t113;
+    const real t544 = t542 - t543;
+    const real t545 = t541 + t544;
+    T[25] = t545;
+    const real t546 = Rc[3] * S[20];
+    const real t547 = Rc[4] * S[26];
+    const real t548 = t546 + t547;
+    const real t549 = Rc[5] * S[32];
+    const real t550 = t548 + t549;
+    const real t551 = r[2] * t159;
+    const real t552 = r[0] * t166;
+    const real t553 = t551 - t552;
+    const real t554 = t550 + t553;
+    T[26] = t554;
+    const real t555 = Rc[3] * S[21];
+    const real t556 = Rc[4] * S[27];
+    const real t557 = t555 + t556;
+    const real t558 = Rc[5] * S[33];
+    const real t559 = t557 + t558;
+    const real t560 = r[2] * t212;
+    const real t561 = r[0] * t219;
+    const real t562 = t560 - t561;
+    const real t563 = t559 + t562;
+    T[27] = t563;
+    const real t564 = Rc[3] * S[22];
+    const real t565 = Rc[4] * S[28];
+    const real t566 = t564 + t565;
+    const real t567 = Rc[5] * S[34];
+    const real t568 = t566 + t567;
+    const real t569 = r[2] * t265;
+    const real t570 = r[0] * t272;
+    const real t571 = t569 - t570;
+    const real t572 = t568 + t571;
+    T[28] = t572;
+    const real t573 = Rc[3] * S[23];
+    const real t574 = Rc[4] * S[29];
+    const real t575 = t573 + t574;
+    const real t576 = Rc[5] * S[35];
+    const real t577 = t575 + t576;
+    const real t578 = r[2] * t318;
+    const real t579 = r[0] * t325;
+    const real t580 = t578 - t579;
+    const real t581 = t577 + t580;
+    T[29] = t581;
+    const real t582 = Rc[6] * S[18];
+    const real t583 = Rc[7] * S[24];
+    const real t584 = t582 + t583;
+    const real t585 = Rc[8] * S[30];
+    const real t586 = t584 + t585;
+    const real t587 = r[0] * t36;
+    const real t588 = r[1] * t46;
+    const real t589 = t587 - t588;
+    const real t590 = t586 + t589;
+    T[30] = t590;
+    const real t591 = Rc[6] * S[19];
+    const real t592 = Rc[7] * S[25];
+    const real t593 = t591 + t592;
+    const real t594 = Rc[8] * S[31];
+    const real t595 = t593 + t594;
+    const real t596 = r[0] * t100;
+    const real t597 = r[1] * t106;
+    const real t598 = t596 - t597;
+    const real t599 = t595 + t598;
+    T[31] = t599;
+    const real t600 = Rc[6] * S[20];
+    const real t601 = Rc[7] * S[26];
+    const real t602 = t600 + t601;
+    const real t603 = Rc[8] * S[32];
+    const real t604 = t602 + t603;
+    const real t605 = r[0] * t153;
+    const real t606 = r[1] * t159;
+    const real t607 = t605 - t606;
+    const real t608 = t604 + t607;
+    T[32] = t608;
+    const real t609 = Rc[6] * S[21];
+    const real t610 = Rc[7] * S[27];
+    const real t611 = t609 + t610;
+    const real t612 = Rc[8] * S[33];
+    const real t613 = t611 + t612;
+    const real t614 = r[0] * t206;
+    const real t615 = r[1] * t212;
+    const real t616 = t614 - t615;
+    const real t617 = t613 + t616;
+    T[33] = t617;
+    const real t618 = Rc[6] * S[22];
+    const real t619 = Rc[7] * S[28];
+    const real t620 = t618 + t619;
+    const real t621 = Rc[8] * S[34];
+    const real t622 = t620 + t621;
+    const real t623 = r[0] * t259;
+    const real t624 = r[1] * t265;
+    const real t625 = t623 - t624;
+    const real t626 = t622 + t625;
+    T[34] = t626;
+    const real t627 = Rc[6] * S[23];
+    const real t628 = Rc[7] * S[29];
+    const real t629 = t627 + t628;
+    const real t630 = Rc[8] * S[35];
+    const real t631 = t629 + t630;
+    const real t632 = r[0] * t312;
+    const real t633 = r[1] * t318;
+    const real t634 = t632 - t633;
+    const real t635 = t631 + t634;
+    T[35] = t635;
+    T[36] = t46;
+    T[37] = t106;
+    T[38] = t159;
+    T[39] = t212;
+    T[40] = t265;
+    T[41] = t318;
+    T[42] = t36;
+    T[43] = t100;
+    T[44] = t153;
+    T[45] = t206;
+    T[46] = t259;
+    T[47] = t312;
+    T[48] = t56;
+    T[49] = t113;
+    T[50] = t166;
+    T[51] = t219;
+    T[52] = t272;
+    T[53] = t325;
+    const real t636 = Rc[0] * t63;
+    const real t637 = Rc[1] * t116;
+    const real t638 = t636 + t637;
+    const real t639 = Rc[2] * t169;
+    const real t640 = t638 + t639;
+    S_I[0] += t640;
+    const real t641 = Rc[3] * t63;
+    const real t642 = Rc[4] * t116;
+    const real t643 = t641 + t642;
+    const real t644 = Rc[5] * t169;
+    const real t645 = t643 + t644;
+    S_I[1] += t645;
+    const real t646 = Rc[6] * t63;
+    const real t647 = Rc[7] * t116;
+    const real t648 = t646 + t647;
+    const real t649 = Rc[8] * t169;
+    const real t650 = t648 + t649;
+    S_I[2] += t650;
+    const real t651 = Rc[0] * t222;
+    const real t652 = Rc[1] * t275;
+    const real t653 = t651 + t652;
+    const real t654 = Rc[2] * t328;
+    const real t655 = t653 + t654;
+    const real t656 = r[1] * t650;
+    const real t657 = r[2] * t645;
+    const real t658 = t656 - t657;
+    const real t659 = t655 + t658;
+    S_I[3] += t659;
+    const real t660 = Rc[3] * t222;
+    const real t661 = Rc[4] * t275;
+    const real t662 = t660 + t661;
+    const real t663 = Rc[5] * t328;
+    const real t664 = t662 + t663;
+    const real t665 = r[2] * t640;
+    const real t666 = r[0] * t650;
+    const real t667 = t665 - t666;
+    const real t668 = t664 + t667;
+    S_I[4] += t668;
+    const real t669 = Rc[6] * t222;
+    const real t670 = Rc[7] * t275;
+    const real t671 = t669 + t670;
+    const real t672 = Rc[8] * t328;
+    const real t673 = t671 + t672;
+    const real t674 = r[0] * t645;
+    const real t675 = r[1] * t640;
+    const real t676 = t674 - t675;
+    const real t677 = t673 + t676;
+    S_I[5] += t677;
+    const real t678 = Rc[0] * t347;
+    const real t679 = Rc[1] * t358;
+    const real t680 = t678 + t679;
+    const real t681 = Rc[2] * t369;
+    const real t682 = t680 + t681;
+    S_I[6] += t682;
+    const real t683 = Rc[3] * t347;
+    const real t684 = Rc[4] * t358;
+    const real t685 = t683 + t684;
+    const real t686 = Rc[5] * t369;
+    const real t687 = t685 + t686;
+    S_I[7] += t687;
+    const real t688 = Rc[6] * t347;
+    const real t689 = Rc[7] * t358;
+    const real t690 = t688 + t689;
+    const real t691 = Rc[8] * t369;
+    const real t692 = t690 + t691;
+    S_I[8] += t692;
+    const real t693 = Rc[0] * t380;
+    const real t694 = Rc[1] * t391;
+    const real t695 = t693 + t694;
+    const real t696 = Rc[2] * t402;
+    const real t697 = t695 + t696;
+    const real t698 = r[1] * t692;
+    const real t699 = r[2] * t687;
+    const real t700 = t698 - t699;
+    const real t701 = t697 + t700;
+    S_I[9] += t701;
+    const real t702 = Rc[3] * t380;
+    const real t703 = Rc[4] * t391;
+    const real t704 = t702 + t703;
+    const real t705 = Rc[5] * t402;
+    const real t706 = t704 + t705;
+    const real t707 = r[2] * t682;
+    const real t708 = r[0] * t692;
+    const real t709 = t707 - t708;
+    const real t710 = t706 + t709;
+    S_I[10] += t710;
+    const real t711 = Rc[6] * t380;
+    const real t712 = Rc[7] * t391;
+    const real t713 = t711 + t712;
+    const real t714 = Rc[8] * t402;
+    const real t715 = t713 + t714;
+    const real t716 = r[0] * t687;
+    const real t717 = r[1] * t682;
+    const real t718 = t716 - t717;
+    const real t719 = t715 + t718;
+    S_I[11] += t719;
+    const real t720 = Rc[0] * t418;
+    const real t721 = Rc[1] * t429;
+    const real t722 = t720 + t721;
+    const real t723 = Rc[2] * t440;
+    const real t724 = t722 + t723;
+    S_I[12] += t724;
+    const real t725 = Rc[3] * t418;
+    const real t726 = Rc[4] * t429;
+    const real t727 = t725 + t726;
+    const real t728 = Rc[5] * t440;
+    const real t729 = t727 + t728;
+    S_I[13] += t729;
+    const real t730 = Rc[6] * t418;
+    const real t731 = Rc[7] * t429;
+    const real t732 = t730 + t731;
+    const real t733 = Rc[8] * t440;
+    const real t734 = t732 + t733;
+    S_I[14] += t734;
+    const real t735 = Rc[0] * t451;
+    const real t736 = Rc[1] * t462;
+    const real t737 = t735 + t736;
+    const real t738 = Rc[2] * t473;
+    const real t739 = t737 + t738;
+    const real t740 = r[1] * t734;
+    const real t741 = r[2] * t729;
+    const real t742 = t740 - t741;
+    const real t743 = t739 + t742;
+    S_I[15] += t743;
+    const real t744 = Rc[3] * t451;
+    const real t745 = Rc[4] * t462;
+    const real t746 = t744 + t745;
+    const real t747 = Rc[5] * t473;
+    const real t748 = t746 + t747;
+    const real t749 = r[2] * t724;
+    const real t750 = r[0] * t734;
+    const real t751 = t749 - t750;
+    const real t752 = t748 + t751;
+    S_I[16] += t752;
+    const real t753 = Rc[6] * t451;
+    const real t754 = Rc[7] * t462;
+    const real t755 = t753 + t754;
+    const real t756 = Rc[8] * t473;
+    const real t757 = t755 + t756;
+    const real t758 = r[0] * t729;
+    const real t759 = r[1] * t724;
+    const real t760 = t758 - t759;
+    const real t761 = t757 + t760;
+    S_I[17] += t761;
+    const real t762 = Rc[0] * t482;
+    const real t763 = Rc[1] * t491;
+    const real t764 = t762 + t763;
+    const real t765 = Rc[2] * t500;
+    const real t766 = t764 + t765;
+    S_I[18] += t766;
+    const real t767 = Rc[3] * t482;
+    const real t768 = Rc[4] * t491;
+    const real t769 = t767 + t768;
+    const real t770 = Rc[5] * t500;
+    const real t771 = t769 + t770;
+    S_I[19] += t771;
+    const real t772 = Rc[6] * t482;
+    const real t773 = Rc[7] * t491;
+    const real t774 = t772 + t773;
+    const real t775 = Rc[8] * t500;
+    const real t776 = t774 + t775;
+    S_I[20] += t776;
+    const real t777 = Rc[0] * t509;
+    const real t778 = Rc[1] * t518;
+    const real t779 = t777 + t778;
+    const real t780 = Rc[2] * t527;
+    const real t781 = t779 + t780;
+    const real t782 = r[1] * t776;
+    const real t783 = r[2] * t771;
+    const real t784 = t782 - t783;
+    const real t785 = t781 + t784;
+    S_I[21] += t785;
+    const real t786 = Rc[3] * t509;
+    const real t787 = Rc[4] * t518;
+    const real t788 = t786 + t787;
+    const real t789 = Rc[5] * t527;
+    const real t790 = t788 + t789;
+    const real t791 = r[2] * t766;
+    const real t792 = r[0] * t776;
+    const real t793 = t791 - t792;
+    const real t794 = t790 + t793;
+    S_I[22] += t794;
+    const real t795 = Rc[6] * t509;
+    const real t796 = Rc[7] * t518;
+    const real t797 = t795 + t796;
+    const real t798 = Rc[8] * t527;
+    const real t799 = t797 + t798;
+    const real t800 = r[0] * t771;
+    const real t801 = r[1] * t766;
+    const real t802 = t800 - t801;
+    const real t803 = t799 + t802;
+    S_I[23] += t803;
+    const real t804 = Rc[0] * t536;
+    const real t805 = Rc[1] * t545;
+    const real t806 = t804 + t805;
+    const real t807 = Rc[2] * t554;
+    const real t808 = t806 + t807;
+    S_I[24] += t808;
+    const real t809 = Rc[3] * t536;
+    const real t810 = Rc[4] * t545;
+    const real t811 = t809 + t810;
+    const real t812 = Rc[5] * t554;
+    const real t813 = t811 + t812;
+    S_I[25] += t813;
+    const real t814 = Rc[6] * t536;
+    const real t815 = Rc[7] * t545;
+    const real t816 = t814 + t815;
+    const real t817 = Rc[8] * t554;
+    const real t818 = t816 + t817;
+    S_I[26] += t818;
+    const real t819 = Rc[0] * t563;
+    const real t820 = Rc[1] * t572;
+    const real t821 = t819 + t820;
+    const real t822 = Rc[2] * t581;
+    const real t823 = t821 + t822;
+    const real t824 = r[1] * t818;
+    const real t825 = r[2] * t813;
+    const real t826 = t824 - t825;
+    const real t827 = t823 + t826;
+    S_I[27] += t827;
+    const real t828 = Rc[3] * t563;
+    const real t829 = Rc[4] * t572;
+    const real t830 = t828 + t829;
+    const real t831 = Rc[5] * t581;
+    const real t832 = t830 + t831;
+    const real t833 = r[2] * t808;
+    const real t834 = r[0] * t818;
+    const real t835 = t833 - t834;
+    const real t836 = t832 + t835;
+    S_I[28] += t836;
+    const real t837 = Rc[6] * t563;
+    const real t838 = Rc[7] * t572;
+    const real t839 = t837 + t838;
+    const real t840 = Rc[8] * t581;
+    const real t841 = t839 + t840;
+    const real t842 = r[0] * t813;
+    const real t843 = r[1] * t808;
+    const real t844 = t842 - t843;
+    const real t845 = t841 + t844;
+    S_I[29] += t845;
+    const real t846 = Rc[0] * t590;
+    const real t847 = Rc[1] * t599;
+    const real t848 = t846 + t847;
+    const real t849 = Rc[2] * t608;
+    const real t850 = t848 + t849;
+    S_I[30] += t850;
+    const real t851 = Rc[3] * t590;
+    const real t852 = Rc[4] * t599;
+    const real t853 = t851 + t852;
+    const real t854 = Rc[5] * t608;
+    const real t855 = t853 + t854;
+    S_I[31] += t855;
+    const real t856 = Rc[6] * t590;
+    const real t857 = Rc[7] * t599;
+    const real t858 = t856 + t857;
+    const real t859 = Rc[8] * t608;
+    const real t860 = t858 + t859;
+    S_I[32] += t860;
+    const real t861 = Rc[0] * t617;
+    const real t862 = Rc[1] * t626;
+    const real t863 = t861 + t862;
+    const real t864 = Rc[2] * t635;
+    const real t865 = t863 + t864;
+    const real t866 = r[1] * t860;
+    const real t867 = r[2] * t855;
+    const real t868 = t866 - t867;
+    const real t869 = t865 + t868;
+    S_I[33] += t869;
+    const real t870 = Rc[3] * t617;
+    const real t871 = Rc[4] * t626;
+    const real t872 = t870 + t871;
+    const real t873 = Rc[5] * t635;
+    const real t874 = t872 + t873;
+    const real t875 = r[2] * t850;
+    const real t876 = r[0] * t860;
+    const real t877 = t875 - t876;
+    const real t878 = t874 + t877;
+    S_I[34] += t878;
+    const real t879 = Rc[6] * t617;
+    const real t880 = Rc[7] * t626;
+    const real t881 = t879 + t880;
+    const real t882 = Rc[8] * t635;
+    const real t883 = t881 + t882;
+    const real t884 = r[0] * t855;
+    const real t885 = r[1] * t850;
+    const real t886 = t884 - t885;
+    const real t887 = t883 + t886;
+    S_I[35] += t887;
+    const real t888 = Rc[0] * t46;
+    const real t889 = Rc[1] * t106;
+    const real t890 = t888 + t889;
+    const real t891 = Rc[2] * t159;
+    const real t892 = t890 + t891;
+    S_I[36] += t892;
+    const real t893 = Rc[3] * t46;
+    const real t894 = Rc[4] * t106;
+    const real t895 = t893 + t894;
+    const real t896 = Rc[5] * t159;
+    const real t897 = t895 + t896;
+    S_I[37] += t897;
+    const real t898 = Rc[6] * t46;
+    const real t899 = Rc[7] * t106;
+    const real t900 = t898 + t899;
+    const real t901 = Rc[8] * t159;
+    const real t902 = t900 + t901;
+    S_I[38] += t902;
+    const real t903 = Rc[0] * t212;
+    const real t904 = Rc[1] * t265;
+    const real t905 = t903 + t904;
+    const real t906 = Rc[2] * t318;
+    const real t907 = t905 + t906;
+    const real t908 = r[1] * t902;
+    const real t909 = r[2] * t897;
+    const real t910 = t908 - t909;
+    const real t911 = t907 + t910;
+    S_I[39] += t911;
+    const real t912 = Rc[3] * t212;
+    const real t913 = Rc[4] * t265;
+    const real t914 = t912 + t913;
+    const real t915 = Rc[5] * t318;
+    const real t916 = t914 + t915;
+    const real t917 = r[2] * t892;
+    const real t918 = r[0] * t902;
+    const real t919 = t917 - t918;
+    const real t920 = t916 + t919;
+    S_I[40] += t920;
+    const real t921 = Rc[6] * t212;
+    const real t922 = Rc[7] * t265;
+    const real t923 = t921 + t922;
+    const real t924 = Rc[8] * t318;
+    const real t925 = t923 + t924;
+    const real t926 = r[0] * t897;
+    const real t927 = r[1] * t892;
+    const real t928 = t926 - t927;
+    const real t929 = t925 + t928;
+    S_I[41] += t929;
+    const real t930 = Rc[0] * t36;
+    const real t931 = Rc[1] * t100;
+    const real t932 = t930 + t931;
+    const real t933 = Rc[2] * t153;
+    const real t934 = t932 + t933;
+    S_I[42] += t934;
+    const real t935 = Rc[3] * t36;
+    const real t936 = Rc[4] * t100;
+    const real t937 = t935 + t936;
+    const real t938 = Rc[5] * t153;
+    const real t939 = t937 + t938;
+    S_I[43] += t939;
+    const real t940 = Rc[6] * t36;
+    const real t941 = Rc[7] * t100;
+    const real t942 = t940 + t941;
+    const real t943 = Rc[8] * t153;
+    const real t944 = t942 + t943;
+    S_I[44] += t944;
+    const real t945 = Rc[0] * t206;
+    const real t946 = Rc[1] * t259;
+    const real t947 = t945 + t946;
+    const real t948 = Rc[2] * t312;
+    const real t949 = t947 + t948;
+    const real t950 = r[1] * t944;
+    const real t951 = r[2] * t939;
+    const real t952 = t950 - t951;
+    const real t953 = t949 + t952;
+    S_I[45] += t953;
+    const real t954 = Rc[3] * t206;
+    const real t955 = Rc[4] * t259;
+    const real t956 = t954 + t955;
+    const real t957 = Rc[5] * t312;
+    const real t958 = t956 + t957;
+    const real t959 = r[2] * t934;
+    const real t960 = r[0] * t944;
+    const real t961 = t959 - t960;
+    const real t962 = t958 + t961;
+    S_I[46] += t962;
+    const real t963 = Rc[6] * t206;
+    const real t964 = Rc[7] * t259;
+    const real t965 = t963 + t964;
+    const real t966 = Rc[8] * t312;
+    const real t967 = t965 + t966;
+    const real t968 = r[0] * t939;
+    const real t969 = r[1] * t934;
+    const real t970 = t968 - t969;
+    const real t971 = t967 + t970;
+    S_I[47] += t971;
+    const real t972 = Rc[0] * t56;
+    const real t973 = Rc[1] * t113;
+    const real t974 = t972 + t973;
+    const real t975 = Rc[2] * t166;
+    const real t976 = t974 + t975;
+    S_I[48] += t976;
+    const real t977 = Rc[3] * t56;
+    const real t978 = Rc[4] * t113;
+    const real t979 = t977 + t978;
+    const real t980 = Rc[5] * t166;
+    const real t981 = t979 + t980;
+    S_I[49] += t981;
+    const real t982 = Rc[6] * t56;
+    const real t983 = Rc[7] * t113;
+    const real t984 = t982 + t983;
+    const real t985 = Rc[8] * t166;
+    const real t986 = t984 + t985;
+    S_I[50] += t986;
+    const real t987 = Rc[0] * t219;
+    const real t988 = Rc[1] * t272;
+    const real t989 = t987 + t988;
+    const real t990 = Rc[2] * t325;
+    const real t991 = t989 + t990;
+    const real t992 = r[1] * t986;
+    const real t993 = r[2] * t981;
+    const real t994 = t992 - t993;
+    const real t995 = t991 + t994;
+    S_I[51] += t995;
+    const real t996 = Rc[3] * t219;
+    const real t997 = Rc[4] * t272;
+    const real t998 = t996 + t997;
+    const real t999 = Rc[5] * t325;
+    const real t1000 = t998 + t999;
+    const real t1001 = r[2] * t976;
+    const real t1002 = r[0] * t986;
+    const real t1003 = t1001 - t1002;
+    const real t1004 = t1000 + t1003;
+    S_I[52] += t1004;
+    const real t1005 = Rc[6] * t219;
+    const real t1006 = Rc[7] * t272;
+    const real t1007 = t1005 + t1006;
+    const real t1008 = Rc[8] * t325;
+    const real t1009 = t1007 + t1008;
+    const real t1010 = r[0] * t981;
+    const real t1011 = r[1] * t976;
+    const real t1012 = t1010 - t1011;
+    const real t1013 = t1009 + t1012;
+    S_I[53] += t1013;
+    return 0;
+}
+
+static int mstmm_sweep_frames_tangent_carry_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_tangent_carry(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_tangent_carry_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_tangent_carry_outputs[] = {
+    {"T", 54, "", 0, 0},
+    {"S_I", 54, "", 1, 0},
+};
+
+/* change of a body's motion by that of its parent's
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    z[0] = t4;
+    const real t5 = Rc[1] * z_I[0];
+    const real t6 = Rc[4] * z_I[1];
+    const real t7 = t5 + t6;
+    const real t8 = Rc[7] * z_I[2];
+    const real t9 = t7 + t8;
+    z[1] = t9;
+    const real t10 = Rc[2] * z_I[0];
+    const real t11 = Rc[5] * z_I[1];
+    const real t12 = t10 + t11;
+    const real t13 = Rc[8] * z_I[2];
+    const real t14 = t12 + t13;
+    z[2] = t14;
+    const real t15 = w[2] * t9;
+    const real t16 = w[1] * t14;
+    const real t17 = t15 - t16;
+    const real t18 = Rc[0] * z_I[3];
+    const real t19 = Rc[3] * z_I[4];
+    const real t20 = t18 + t19;
+    const real t21 = Rc[6] * z_I[5];
+    const real t22 = t20 + t21;
+    const real t23 = t17 + t22;
+    z[3] = t23;
+    const real t24 = w[0] * t14;
+    const real t25 = w[2] * t4;
+    const real t26 = t24 - t25;
+    const real t27 = Rc[1] * z_I[3];
+    const real t28 = Rc[4] * z_I[4];
+    const real t29 = t27 + t28;
+    const real t30 = Rc[7] * z_I[5];
+    const real t31 = t29 + t30;
+    const real t32 = t26 + t31;
+    z[4] = t32;
+    const real t33 = w[1] * t4;
+    const real t34 = w[0] * t9;
+    const real t35 = t33 - t34;
+    const real t36 = Rc[2] * z_I[3];
+    const real t37 = Rc[5] * z_I[4];
+    const real t38 = t36 + t37;
+    const real t39 = Rc[8] * z_I[5];
+    const real t40 = t38 + t39;
+    const real t41 = t35 + t40;
+    z[5] = t41;
+    const real t42 = v[2] * 2.0;
+    const real t43 = t9 * t42;
+    const real t44 = v[1] * 2.0;
+    const real t45 = t14 * t44;
+    const real t46 = t43 - t45;
+    const real t47 = r[2] * z_I[4];
+    const real t48 = r[1] * w_I[1];
+    const real t49 = r[2] * w_I[2];
+    const real t50 = t48 + t49;
+    const real t51 = z_I[0] * t50;
+    const real t52 = r[0] * w_I[1];
+    const real t53 = 2.0 * t52;
+    const real t54 = r[1] * w_I[0];
+    const real t55 = t53 - t54;
+    const real t56 = z_I[1] * t55;
+    const real t57 = r[0] * w_I[2];
+    const real t58 = 2.0 * t57;
+    const real t59 = r[2] * w_I[0];
+    const real t60 = t58 - t59;
+    const real t61 = z_I[2] * t60;
+    const real t62 = t56 + t61;
+    const real t63 = t51 - t62;
+    const real t64 = r[1] * z_I[5];
+    const real t65 = t63 - t64;
+    const real t66 = t47 + t65;
+    const real t67 = z_I[6] + t66;
+    const real t68 = Rc[0] * t67;
+    const real t69 = r[0] * z_I[5];
+    const real t70 = r[0] * w_I[0];
+    const real t71 = t49 + t70;
+    const real t72 = z_I[1] * t71;
+    const real t73 = 2.0 * t54;
+    const real t74 = t73 - t52;
+    const real t75 = z_I[0] * t74;
+    const real t76 = t72 - t75;
+    const real t77 = r[1] * w_I[2];
+    const real t78 = 2.0 * t77;
+    const real t79 = r[2] * w_I[1];
+    const real t80 = t78 - t79;
+    const real t81 = z_I[2] * t80;
+    const real t82 = t76 - t81;
+    const real t83 = t69 + t82;
+    const real t84 = r[2] * z_I[3];
+    const real t85 = t83 - t84;
+    const real t86 = z_I[7] + t85;
+    const real t87 = Rc[3] * t86;
+    const real t88 = t68 + t87;
+    const real t89 = r[1] * z_I[3];
+    const real t90 = t48 + t70;
+    const real t91 = z_I[2] * t90;
+    const real t92 = 2.0 * t59;
+    const real t93 = t92 - t57;
+    const real t94 = z_I[0] * t93;
+    const real t95 = t91 - t94;
+    const real t96 = 2.0 * t79;
+    const real t97 = t96 - t77;
+    const real t98 = z_I[1] * t97;
+    const real t99 = t95 - t98;
+    const real t100 = r[0] * z_I[4];
+    const real t101 = t99 - t100;
+    const real t102 = t89 + t101;
+    const real t103 = z_I[8] + t102;
+    const real t104 = Rc[6] * t103;
+    const real t105 = t88 + t104;
+    const real t106 = t46 + t105;
+    z[6] = t106;
+    const real t107 = v[0] * 2.0;
+    const real t108 = t14 * t107;
+    const real t109 = t4 * t42;
+    const real t110 = t108 - t109;
+    const real t111 = Rc[1] * t67;
+    const real t112 = Rc[4] * t86;
+    const real t113 = t111 + t112;
+    const real t114 = Rc[7] * t103;
+    const real t115 = t113 + t114;
+    const real t116 = t110 + t115;
+    z[7] = t116;
+    const real t117 = t4 * t44;
+    const real t118 = t9 * t107;
+    const real t119 = t117 - t118;
+    const real t120 = Rc[2] * t67;
+    const real t121 = Rc[5] * t86;
+    const real t122 = t120 + t121;
+    const real t123 = Rc[8] * t103;
+    const real t124 = t122 + t123;
+    const real t125 = t119 + t124;
+    z[8] = t125;
+    return 0;
+}
+
+static int mstmm_sweep_frames_tangent_moved_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_tangent_moved(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_tangent_moved_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
+    {"z", 9, "", 0, 0},
+};
+
+/* change of a load by the hinge that carries it
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  d_Rc[3][3] slope of Rc
+ * in  d_r[3] (m) slope of r
+ * in  f[6] (N, N*m) load at P, body axes
+ * out G[6] column of G
+ */
+int mstmm_sweep_frames_tangent_turned(const real *restrict Rc, const real *restrict d_Rc,
+    const real *restrict d_r, const real *restrict f, real *restrict G)
+{
+    const real t0 = Rc[0] * d_Rc[0];
+    const real t1 = Rc[3] * d_Rc[3];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * d_Rc[6];
+    const real t4 = t2 + t3;
+    const real t5 = f[0] * t4;
+    const real t6 = Rc[0] * d_Rc[1];
+    const real t7 = Rc[3] * d_Rc[4];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[6] * d_Rc[7];
+    const real t10 = t8 + t9;
+    const real t11 = f[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[0] * d_Rc[2];
+    const real t14 = Rc[3] * d_Rc[5];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[6] * d_Rc[8];
+    const real t17 = t15 + t16;
+    const real t18 = f[2] * t17;
+    const real t19 = t12 + t18;
+    G[0] = t19;
+    const real t20 = Rc[1] * d_Rc[0];
+    const real t21 = Rc[4] * d_Rc[3];
+    const real t22 = t20 + t21;
+    const real t23 = Rc[7] * d_Rc[6];
+    const real t24 = t22 + t23;
+    const real t25 = f[0] * t24;
+    const real t26 = Rc[1] * d_Rc[1];
+    const real t27 = Rc[4] * d_Rc[4];
+    const real t28 = t26 + t27;
+    const real t29 = Rc[7] * d_Rc[7];
+    const real t30 = t28 + t29;
+    const real t31 = f[1] * t30;
+    const real t32 = t25 + t31;
+    const real t33 = Rc[1] * d_Rc[2];
+    const real t34 = Rc[4] * d_Rc[5];
+    const real t35 = t33 + t34;
+    const real t36 = Rc[7] * d_Rc[8];
+    const real t37 = t35 + t36;
+    const real t38 = f[2] * t37;
+    const real t39 = t32 + t38;
+    G[1] = t39;
+    const real t40 = Rc[2] * d_Rc[0];
+    const real t41 = Rc[5] * d_Rc[3];
+    const real t42 = t40 + t41;
+    const real t43 = Rc[8] * d_Rc[6];
+    const real t44 = t42 + t43;
+    const real t45 = f[0] * t44;
+    const real t46 = Rc[2] * d_Rc[1];
+    const real t47 = Rc[5] * d_Rc[4];
+    const real t48 = t46 + t47;
+    const real t49 = Rc[8] * d_Rc[7];
+    const real t50 = t48 + t49;
+    const real t51 = f[1] * t50;
+    const real t52 = t45 + t51;
+    const real t53 = Rc[2] * d_Rc[2];
+    const real t54 = Rc[5] * d_Rc[5];
+    const real t55 = t53 + t54;
+    const real t56 = Rc[8] * d_Rc[8];
+    const real t57 = t55 + t56;
+    const real t58 = f[2] * t57;
+    const real t59 = t52 + t58;
+    G[2] = t59;
+    const real t60 = f[3] * t4;
+    const real t61 = f[4] * t10;
+    const real t62 = t60 + t61;
+    const real t63 = f[5] * t17;
+    const real t64 = t62 + t63;
+    const real t65 = Rc[1] * d_r[0];
+    const real t66 = Rc[4] * d_r[1];
+    const real t67 = t65 + t66;
+    const real t68 = Rc[7] * d_r[2];
+    const real t69 = t67 + t68;
+    const real t70 = f[2] * t69;
+    const real t71 = Rc[2] * d_r[0];
+    const real t72 = Rc[5] * d_r[1];
+    const real t73 = t71 + t72;
+    const real t74 = Rc[8] * d_r[2];
+    const real t75 = t73 + t74;
+    const real t76 = f[1] * t75;
+    const real t77 = t70 - t76;
+    const real t78 = t64 + t77;
+    G[3] = t78;
+    const real t79 = f[3] * t24;
+    const real t80 = f[4] * t30;
+    const real t81 = t79 + t80;
+    const real t82 = f[5] * t37;
+    const real t83 = t81 + t82;
+    const real t84 = f[0] * t75;
+    const real t85 = Rc[0] * d_r[0];
+    const real t86 = Rc[3] * d_r[1];
+    const real t87 = t85 + t86;
+    const real t88 = Rc[6] * d_r[2];
+    const real t89 = t87 + t88;
+    const real t90 = f[2] * t89;
+    const real t91 = t84 - t90;
+    const real t92 = t83 + t91;
+    G[4] = t92;
+    const real t93 = f[3] * t44;
+    const real t94 = f[4] * t50;
+    const real t95 = t93 + t94;
+    const real t96 = f[5] * t57;
+    const real t97 = t95 + t96;
+    const real t98 = f[1] * t89;
+    const real t99 = f[0] * t69;
+    const real t100 = t98 - t99;
+    const real t101 = t97 + t100;
+    G[5] = t101;
+    return 0;
+}
+
+static int mstmm_sweep_frames_tangent_turned_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_tangent_turned(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_tangent_turned_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
+    {"G", 6, "", 0, 0},
+};
+
+/* pose and its derivative along a direction
+ * in  A_I[3][3] rotation, parent axes to inertial axes
+ * in  x_I[3] (m) P of the parent, inertial axes
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  d_A_I[3][3] derivative of A_I
+ * in  d_x_I[3] (m) derivative of x_I
+ * in  d_Rc[3][3] derivative of Rc
+ * in  d_r[3] (m) derivative of r
+ * out d_A[3][3] derivative of A
+ * out d_x[3] (m) derivative of x
+ */
+int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
+    const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_A, real *restrict d_x)
+{
+    (void)x_I;
+    const real t0 = Rc[6] * d_A_I[2];
+    const real t1 = A_I[2] * d_Rc[6];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[3] * d_A_I[1];
+    const real t4 = A_I[1] * d_Rc[3];
+    const real t5 = t3 + t4;
+    const real t6 = Rc[0] * d_A_I[0];
+    const real t7 = A_I[0] * d_Rc[0];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    const real t10 = t2 + t9;
+    d_A[0] = t10;
+    const real t11 = Rc[7] * d_A_I[2];
+    const real t12 = A_I[2] * d_Rc[7];
+    const real t13 = t11 + t12;
+    const real t14 = Rc[4] * d_A_I[1];
+    const real t15 = A_I[1] * d_Rc[4];
+    const real t16 = t14 + t15;
+    const real t17 = Rc[1] * d_A_I[0];
+    const real t18 = A_I[0] * d_Rc[1];
+    const real t19 = t17 + t18;
+    const real t20 = t16 + t19;
+    const real t21 = t13 + t20;
+    d_A[1] = t21;
+    const real t22 = Rc[8] * d_A_I[2];
+    const real t23 = A_I[2] * d_Rc[8];
+    const real t24 = t22 + t23;
+    const real t25 = Rc[5] * d_A_I[1];
+    const real t26 = A_I[1] * d_Rc[5];
+    const real t27 = t25 + t26;
+    const real t28 = Rc[2] * d_A_I[0];
+    const real t29 = A_I[0] * d_Rc[2];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t24 + t31;
+    d_A[2] = t32;
+    const real t33 = A_I[5] * d_Rc[6];
+    const real t34 = Rc[6] * d_A_I[5];
+    const real t35 = t33 + t34;
+    const real t36 = A_I[4] * d_Rc[3];
+    const real t37 = Rc[3] * d_A_I[4];
+    const real t38 = t36 + t37;
+    const real t39 = A_I[3] * d_Rc[0];
+    const real t40 = Rc[0] * d_A_I[3];
+    const real t41 = t39 + t40;
+    const real t42 = t38 + t41;
+    const real t43 = t35 + t42;
+    d_A[3] = t43;
+    const real t44 = A_I[5] * d_Rc[7];
+    const real t45 = Rc[7] * d_A_I[5];
+    const real t46 = t44 + t45;
+    const real t47 = A_I[4] * d_Rc[4];
+    const real t48 = Rc[4] * d_A_I[4];
+    const real t49 = t47 + t48;
+    const real t50 = A_I[3] * d_Rc[1];
+    const real t51 = Rc[1] * d_A_I[3];
+    const real t52 = t50 + t51;
+    const real t53 = t49 + t52;
+    const real t54 = t46 + t53;
+    d_A[4] = t54;
+    const real t55 = A_I[5] * d_Rc[8];
+    const real t56 = Rc[8] * d_A_I[5];
+    const real t57 = t55 + t56;
+    const real t58 = A_I[4] * d_Rc[5];
+    const real t59 = Rc[5] * d_A_I[4];
+    const real t60 = t58 + t59;
+    const real t61 = A_I[3] * d_Rc[2];
+    const real t62 = Rc[2] * d_A_I[3];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    d_A[5] = t65;
+    const real t66 = A_I[8] * d_Rc[6];
+    const real t67 = Rc[6] * d_A_I[8];
+    const real t68 = t66 + t67;
+    const real t69 = A_I[7] * d_Rc[3];
+    const real t70 = Rc[3] * d_A_I[7];
+    const real t71 = t69 + t70;
+    const real t72 = A_I[6] * d_Rc[0];
+    const real t73 = Rc[0] * d_A_I[6];
+    const real t74 = t72 + t73;
+    const real t75 = t71 + t74;
+    const real t76 = t68 + t75;
+    d_A[6] = t76;
+    const real t77 = A_I[8] * d_Rc[7];
+    const real t78 = Rc[7] * d_A_I[8];
+    const real t79 = t77 + t78;
+    const real t80 = A_I[7] * d_Rc[4];
+    const real t81 = Rc[4] * d_A_I[7];
+    const real t82 = t80 + t81;
+    const real t83 = A_I[6] * d_Rc[1];
+    const real t84 = Rc[1] * d_A_I[6];
+    const real t85 = t83 + t84;
+    const real t86 = t82 + t85;
+    const real t87 = t79 + t86;
+    d_A[7] = t87;
+    const real t88 = A_I[8] * d_Rc[8];
+    const real t89 = Rc[8] * d_A_I[8];
+    const real t90 = t88 + t89;
+    const real t91 = A_I[7] * d_Rc[5];
+    const real t92 = Rc[5] * d_A_I[7];
+    const real t93 = t91 + t92;
+    const real t94 = A_I[6] * d_Rc[2];
+    const real t95 = Rc[2] * d_A_I[6];
+    const real t96 = t94 + t95;
+    const real t97 = t93 + t96;
+    const real t98 = t90 + t97;
+    d_A[8] = t98;
+    const real t99 = r[2] * d_A_I[2];
+    const real t100 = A_I[2] * d_r[2];
+    const real t101 = t99 + t100;
+    const real t102 = r[1] * d_A_I[1];
+    const real t103 = A_I[1] * d_r[1];
+    const real t104 = t102 + t103;
+    const real t105 = r[0] * d_A_I[0];
+    const real t106 = A_I[0] * d_r[0];
+    const real t107 = t105 + t106;
+    const real t108 = t104 + t107;
+    const real t109 = t101 + t108;
+    const real t110 = d_x_I[0] + t109;
+    d_x[0] = t110;
+    const real t111 = r[2] * d_A_I[5];
+    const real t112 = A_I[5] * d_r[2];
+    const real t113 = t111 + t112;
+    const real t114 = r[1] * d_A_I[4];
+    const real t115 = A_I[4] * d_r[1];
+    const real t116 = t114 + t115;
+    const real t117 = r[0] * d_A_I[3];
+    const real t118 = A_I[3] * d_r[0];
+    const real t119 = t117 + t118;
+    const real t120 = t116 + t119;
+    const real t121 = t113 + t120;
+    const real t122 = d_x_I[1] + t121;
+    d_x[1] = t122;
+    const real t123 = r[2] * d_A_I[8];
+    const real t124 = A_I[8] * d_r[2];
+    const real t125 = t123 + t124;
+    const real t126 = r[1] * d_A_I[7];
+    const real t127 = A_I[7] * d_r[1];
+    const real t128 = t126 + t127;
+    const real t129 = r[0] * d_A_I[6];
+    const real t130 = A_I[6] * d_r[0];
+    const real t131 = t129 + t130;
+    const real t132 = t128 + t131;
+    const real t133 = t125 + t132;
+    const real t134 = d_x_I[2] + t133;
+    d_x[2] = t134;
+    return 0;
+}
+
+static int mstmm_sweep_frames_pose_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_pose_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_pose_slope_inputs[] = {
+    {"A_I", 9, "", 0, 0},
+    {"x_I", 3, "m", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"d_A_I", 9, "", 0, 0},
+    {"d_x_I", 3, "m", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_pose_slope_outputs[] = {
+    {"d_A", 9, "", 0, 0},
+    {"d_x", 3, "m", 0, 0},
+};
+
+/* velocity and its derivative along a direction
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  v_I[3] (m/s) velocity of the parent's P, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v_rel[3] (m/s) relative velocity of the hinge, body axes
+ * in  d_Rc[3][3] derivative of Rc
+ * in  d_r[3] (m) derivative of r
+ * in  d_v_I[3] (m/s) derivative of v_I
+ * in  d_w_I[3] (rad/s) derivative of w_I
+ * in  d_v_rel[3] (m/s) derivative of v_rel
+ * out d_v[3] (m/s) derivative of v
+ */
+int mstmm_sweep_frames_velocity_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
+    const real *restrict d_Rc, const real *restrict d_r, const real *restrict d_v_I,
+    const real *restrict d_w_I, const real *restrict d_v_rel, real *restrict d_v)
+{
+    (void)v_rel;
+    const real t0 = w_I[0] * d_r[1];
+    const real t1 = r[1] * d_w_I[0];
+    const real t2 = t0 + t1;
+    const real t3 = r[0] * d_w_I[1];
+    const real t4 = w_I[1] * d_r[0];
+    const real t5 = t3 + t4;
+    const real t6 = t2 - t5;
+    const real t7 = d_v_I[2] + t6;
+    const real t8 = Rc[6] * t7;
+    const real t9 = r[1] * w_I[0];
+    const real t10 = w_I[1] * r[0];
+    const real t11 = t9 - t10;
+    const real t12 = t11 + v_I[2];
+    const real t13 = t12 * d_Rc[6];
+    const real t14 = t8 + t13;
+    const real t15 = r[0] * d_w_I[2];
+    const real t16 = w_I[2] * d_r[0];
+    const real t17 = t15 + t16;
+    const real t18 = w_I[0] * d_r[2];
+    const real t19 = r[2] * d_w_I[0];
+    const real t20 = t18 + t19;
+    const real t21 = t17 - t20;
+    const real t22 = d_v_I[1] + t21;
+    const real t23 = Rc[3] * t22;
+    const real t24 = w_I[2] * r[0];
+    const real t25 = r[2] * w_I[0];
+    const real t26 = t24 - t25;
+    const real t27 = t26 + v_I[1];
+    const real t28 = t27 * d_Rc[3];
+    const real t29 = t23 + t28;
+    const real t30 = w_I[1] * d_r[2];
+    const real t31 = r[2] * d_w_I[1];
+    const real t32 = t30 + t31;
+    const real t33 = w_I[2] * d_r[1];
+    const real t34 = r[1] * d_w_I[2];
+    const real t35 = t33 + t34;
+    const real t36 = t32 - t35;
+    const real t37 = d_v_I[0] + t36;
+    const real t38 = Rc[0] * t37;
+    const real t39 = r[2] * w_I[1];
+    const real t40 = r[1] * w_I[2];
+    const real t41 = t39 - t40;
+    const real t42 = t41 + v_I[0];
+    const real t43 = t42 * d_Rc[0];
+    const real t44 = t38 + t43;
+    const real t45 = t29 + t44;
+    const real t46 = t14 + t45;
+    const real t47 = d_v_rel[0] + t46;
+    d_v[0] = t47;
+    const real t48 = Rc[7] * t7;
+    const real t49 = t12 * d_Rc[7];
+    const real t50 = t48 + t49;
+    const real t51 = Rc[4] * t22;
+    const real t52 = t27 * d_Rc[4];
+    const real t53 = t51 + t52;
+    const real t54 = Rc[1] * t37;
+    const real t55 = t42 * d_Rc[1];
+    const real t56 = t54 + t55;
+    const real t57 = t53 + t56;
+    const real t58 = t50 + t57;
+    const real t59 = d_v_rel[1] + t58;
+    d_v[1] = t59;
+    const real t60 = Rc[8] * t7;
+    const real t61 = t12 * d_Rc[8];
+    const real t62 = t60 + t61;
+    const real t63 = Rc[5] * t22;
+    const real t64 = t27 * d_Rc[5];
+    const real t65 = t63 + t64;
+    const real t66 = Rc[2] * t37;
+    const real t67 = t42 * d_Rc[2];
+    const real t68 = t66 + t67;
+    const real t69 = t65 + t68;
+    const real t70 = t62 + t69;
+    const real t71 = d_v_rel[2] + t70;
+    d_v[2] = t71;
+    return 0;
+}
+
+static int mstmm_sweep_frames_velocity_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_velocity_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_velocity_slope_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"v_I", 3, "m/s", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v_rel", 3, "m/s", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_v_I", 3, "m/s", 0, 0},
+    {"d_w_I", 3, "rad/s", 0, 0},
+    {"d_v_rel", 3, "m/s", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_velocity_slope_outputs[] = {
+    {"d_v", 3, "m/s", 0, 0},
+};
+
+/* point and its derivative along a direction
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  x[3] (m) P of the body, inertial axes
+ * in  v[3] (m/s) velocity of P, body axes
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  delta[6] deviation of the body's acceleration
+ * in  offset[3] (m) point of the body from P, body axes
+ * in  gravity[3] (m/s2) inertial axes
+ * in  d_A[3][3] derivative of A
+ * in  d_x[3] (m) derivative of x
+ * in  d_v[3] (m/s) derivative of v
+ * in  d_motion[9] derivative of motion
+ * out d_x_K[3] (m) derivative of x_K
+ * out d_v_K[3] (m/s) derivative of v_K
+ */
+int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict delta,
+    const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
+    const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
+    real *restrict d_x_K, real *restrict d_v_K)
+{
+    (void)x;
+    (void)delta;
+    (void)gravity;
+    const real t0 = offset[2] * d_A[2];
+    const real t1 = offset[1] * d_A[1];
+    const real t2 = offset[0] * d_A[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = d_x[0] + t4;
+    d_x_K[0] = t5;
+    const real t6 = offset[2] * d_A[5];
+    const real t7 = offset[1] * d_A[4];
+    const real t8 = offset[0] * d_A[3];
+    const real t9 = t7 + t8;
+    const real t10 = t6 + t9;
+    const real t11 = d_x[1] + t10;
+    d_x_K[1] = t11;
+    const real t12 = offset[2] * d_A[8];
+    const real t13 = offset[1] * d_A[7];
+    const real t14 = offset[0] * d_A[6];
+    const real t15 = t13 + t14;
+    const real t16 = t12 + t15;
+    const real t17 = d_x[2] + t16;
+    d_x_K[2] = t17;
+    const real t18 = offset[1] * motion[0];
+    const real t19 = offset[0] * motion[1];
+    const real t20 = t18 - t19;
+    const real t21 = t20 + v[2];
+    const real t22 = t21 * d_A[2];
+    const real t23 = offset[1] * d_motion[0];
+    const real t24 = offset[0] * d_motion[1];
+    const real t25 = t23 - t24;
+    const real t26 = d_v[2] + t25;
+    const real t27 = A[2] * t26;
+    const real t28 = t22 + t27;
+    const real t29 = offset[0] * motion[2];
+    const real t30 = offset[2] * motion[0];
+    const real t31 = t29 - t30;
+    const real t32 = t31 + v[1];
+    const real t33 = t32 * d_A[1];
+    const real t34 = offset[0] * d_motion[2];
+    const real t35 = offset[2] * d_motion[0];
+    const real t36 = t34 - t35;
+    const real t37 = d_v[1] + t36;
+    const real t38 = A[1] * t37;
+    const real t39 = t33 + t38;
+    const real t40 = offset[2] * motion[1];
+    const real t41 = offset[1] * motion[2];
+    const real t42 = t40 - t41;
+    const real t43 = t42 + v[0];
+    const real t44 = t43 * d_A[0];
+    const real t45 = offset[2] * d_motion[1];
+    const real t46 = offset[1] * d_motion[2];
+    const real t47 = t45 - t46;
+    const real t48 = d_v[0] + t47;
+    const real t49 = A[0] * t48;
+    const real t50 = t44 + t49;
+    const real t51 = t39 + t50;
+    const real t52 = t28 + t51;
+    d_v_K[0] = t52;
+    const real t53 = t21 * d_A[5];
+    const real t54 = A[5] * t26;
+    const real t55 = t53 + t54;
+    const real t56 = t32 * d_A[4];
+    const real t57 = A[4] * t37;
+    const real t58 = t56 + t57;
+    const real t59 = t43 * d_A[3];
+    const real t60 = A[3] * t48;
+    const real t61 = t59 + t60;
+    const real t62 = t58 + t61;
+    const real t63 = t55 + t62;
+    d_v_K[1] = t63;
+    const real t64 = t21 * d_A[8];
+    const real t65 = A[8] * t26;
+    const real t66 = t64 + t65;
+    const real t67 = t32 * d_A[7];
+    const real t68 = A[7] * t37;
+    const real t69 = t67 + t68;
+    const real t70 = t43 * d_A[6];
+    const real t71 = A[6] * t48;
+    const real t72 = t70 + t71;
+    const real t73 = t69 + t72;
+    const real t74 = t66 + t73;
+    d_v_K[2] = t74;
+    return 0;
+}
+
+static int mstmm_sweep_frames_point_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_point_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_point_slope_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"x", 3, "m", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"offset", 3, "m", 0, 0},
+    {"gravity", 3, "m/s2", 0, 0},
+    {"d_A", 9, "", 0, 0},
+    {"d_x", 3, "m", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_point_slope_outputs[] = {
+    {"d_x_K", 3, "m", 0, 0},
+    {"d_v_K", 3, "m/s", 0, 0},
+};
+
+/* turning and its derivative along a direction
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  delta[6] deviation of the body's acceleration
+ * in  d_A[3][3] derivative of A
+ * in  d_motion[9] derivative of motion
+ * out d_w_K[3] (rad/s) derivative of w_K
+ */
+int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+    const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
+    real *restrict d_w_K)
+{
+    (void)delta;
+    const real t0 = motion[2] * d_A[2];
+    const real t1 = A[2] * d_motion[2];
+    const real t2 = t0 + t1;
+    const real t3 = motion[1] * d_A[1];
+    const real t4 = A[1] * d_motion[1];
+    const real t5 = t3 + t4;
+    const real t6 = motion[0] * d_A[0];
+    const real t7 = A[0] * d_motion[0];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    const real t10 = t2 + t9;
+    d_w_K[0] = t10;
+    const real t11 = A[5] * d_motion[2];
+    const real t12 = motion[2] * d_A[5];
+    const real t13 = t11 + t12;
+    const real t14 = A[4] * d_motion[1];
+    const real t15 = motion[1] * d_A[4];
+    const real t16 = t14 + t15;
+    const real t17 = A[3] * d_motion[0];
+    const real t18 = motion[0] * d_A[3];
+    const real t19 = t17 + t18;
+    const real t20 = t16 + t19;
+    const real t21 = t13 + t20;
+    d_w_K[1] = t21;
+    const real t22 = A[8] * d_motion[2];
+    const real t23 = motion[2] * d_A[8];
+    const real t24 = t22 + t23;
+    const real t25 = A[7] * d_motion[1];
+    const real t26 = motion[1] * d_A[7];
+    const real t27 = t25 + t26;
+    const real t28 = A[6] * d_motion[0];
+    const real t29 = motion[0] * d_A[6];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t24 + t31;
+    d_w_K[2] = t32;
+    return 0;
+}
+
+static int mstmm_sweep_frames_turning_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_turning_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_turning_slope_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+    {"d_A", 9, "", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_turning_slope_outputs[] = {
+    {"d_w_K", 3, "rad/s", 0, 0},
+};
+
+/* end_frame and its derivative along a direction
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  R_end[3][3] rotation, end axes to body axes
+ * in  d_A[3][3] derivative of A
+ * out d_A_end[3][3] derivative of A_end
+ */
+int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
+    const real *restrict d_A, real *restrict d_A_end)
+{
+    (void)A;
+    const real t0 = R_end[6] * d_A[2];
+    const real t1 = R_end[3] * d_A[1];
+    const real t2 = R_end[0] * d_A[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_A_end[0] = t4;
+    const real t5 = R_end[7] * d_A[2];
+    const real t6 = R_end[4] * d_A[1];
+    const real t7 = R_end[1] * d_A[0];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_A_end[1] = t9;
+    const real t10 = R_end[8] * d_A[2];
+    const real t11 = R_end[5] * d_A[1];
+    const real t12 = R_end[2] * d_A[0];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_A_end[2] = t14;
+    const real t15 = R_end[6] * d_A[5];
+    const real t16 = R_end[3] * d_A[4];
+    const real t17 = R_end[0] * d_A[3];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_A_end[3] = t19;
+    const real t20 = R_end[7] * d_A[5];
+    const real t21 = R_end[4] * d_A[4];
+    const real t22 = R_end[1] * d_A[3];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_A_end[4] = t24;
+    const real t25 = R_end[8] * d_A[5];
+    const real t26 = R_end[5] * d_A[4];
+    const real t27 = R_end[2] * d_A[3];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_A_end[5] = t29;
+    const real t30 = R_end[6] * d_A[8];
+    const real t31 = R_end[3] * d_A[7];
+    const real t32 = R_end[0] * d_A[6];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_A_end[6] = t34;
+    const real t35 = R_end[7] * d_A[8];
+    const real t36 = R_end[4] * d_A[7];
+    const real t37 = R_end[1] * d_A[6];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_A_end[7] = t39;
+    const real t40 = R_end[8] * d_A[8];
+    const real t41 = R_end[5] * d_A[7];
+    const real t42 = R_end[2] * d_A[6];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_A_end[8] = t44;
+    return 0;
+}
+
+static int mstmm_sweep_frames_end_frame_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_end_frame_slope(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_end_frame_slope_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"R_end", 9, "", 0, 0},
+    {"d_A", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_end_frame_slope_outputs[] = {
+    {"d_A_end", 9, "", 0, 0},
+};
+
+/* applied_load and its derivative along a direction
+ * in  A[3][3] rotation, body axes to inertial axes
+ * in  A_F[3][3] rotation, axes of the load to inertial axes
+ * in  offset[3] (m) point of the body from P, body axes
+ * in  F[3] (N) force, axes of the load
+ * in  M[3] (N*m) moment, axes of the load
+ * in  d_A[3][3] derivative of A
+ * in  d_A_F[3][3] derivative of A_F
+ * in  d_F[3] (N) derivative of F
+ * in  d_M[3] (N*m) derivative of M
+ * out d_e[6] (N, N*m) derivative of e, added to what is there
+ */
+int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M,
+    const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
+    const real *restrict d_M, real *restrict d_e)
+{
+    const real t0 = A_F[8] * d_A[6];
+    const real t1 = A[6] * d_A_F[8];
+    const real t2 = t0 + t1;
+    const real t3 = A_F[5] * d_A[3];
+    const real t4 = A[3] * d_A_F[5];
+    const real t5 = t3 + t4;
+    const real t6 = A_F[2] * d_A[0];
+    const real t7 = A[0] * d_A_F[2];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    const real t10 = t2 + t9;
+    const real t11 = F[2] * t10;
+    const real t12 = A[0] * A_F[2];
+    const real t13 = A[3] * A_F[5];
+    const real t14 = t12 + t13;
+    const real t15 = A[6] * A_F[8];
+    const real t16 = t14 + t15;
+    const real t17 = t16 * d_F[2];
+    const real t18 = t11 + t17;
+    const real t19 = A_F[7] * d_A[6];
+    const real t20 = A[6] * d_A_F[7];
+    const real t21 = t19 + t20;
+    const real t22 = A_F[4] * d_A[3];
+    const real t23 = A[3] * d_A_F[4];
+    const real t24 = t22 + t23;
+    const real t25 = A_F[1] * d_A[0];
+    const real t26 = A[0] * d_A_F[1];
+    const real t27 = t25 + t26;
+    const real t28 = t24 + t27;
+    const real t29 = t21 + t28;
+    const real t30 = F[1] * t29;
+    const real t31 = A[0] * A_F[1];
+    const real t32 = A[3] * A_F[4];
+    const real t33 = t31 + t32;
+    const real t34 = A[6] * A_F[7];
+    const real t35 = t33 + t34;
+    const real t36 = t35 * d_F[1];
+    const real t37 = t30 + t36;
+    const real t38 = A_F[6] * d_A[6];
+    const real t39 = A[6] * d_A_F[6];
+    const real t40 = t38 + t39;
+    const real t41 = A_F[3] * d_A[3];
+    const real t42 = A[3] * d_A_F[3];
+    const real t43 = t41 + t42;
+    const real t44 = A_F[0] * d_A[0];
+    const real t45 = A[0] * d_A_F[0];
+    const real t46 = t44 + t45;
+    const real t47 = t43 + t46;
+    const real t48 = t40 + t47;
+    const real t49 = F[0] * t48;
+    const real t50 = A[0] * A_F[0];
+    const real t51 = A[3] * A_F[3];
+    const real t52 = t50 + t51;
+    const real t53 = A[6] * A_F[6];
+    const real t54 = t52 + t53;
+    const real t55 = t54 * d_F[0];
+    const real t56 = t49 + t55;
+    const real t57 = t37 + t56;
+    const real t58 = t18 + t57;
+    const real t59 = -t58;
+    d_e[0] += t59;
+    const real t60 = A_F[2] * A[1];
+    const real t61 = A_F[5] * A[4];
+    const real t62 = t60 + t61;
+    const real t63 = A_F[8] * A[7];
+    const real t64 = t62 + t63;
+    const real t65 = t64 * d_F[2];
+    const real t66 = A[7] * d_A_F[8];
+    const real t67 = A_F[8] * d_A[7];
+    const real t68 = t66 + t67;
+    const real t69 = A[4] * d_A_F[5];
+    const real t70 = A_F[5] * d_A[4];
+    const real t71 = t69 + t70;
+    const real t72 = A[1] * d_A_F[2];
+    const real t73 = A_F[2] * d_A[1];
+    const real t74 = t72 + t73;
+    const real t75 = t71 + t74;
+    const real t76 = t68 + t75;
+    const real t77 = F[2] * t76;
+    const real t78 = t65 + t77;
+    const real t79 = A_F[1] * A[1];
+    const real t80 = A_F[4] * A[4];
+    const real t81 = t79 + t80;
+    const real t82 = A_F[7] * A[7];
+    const real t83 = t81 + t82;
+    const real t84 = t83 * d_F[1];
+    const real t85 = A[7] * d_A_F[7];
+    const real t86 = A_F[7] * d_A[7];
+    const real t87 = t85 + t86;
+    const real t88 = A[4] * d_A_F[4];
+    const real t89 = A_F[4] * d_A[4];
+    const real t90 = t88 + t89;
+    const real t91 = A[1] * d_A_F[1];
+    const real t92 = A_F[1] * d_A[1];
+    const real t93 = t91 + t92;
+    const real t94 = t90 + t93;
+    const real t95 = t87 + t94;
+    const real t96 = F[1] * t95;
+    const real t97 = t84 + t96;
+    const real t98 = A_F[0] * A[1];
+    const real t99 = A_F[3] * A[4];
+    const real t100 = t98 + t99;
+    const real t101 = A_F[6] * A[7];
+    const real t102 = t100 + t101;
+    const real t103 = t102 * d_F[0];
+    const real t104 = A[7] * d_A_F[6];
+    const real t105 = A_F[6] * d_A[7];
+    const real t106 = t104 + t105;
+    const real t107 = A[4] * d_A_F[3];
+    const real t108 = A_F[3] * d_A[4];
+    const real t109 = t107 + t108;
+    const real t110 = A[1] * d_A_F[0];
+    const real t111 = A_F[0] * d_A[1];
+    const real t112 = t110 + t111;
+    const real t113 = t109 + t112;
+    const real t114 = t106 + t113;
+    const real t115 = F[0] * t114;
+    const real t116 = t103 + t115;
+    const real t117 = t97 + t116;
+    const real t118 = t78 + t117;
+    const real t119 = -t118;
+    d_e[1] += t119;
+    const real t120 = A_F[2] * A[2];
+    const real t121 = A_F[5] * A[5];
+    const real t122 = t120 + t121;
+    const real t123 = A_F[8] * A[8];
+    const real t124 = t122 + t123;
+    const real t125 = t124 * d_F[2];
+    const real t126 = A[8] * d_A_F[8];
+    const real t127 = A_F[8] * d_A[8];
+    const real t128 = t126 + t127;
+    const real t129 = A[5] * d_A_F[5];
+    const real t130 = A_F[5] * d_A[5];
+    const real t131 = t129 + t130;
+    const real t132 = A[2] * d_A_F[2];
+    const real t133 = A_F[2] * d_A[2];
+    const real t134 = t132 + t133;
+    const real t135 = t131 + t134;
+    const real t136 = t128 + t135;
+    const real t137 = F[2] * t136;
+    const real t138 = t125 + t137;
+    const real t139 = A_F[1] * A[2];
+    const real t140 = A_F[4] * A[5];
+    const real t141 = t139 + t140;
+    const real t142 = A_F[7] * A[8];
+    const real t143 = t141 + t142;
+    const real t144 = t143 * d_F[1];
+    const real t145 = A[8] * d_A_F[7];
+    const real t146 = A_F[7] * d_A[8];
+    const real t147 = t145 + t146;
+    const real t148 = A[5] * d_A_F[4];
+    const real t149 = A_F[4] * d_A[5];
+    const real t150 = t148 + t149;
+    const real t151 = A[2] * d_A_F[1];
+    const real t152 = A_F[1] * d_A[2];
+    const real t153 = t151 + t152;
+    const real t154 = t150 + t153;
+    const real t155 = t147 + t154;
+    const real t156 = F[1] * t155;
+    const real t157 = t144 + t156;
+    const real t158 = A_F[0] * A[2];
+    const real t159 = A_F[3] * A[5];
+    const real t160 = t158 + t159;
+    const real t161 = A_F[6] * A[8];
+    const real t162 = t160 + t161;
+    const real t163 = t162 * d_F[0];
+    const real t164 = A[8] * d_A_F[6];
+    const real t165 = A_F[6] * d_A[8];
+    const real t166 = t164 + t165;
+    const real t167 = A[5] * d_A_F[3];
+    const real t168 = A_F[3] * d_A[5];
+    const real t169 = t167 + t168;
+    const real t170 = A[2] * d_A_F[0];
+    const real t171 = A_F[0] * d_A[2];
+    const real t172 = t170 + t171;
+    const real t173 = t169 + t172;
+    const real t174 = t166 + t173;
+    const real t175 = F[0] * t174;
+    const real t176 = t163 + t175;
+    const real t177 = t157 + t176;
+    const real t178 = t138 + t177;
+    const real t179 = -t178;
+    d_e[2] += t179;
+    const real t180 = offset[2] * t118;
+    const real t181 = offset[1] * t178;
+    const real t182 = t180 - t181;
+    const real t183 = M[2] * t10;
+    const real t184 = t16 * d_M[2];
+    const real t185 = t183 + t184;
+    const real t186 = M[1] * t29;
+    const real t187 = t35 * d_M[1];
+    const real t188 = t186 + t187;
+    const real t189 = M[0] * t48;
+    const real t190 = t54 * d_M[0];
+    const real t191 = t189 + t190;
+    const real t192 = t188 + t191;
+    const real t193 = t185 + t192;
+    const real t194 = t182 - t193;
+    d_e[3] += t194;
+    const real t195 = offset[0] * t178;
+    const real t196 = offset[2] * t58;
+    const real t197 = t195 - t196;
+    const real t198 = M[2] * t76;
+    const real t199 = t64 * d_M[2];
+    const real t200 = t198 + t199;
+    const real t201 = M[1] * t95;
+    const real t202 = t83 * d_M[1];
+    const real t203 = t201 + t202;
+    const real t204 = M[0] * t114;
+    const real t205 = t102 * d_M[0];
+    const real t206 = t204 + t205;
+    const real t207 = t203 + t206;
+    const real t208 = t200 + t207;
+    const real t209 = t197 - t208;
+    d_e[4] += t209;
+    const real t210 = offset[1] * t58;
+    const real t211 = offset[0] * t118;
+    const real t212 = t210 - t211;
+    const real t213 = M[2] * t136;
+    const real t214 = t124 * d_M[2];
+    const real t215 = t213 + t214;
+    const real t216 = M[1] * t155;
+    const real t217 = t143 * d_M[1];
+    const real t218 = t216 + t217;
+    const real t219 = M[0] * t174;
+    const real t220 = t162 * d_M[0];
+    const real t221 = t219 + t220;
+    const real t222 = t218 + t221;
+    const real t223 = t215 + t222;
+    const real t224 = t212 - t223;
+    d_e[5] += t224;
+    return 0;
+}
+
+static int mstmm_sweep_frames_applied_load_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_applied_load_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_applied_load_slope_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"A_F", 9, "", 0, 0},
+    {"offset", 3, "m", 0, 0},
+    {"F", 3, "N", 0, 0},
+    {"M", 3, "N*m", 0, 0},
+    {"d_A", 9, "", 0, 0},
+    {"d_A_F", 9, "", 0, 0},
+    {"d_F", 3, "N", 0, 0},
+    {"d_M", 3, "N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_applied_load_slope_outputs[] = {
+    {"d_e", 6, "N, N*m", 1, 0},
+};
+
+/* opposite and its derivative along a direction
+ * in  x_F[3]
+ * in  x_T[3]
+ * in  F[3]
+ * in  M[3]
+ * in  d_x_F[3] derivative of x_F
+ * in  d_x_T[3] derivative of x_T
+ * in  d_F[3] derivative of F
+ * in  d_M[3] derivative of M
+ * out d_F_back[3] (N) derivative of F_back
+ * out d_M_back[3] (N*m) derivative of M_back
+ */
+int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+    const real *restrict F, const real *restrict M, const real *restrict d_x_F,
+    const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
+    real *restrict d_F_back, real *restrict d_M_back)
+{
+    (void)M;
+    const real t0 = -d_F[0];
+    d_F_back[0] = t0;
+    const real t1 = -d_F[1];
+    d_F_back[1] = t1;
+    const real t2 = -d_F[2];
+    d_F_back[2] = t2;
+    const real t3 = x_F[1] - x_T[1];
+    const real t4 = t3 * d_F[2];
+    const real t5 = d_x_F[1] - d_x_T[1];
+    const real t6 = F[2] * t5;
+    const real t7 = t4 + t6;
+    const real t8 = x_T[2] - x_F[2];
+    const real t9 = t8 * d_F[1];
+    const real t10 = d_x_T[2] - d_x_F[2];
+    const real t11 = F[1] * t10;
+    const real t12 = t9 + t11;
+    const real t13 = t7 + t12;
+    const real t14 = t13 - d_M[0];
+    d_M_back[0] = t14;
+    const real t15 = x_T[0] - x_F[0];
+    const real t16 = t15 * d_F[2];
+    const real t17 = d_x_T[0] - d_x_F[0];
+    const real t18 = F[2] * t17;
+    const real t19 = t16 + t18;
+    const real t20 = t8 * d_F[0];
+    const real t21 = F[0] * t10;
+    const real t22 = t20 + t21;
+    const real t23 = t19 - t22;
+    const real t24 = t23 - d_M[1];
+    d_M_back[1] = t24;
+    const real t25 = t15 * d_F[1];
+    const real t26 = F[1] * t17;
+    const real t27 = t25 + t26;
+    const real t28 = t3 * d_F[0];
+    const real t29 = F[0] * t5;
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = d_M[2] + t31;
+    const real t33 = -t32;
+    d_M_back[2] = t33;
+    return 0;
+}
+
+static int mstmm_sweep_frames_opposite_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_opposite_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_opposite_slope_inputs[] = {
+    {"x_F", 3, "", 0, 0},
+    {"x_T", 3, "", 0, 0},
+    {"F", 3, "", 0, 0},
+    {"M", 3, "", 0, 0},
+    {"d_x_F", 3, "", 0, 0},
+    {"d_x_T", 3, "", 0, 0},
+    {"d_F", 3, "", 0, 0},
+    {"d_M", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_opposite_slope_outputs[] = {
+    {"d_F_back", 3, "N", 0, 0},
+    {"d_M_back", 3, "N*m", 0, 0},
+};
+
+/* transport and its derivative along a direction
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  d_Rc[3][3] derivative of Rc
+ * in  d_r[3] (m) derivative of r
+ * in  d_e[6] (N, N*m) derivative of e
+ * out d_e_I[6] (N, N*m) derivative of e_I, added to what is there
+ */
+int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
+    const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
+    const real *restrict d_e, real *restrict d_e_I)
+{
+    const real t0 = e[2] * d_Rc[2];
+    const real t1 = Rc[2] * d_e[2];
+    const real t2 = t0 + t1;
+    const real t3 = e[1] * d_Rc[1];
+    const real t4 = Rc[1] * d_e[1];
+    const real t5 = t3 + t4;
+    const real t6 = e[0] * d_Rc[0];
+    const real t7 = Rc[0] * d_e[0];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    const real t10 = t2 + t9;
+    d_e_I[0] += t10;
+    const real t11 = Rc[5] * d_e[2];
+    const real t12 = e[2] * d_Rc[5];
+    const real t13 = t11 + t12;
+    const real t14 = Rc[4] * d_e[1];
+    const real t15 = e[1] * d_Rc[4];
+    const real t16 = t14 + t15;
+    const real t17 = Rc[3] * d_e[0];
+    const real t18 = e[0] * d_Rc[3];
+    const real t19 = t17 + t18;
+    const real t20 = t16 + t19;
+    const real t21 = t13 + t20;
+    d_e_I[1] += t21;
+    const real t22 = Rc[8] * d_e[2];
+    const real t23 = e[2] * d_Rc[8];
+    const real t24 = t22 + t23;
+    const real t25 = Rc[7] * d_e[1];
+    const real t26 = e[1] * d_Rc[7];
+    const real t27 = t25 + t26;
+    const real t28 = Rc[6] * d_e[0];
+    const real t29 = e[0] * d_Rc[6];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t24 + t31;
+    d_e_I[2] += t32;
+    const real t33 = e[5] * d_Rc[2];
+    const real t34 = Rc[2] * d_e[5];
+    const real t35 = t33 + t34;
+    const real t36 = e[4] * d_Rc[1];
+    const real t37 = Rc[1] * d_e[4];
+    const real t38 = t36 + t37;
+    const real t39 = e[3] * d_Rc[0];
+    const real t40 = Rc[0] * d_e[3];
+    const real t41 = t39 + t40;
+    const real t42 = t38 + t41;
+    const real t43 = t35 + t42;
+    const real t44 = r[1] * t32;
+    const real t45 = e[0] * Rc[6];
+    const real t46 = e[1] * Rc[7];
+    const real t47 = t45 + t46;
+    const real t48 = e[2] * Rc[8];
+    const real t49 = t47 + t48;
+    const real t50 = t49 * d_r[1];
+    const real t51 = t44 + t50;
+    const real t52 = r[2] * t21;
+    const real t53 = e[0] * Rc[3];
+    const real t54 = e[1] * Rc[4];
+    const real t55 = t53 + t54;
+    const real t56 = e[2] * Rc[5];
+    const real t57 = t55 + t56;
+    const real t58 = t57 * d_r[2];
+    const real t59 = t52 + t58;
+    const real t60 = t51 - t59;
+    const real t61 = t43 + t60;
+    d_e_I[3] += t61;
+    const real t62 = e[5] * d_Rc[5];
+    const real t63 = Rc[5] * d_e[5];
+    const real t64 = t62 + t63;
+    const real t65 = e[4] * d_Rc[4];
+    const real t66 = Rc[4] * d_e[4];
+    const real t67 = t65 + t66;
+    const real t68 = e[3] * d_Rc[3];
+    const real t69 = Rc[3] * d_e[3];
+    const real t70 = t68 + t69;
+    const real t71 = t67 + t70;
+    const real t72 = t64 + t71;
+    const real t73 = r[2] * t10;
+    const real t74 = Rc[0] * e[0];
+    const real t75 = Rc[1] * e[1];
+    const real t76 = t74 + t75;
+    const real t77 = Rc[2] * e[2];
+    const real t78 = t76 + t77;
+    const real t79 = t78 * d_r[2];
+    const real t80 = t73 + t79;
+    const real t81 = r[0] * t32;
+    const real t82 = t49 * d_r[0];
+    const real t83 = t81 + t82;
+    const real t84 = t80 - t83;
+    const real t85 = t72 + t84;
+    d_e_I[4] += t85;
+    const real t86 = e[5] * d_Rc[8];
+    const real t87 = Rc[8] * d_e[5];
+    const real t88 = t86 + t87;
+    const real t89 = e[4] * d_Rc[7];
+    const real t90 = Rc[7] * d_e[4];
+    const real t91 = t89 + t90;
+    const real t92 = e[3] * d_Rc[6];
+    const real t93 = Rc[6] * d_e[3];
+    const real t94 = t92 + t93;
+    const real t95 = t91 + t94;
+    const real t96 = t88 + t95;
+    const real t97 = r[0] * t21;
+    const real t98 = t57 * d_r[0];
+    const real t99 = t97 + t98;
+    const real t100 = r[1] * t10;
+    const real t101 = t78 * d_r[1];
+    const real t102 = t100 + t101;
+    const real t103 = t99 - t102;
+    const real t104 = t96 + t103;
+    d_e_I[5] += t104;
+    return 0;
+}
+
+static int mstmm_sweep_frames_transport_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_transport_slope(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_transport_slope_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_e", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_transport_slope_outputs[] = {
+    {"d_e_I", 6, "N, N*m", 1, 0},
+};
+
+/* driven_effort and its derivative along a direction
+ * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
+ * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
+ * in  udot[1] acceleration
+ * in  tau[1] (N, N*m) effort that is there already
+ * in  d_felt[1] (N, N*m) derivative of felt
+ * in  d_udot[1] derivative of udot
+ * in  d_tau[1] (N, N*m) derivative of tau
+ * out d_tau_d[1] (N, N*m) derivative of tau_d
+ */
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+    const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d)
+{
+    (void)felt;
+    (void)udot;
+    (void)tau;
+    const real t0 = J[0] * d_udot[0];
+    const real t1 = t0 - d_tau[0];
+    const real t2 = d_felt[0] + t1;
+    d_tau_d[0] = t2;
+    return 0;
+}
+
+static int mstmm_sweep_frames_driven_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_driven_effort_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_driven_effort_slope_inputs[] = {
+    {"felt", 1, "N, N*m", 0, 0},
+    {"J", 1, "kg or kg*m2", 0, 0},
+    {"udot", 1, "", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+    {"d_felt", 1, "N, N*m", 0, 0},
+    {"d_udot", 1, "", 0, 0},
+    {"d_tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_driven_effort_slope_outputs[] = {
+    {"d_tau_d", 1, "N, N*m", 0, 0},
+};
+
+/* length and its derivative along a direction
+ * in  x_F[3]
+ * in  v_F[3]
+ * in  x_T[3]
+ * in  v_T[3]
+ * in  d_x_F[3] derivative of x_F
+ * in  d_v_F[3] derivative of v_F
+ * in  d_x_T[3] derivative of x_T
+ * in  d_v_T[3] derivative of v_T
+ * out d_l[2] (m, m/s) derivative of l
+ */
+int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
+    const real *restrict d_v_F, const real *restrict d_x_T, const real *restrict d_v_T,
+    real *restrict d_l)
+{
+    const real t0 = x_T[1] - x_F[1];
+    const real t1 = d_x_T[1] - d_x_F[1];
+    const real t2 = t0 * t1;
+    const real t3 = t2 + t2;
+    const real t4 = x_T[0] - x_F[0];
+    const real t5 = d_x_T[0] - d_x_F[0];
+    const real t6 = t4 * t5;
+    const real t7 = t6 + t6;
+    const real t8 = t3 + t7;
+    const real t9 = x_T[2] - x_F[2];
+    const real t10 = d_x_T[2] - d_x_F[2];
+    const real t11 = t9 * t10;
+    const real t12 = t11 + t11;
+    const real t13 = t8 + t12;
+    const real t14 = t9 * t9;
+    const real t15 = t4 * t4;
+    const real t16 = t0 * t0;
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = sqrt(t18);
+    const real t20 = t19 * 2.0;
+    const real t21 = t13 / t20;
+    d_l[0] = t21;
+    const real t22 = 1.0 / t19;
+    const real t23 = v_T[1] - v_F[1];
+    const real t24 = t23 * t1;
+    const real t25 = d_v_T[1] - d_v_F[1];
+    const real t26 = t0 * t25;
+    const real t27 = t24 + t26;
+    const real t28 = v_T[0] - v_F[0];
+    const real t29 = t28 * t5;
+    const real t30 = d_v_T[0] - d_v_F[0];
+    const real t31 = t4 * t30;
+    const real t32 = t29 + t31;
+    const real t33 = t27 + t32;
+    const real t34 = v_T[2] - v_F[2];
+    const real t35 = t34 * t10;
+    const real t36 = d_v_T[2] - d_v_F[2];
+    const real t37 = t9 * t36;
+    const real t38 = t35 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = t22 * t39;
+    const real t41 = t9 * t34;
+    const real t42 = t4 * t28;
+    const real t43 = t0 * t23;
+    const real t44 = t42 + t43;
+    const real t45 = t41 + t44;
+    const real t46 = t22 * t21;
+    const real t47 = t46 / t19;
+    const real t48 = t45 * t47;
+    const real t49 = t40 - t48;
+    d_l[1] = t49;
+    return 0;
+}
+
+static int mstmm_sweep_frames_length_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_length_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_length_slope_inputs[] = {
+    {"x_F", 3, "", 0, 0},
+    {"v_F", 3, "", 0, 0},
+    {"x_T", 3, "", 0, 0},
+    {"v_T", 3, "", 0, 0},
+    {"d_x_F", 3, "", 0, 0},
+    {"d_v_F", 3, "", 0, 0},
+    {"d_x_T", 3, "", 0, 0},
+    {"d_v_T", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_length_slope_outputs[] = {
+    {"d_l", 2, "m, m/s", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
     {
         .name = "pose",
@@ -2189,13 +4940,169 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "tangent_carry",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_carry,
+        .call = mstmm_sweep_frames_tangent_carry_call,
+        .n_inputs = 6,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_tangent_carry_inputs,
+        .outputs = mstmm_sweep_frames_tangent_carry_outputs,
+        .ir_hash = "4defcae13fe9585f647bd30582d9d95480d6cf7fcf35a31c7562afec0a58bb97",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_moved",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_moved,
+        .call = mstmm_sweep_frames_tangent_moved_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_tangent_moved_inputs,
+        .outputs = mstmm_sweep_frames_tangent_moved_outputs,
+        .ir_hash = "e1a160196e3d015b3373708d78e4c4f2b37bc4aaf9f0f99078d7c46dcc59ef92",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_turned",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_turned,
+        .call = mstmm_sweep_frames_tangent_turned_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_tangent_turned_inputs,
+        .outputs = mstmm_sweep_frames_tangent_turned_outputs,
+        .ir_hash = "1ce7050087ae6c408a32d5b0cf07cb3a8e6b8d7fe7589d83d8fdb72c2cd153e5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pose_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
+        .call = mstmm_sweep_frames_pose_slope_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_pose_slope_inputs,
+        .outputs = mstmm_sweep_frames_pose_slope_outputs,
+        .ir_hash = "ca7add206df2fd97e654853c696c446da43e2b405b988e1610f7033bc393c249",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "velocity_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_velocity_slope,
+        .call = mstmm_sweep_frames_velocity_slope_call,
+        .n_inputs = 10,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_velocity_slope_inputs,
+        .outputs = mstmm_sweep_frames_velocity_slope_outputs,
+        .ir_hash = "7e8d18fc974f0af072fbcb8dee7eae74a943631e006bc634cc6d4f118da96ae3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "point_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_point_slope,
+        .call = mstmm_sweep_frames_point_slope_call,
+        .n_inputs = 11,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_point_slope_inputs,
+        .outputs = mstmm_sweep_frames_point_slope_outputs,
+        .ir_hash = "3fabb20b567e0348c8bf1b4c54cc536fb16e66baa3d16bd0d92018731ab3e1dd",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "turning_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_turning_slope,
+        .call = mstmm_sweep_frames_turning_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_turning_slope_inputs,
+        .outputs = mstmm_sweep_frames_turning_slope_outputs,
+        .ir_hash = "72a06532a5be48f11bbc22506a3e65ced486a18206aa8477177642c5cbe9f4ef",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "end_frame_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_end_frame_slope,
+        .call = mstmm_sweep_frames_end_frame_slope_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_end_frame_slope_inputs,
+        .outputs = mstmm_sweep_frames_end_frame_slope_outputs,
+        .ir_hash = "e103505ffafcd11b133645cc587fa6e0f20433cdb055af7583e1dfc1d6cc9640",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "applied_load_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_applied_load_slope,
+        .call = mstmm_sweep_frames_applied_load_slope_call,
+        .n_inputs = 9,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_applied_load_slope_inputs,
+        .outputs = mstmm_sweep_frames_applied_load_slope_outputs,
+        .ir_hash = "b0feb08d2cdf4413da67c86e618ede5c66080f20f9802dc69629c71a89ee09c7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "opposite_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_opposite_slope,
+        .call = mstmm_sweep_frames_opposite_slope_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_opposite_slope_inputs,
+        .outputs = mstmm_sweep_frames_opposite_slope_outputs,
+        .ir_hash = "69112f9d1f987feff74241be2b546a3ad29ac77818c242fb74cf681c3d0b92af",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "transport_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_transport_slope,
+        .call = mstmm_sweep_frames_transport_slope_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_transport_slope_inputs,
+        .outputs = mstmm_sweep_frames_transport_slope_outputs,
+        .ir_hash = "1646ce7b4da554c820deab060f44c001c12907851b37214450dd0fe30309ef6f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "driven_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_driven_effort_slope,
+        .call = mstmm_sweep_frames_driven_effort_slope_call,
+        .n_inputs = 7,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_driven_effort_slope_inputs,
+        .outputs = mstmm_sweep_frames_driven_effort_slope_outputs,
+        .ir_hash = "edad07f26b8a0ea36c3e25cd1a5b75e26d3a69bc3a350dc775ee5a38723206ef",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "length_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_length_slope,
+        .call = mstmm_sweep_frames_length_slope_call,
+        .n_inputs = 8,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_length_slope_inputs,
+        .outputs = mstmm_sweep_frames_length_slope_outputs,
+        .ir_hash = "02263d65636bc80a013c69aac9aac1f963d1cb56acca8fbe2452ea7f7f05bd7c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "10797f50d500127315633c228c28c7b9a2c749c329d6e505cc5589612d8a7889",
+    .hash = "bc9dc16bbc371a6cf24b88e8adaa392fea1a6421cb0ac5c0390f1dde25086c75",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2205,6 +5112,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 35,
     .kernels = mstmm_sweep_frames_kernels,
 };

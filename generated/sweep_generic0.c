@@ -33,6 +33,15 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 0 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1174,6 +1183,529 @@ static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][0]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[0]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][0] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[0] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)H;
+    (void)c;
+    (void)s;
+    (void)d_H;
+    (void)d_s;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = d_c[3] + t157;
+    const real t159 = motion_I[5] * t34;
+    const real t160 = t65 * d_motion_I[5];
+    const real t161 = t159 + t160;
+    const real t162 = motion_I[4] * t19;
+    const real t163 = t73 * d_motion_I[4];
+    const real t164 = t162 + t163;
+    const real t165 = motion_I[3] * t4;
+    const real t166 = t81 * d_motion_I[3];
+    const real t167 = t165 + t166;
+    const real t168 = t164 + t167;
+    const real t169 = t161 + t168;
+    const real t170 = t158 + t169;
+    d_motion[3] = t170;
+    const real t171 = t153 * d_w[0];
+    const real t172 = w[0] * t139;
+    const real t173 = t171 + t172;
+    const real t174 = w[2] * t85;
+    const real t175 = t81 * motion_I[0];
+    const real t176 = t73 * motion_I[1];
+    const real t177 = t175 + t176;
+    const real t178 = t65 * motion_I[2];
+    const real t179 = t177 + t178;
+    const real t180 = t179 * d_w[2];
+    const real t181 = t174 + t180;
+    const real t182 = t173 - t181;
+    const real t183 = d_c[4] + t182;
+    const real t184 = motion_I[5] * t39;
+    const real t185 = t92 * d_motion_I[5];
+    const real t186 = t184 + t185;
+    const real t187 = motion_I[4] * t24;
+    const real t188 = t100 * d_motion_I[4];
+    const real t189 = t187 + t188;
+    const real t190 = motion_I[3] * t9;
+    const real t191 = t108 * d_motion_I[3];
+    const real t192 = t190 + t191;
+    const real t193 = t189 + t192;
+    const real t194 = t186 + t193;
+    const real t195 = t183 + t194;
+    d_motion[4] = t195;
+    const real t196 = w[1] * t85;
+    const real t197 = t179 * d_w[1];
+    const real t198 = t196 + t197;
+    const real t199 = t146 * d_w[0];
+    const real t200 = w[0] * t112;
+    const real t201 = t199 + t200;
+    const real t202 = t198 - t201;
+    const real t203 = d_c[5] + t202;
+    const real t204 = motion_I[5] * t44;
+    const real t205 = t119 * d_motion_I[5];
+    const real t206 = t204 + t205;
+    const real t207 = motion_I[4] * t29;
+    const real t208 = t127 * d_motion_I[4];
+    const real t209 = t207 + t208;
+    const real t210 = motion_I[3] * t14;
+    const real t211 = t135 * d_motion_I[3];
+    const real t212 = t210 + t211;
+    const real t213 = t209 + t212;
+    const real t214 = t206 + t213;
+    const real t215 = t203 + t214;
+    d_motion[5] = t215;
+    const real t216 = v[2] * t112;
+    const real t217 = t146 * d_v[2];
+    const real t218 = t216 + t217;
+    const real t219 = 2.0 * t218;
+    const real t220 = v[1] * t139;
+    const real t221 = t153 * d_v[1];
+    const real t222 = t220 + t221;
+    const real t223 = 2.0 * t222;
+    const real t224 = t219 - t223;
+    const real t225 = d_c[0] + t224;
+    const real t226 = Rt[0] * d[0];
+    const real t227 = Rt[1] * d[1];
+    const real t228 = t226 + t227;
+    const real t229 = Rt[2] * d[2];
+    const real t230 = t228 + t229;
+    const real t231 = t230 + ro[0];
+    const real t232 = motion_I[0] * motion_I[2];
+    const real t233 = t232 - motion_I[4];
+    const real t234 = t231 * t233;
+    const real t235 = Rt[3] * d[0];
+    const real t236 = Rt[4] * d[1];
+    const real t237 = t235 + t236;
+    const real t238 = Rt[5] * d[2];
+    const real t239 = t237 + t238;
+    const real t240 = t239 + ro[1];
+    const real t241 = motion_I[1] * motion_I[2];
+    const real t242 = motion_I[3] + t241;
+    const real t243 = t240 * t242;
+    const real t244 = t234 + t243;
+    const real t245 = Rt[6] * d[0];
+    const real t246 = Rt[7] * d[1];
+    const real t247 = t245 + t246;
+    const real t248 = Rt[8] * d[2];
+    const real t249 = t247 + t248;
+    const real t250 = t249 + ro[2];
+    const real t251 = motion_I[1] * motion_I[1];
+    const real t252 = motion_I[0] * motion_I[0];
+    const real t253 = t251 + t252;
+    const real t254 = t250 * t253;
+    const real t255 = t244 - t254;
+    const real t256 = t255 + motion_I[8];
+    const real t257 = t256 * t34;
+    const real t258 = t242 * t54;
+    const real t259 = motion_I[2] * d_motion_I[1];
+    const real t260 = motion_I[1] * d_motion_I[2];
+    const real t261 = t259 + t260;
+    const real t262 = d_motion_I[3] + t261;
+    const real t263 = t240 * t262;
+    const real t264 = t258 + t263;
+    const real t265 = t233 * t49;
+    const real t266 = motion_I[2] * d_motion_I[0];
+    const real t267 = motion_I[0] * d_motion_I[2];
+    const real t268 = t266 + t267;
+    const real t269 = t268 - d_motion_I[4];
+    const real t270 = t231 * t269;
+    const real t271 = t265 + t270;
+    const real t272 = t264 + t271;
+    const real t273 = t253 * t59;
+    const real t274 = motion_I[0] * d_motion_I[0];
+    const real t275 = t274 + t274;
+    const real t276 = motion_I[1] * d_motion_I[1];
+    const real t277 = t276 + t276;
+    const real t278 = t275 + t277;
+    const real t279 = t250 * t278;
+    const real t280 = t273 + t279;
+    const real t281 = t272 - t280;
+    const real t282 = d_motion_I[8] + t281;
+    const real t283 = t65 * t282;
+    const real t284 = t257 + t283;
+    const real t285 = motion_I[0] * motion_I[1];
+    const real t286 = motion_I[5] + t285;
+    const real t287 = t231 * t286;
+    const real t288 = motion_I[2] * motion_I[2];
+    const real t289 = t288 + t252;
+    const real t290 = t240 * t289;
+    const real t291 = t287 - t290;
+    const real t292 = t241 - motion_I[3];
+    const real t293 = t250 * t292;
+    const real t294 = t291 + t293;
+    const real t295 = t294 + motion_I[7];
+    const real t296 = t295 * t19;
+    const real t297 = t292 * t59;
+    const real t298 = t261 - d_motion_I[3];
+    const real t299 = t250 * t298;
+    const real t300 = t297 + t299;
+    const real t301 = t286 * t49;
+    const real t302 = motion_I[1] * d_motion_I[0];
+    const real t303 = motion_I[0] * d_motion_I[1];
+    const real t304 = t302 + t303;
+    const real t305 = d_motion_I[5] + t304;
+    const real t306 = t231 * t305;
+    const real t307 = t301 + t306;
+    const real t308 = t289 * t54;
+    const real t309 = motion_I[2] * d_motion_I[2];
+    const real t310 = t309 + t309;
+    const real t311 = t275 + t310;
+    const real t312 = t240 * t311;
+    const real t313 = t308 + t312;
+    const real t314 = t307 - t313;
+    const real t315 = t300 + t314;
+    const real t316 = d_motion_I[7] + t315;
+    const real t317 = t73 * t316;
+    const real t318 = t296 + t317;
+    const real t319 = t285 - motion_I[5];
+    const real t320 = t240 * t319;
+    const real t321 = t251 + t288;
+    const real t322 = t231 * t321;
+    const real t323 = t320 - t322;
+    const real t324 = motion_I[4] + t232;
+    const real t325 = t250 * t324;
+    const real t326 = t323 + t325;
+    const real t327 = t326 + motion_I[6];
+    const real t328 = t327 * t4;
+    const real t329 = t324 * t59;
+    const real t330 = d_motion_I[4] + t268;
+    const real t331 = t250 * t330;
+    const real t332 = t329 + t331;
+    const real t333 = t319 * t54;
+    const real t334 = t304 - d_motion_I[5];
+    const real t335 = t240 * t334;
+    const real t336 = t333 + t335;
+    const real t337 = t321 * t49;
+    const real t338 = t277 + t310;
+    const real t339 = t231 * t338;
+    const real t340 = t337 + t339;
+    const real t341 = t336 - t340;
+    const real t342 = t332 + t341;
+    const real t343 = d_motion_I[6] + t342;
+    const real t344 = t81 * t343;
+    const real t345 = t328 + t344;
+    const real t346 = t318 + t345;
+    const real t347 = t284 + t346;
+    const real t348 = t225 + t347;
+    d_motion[6] = t348;
+    const real t349 = v[0] * t139;
+    const real t350 = t153 * d_v[0];
+    const real t351 = t349 + t350;
+    const real t352 = 2.0 * t351;
+    const real t353 = v[2] * t85;
+    const real t354 = t179 * d_v[2];
+    const real t355 = t353 + t354;
+    const real t356 = 2.0 * t355;
+    const real t357 = t352 - t356;
+    const real t358 = d_c[1] + t357;
+    const real t359 = t256 * t39;
+    const real t360 = t92 * t282;
+    const real t361 = t359 + t360;
+    const real t362 = t295 * t24;
+    const real t363 = t100 * t316;
+    const real t364 = t362 + t363;
+    const real t365 = t327 * t9;
+    const real t366 = t108 * t343;
+    const real t367 = t365 + t366;
+    const real t368 = t364 + t367;
+    const real t369 = t361 + t368;
+    const real t370 = t358 + t369;
+    d_motion[7] = t370;
+    const real t371 = v[1] * t85;
+    const real t372 = t179 * d_v[1];
+    const real t373 = t371 + t372;
+    const real t374 = 2.0 * t373;
+    const real t375 = v[0] * t112;
+    const real t376 = t146 * d_v[0];
+    const real t377 = t375 + t376;
+    const real t378 = 2.0 * t377;
+    const real t379 = t374 - t378;
+    const real t380 = d_c[2] + t379;
+    const real t381 = t256 * t44;
+    const real t382 = t119 * t282;
+    const real t383 = t381 + t382;
+    const real t384 = t295 * t29;
+    const real t385 = t127 * t316;
+    const real t386 = t384 + t385;
+    const real t387 = t327 * t14;
+    const real t388 = t135 * t343;
+    const real t389 = t387 + t388;
+    const real t390 = t386 + t389;
+    const real t391 = t383 + t390;
+    const real t392 = t380 + t391;
+    d_motion[8] = t392;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 0, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 0, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 0, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 0, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][0] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][0] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[0] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    (void)H;
+    (void)f;
+    (void)d_H;
+    (void)d_f;
+    (void)d_tau;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_effort_slope_inputs[] = {
+    {"H", 0, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 0, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_effort_slope_outputs[] = {
+    {"d_tau", 0, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
     {
         .name = "forward",
@@ -1271,13 +1803,37 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic0_forward_slope,
+        .call = mstmm_sweep_generic0_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic0_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic0_forward_slope_outputs,
+        .ir_hash = "484796c85cec186ae884d3ac0df980d3d48b803aba834242bf50183e52b9fb80",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic0_effort_slope,
+        .call = mstmm_sweep_generic0_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic0_effort_slope_outputs,
+        .ir_hash = "10aa8d744bb9932f8402826f38924d11cd225db2010392cb19d6fe17b56d3231",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "4094c0e3519a4a52e495027bcfb97b1a008f53a8d8958b2eba476dfc547ac599",
+    .hash = "47524a0ed561103ce83f8b2221c4d8d73c64c7e9813fe2b3ec2d9c3fbd5e742c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1287,6 +1843,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic0_kernels,
 };

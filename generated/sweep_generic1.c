@@ -34,6 +34,15 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1599,6 +1608,568 @@ static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[1]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[1] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[0] * d_H[3];
+    const real t159 = H[3] * d_s[0];
+    const real t160 = t158 + t159;
+    const real t161 = d_c[3] + t160;
+    const real t162 = t157 + t161;
+    const real t163 = motion_I[5] * t34;
+    const real t164 = t65 * d_motion_I[5];
+    const real t165 = t163 + t164;
+    const real t166 = motion_I[4] * t19;
+    const real t167 = t73 * d_motion_I[4];
+    const real t168 = t166 + t167;
+    const real t169 = motion_I[3] * t4;
+    const real t170 = t81 * d_motion_I[3];
+    const real t171 = t169 + t170;
+    const real t172 = t168 + t171;
+    const real t173 = t165 + t172;
+    const real t174 = t162 + t173;
+    d_motion[3] = t174;
+    const real t175 = t153 * d_w[0];
+    const real t176 = w[0] * t139;
+    const real t177 = t175 + t176;
+    const real t178 = w[2] * t85;
+    const real t179 = t81 * motion_I[0];
+    const real t180 = t73 * motion_I[1];
+    const real t181 = t179 + t180;
+    const real t182 = t65 * motion_I[2];
+    const real t183 = t181 + t182;
+    const real t184 = t183 * d_w[2];
+    const real t185 = t178 + t184;
+    const real t186 = t177 - t185;
+    const real t187 = H[4] * d_s[0];
+    const real t188 = s[0] * d_H[4];
+    const real t189 = t187 + t188;
+    const real t190 = d_c[4] + t189;
+    const real t191 = t186 + t190;
+    const real t192 = motion_I[5] * t39;
+    const real t193 = t92 * d_motion_I[5];
+    const real t194 = t192 + t193;
+    const real t195 = motion_I[4] * t24;
+    const real t196 = t100 * d_motion_I[4];
+    const real t197 = t195 + t196;
+    const real t198 = motion_I[3] * t9;
+    const real t199 = t108 * d_motion_I[3];
+    const real t200 = t198 + t199;
+    const real t201 = t197 + t200;
+    const real t202 = t194 + t201;
+    const real t203 = t191 + t202;
+    d_motion[4] = t203;
+    const real t204 = w[1] * t85;
+    const real t205 = t183 * d_w[1];
+    const real t206 = t204 + t205;
+    const real t207 = t146 * d_w[0];
+    const real t208 = w[0] * t112;
+    const real t209 = t207 + t208;
+    const real t210 = t206 - t209;
+    const real t211 = H[5] * d_s[0];
+    const real t212 = s[0] * d_H[5];
+    const real t213 = t211 + t212;
+    const real t214 = d_c[5] + t213;
+    const real t215 = t210 + t214;
+    const real t216 = motion_I[5] * t44;
+    const real t217 = t119 * d_motion_I[5];
+    const real t218 = t216 + t217;
+    const real t219 = motion_I[4] * t29;
+    const real t220 = t127 * d_motion_I[4];
+    const real t221 = t219 + t220;
+    const real t222 = motion_I[3] * t14;
+    const real t223 = t135 * d_motion_I[3];
+    const real t224 = t222 + t223;
+    const real t225 = t221 + t224;
+    const real t226 = t218 + t225;
+    const real t227 = t215 + t226;
+    d_motion[5] = t227;
+    const real t228 = v[2] * t112;
+    const real t229 = t146 * d_v[2];
+    const real t230 = t228 + t229;
+    const real t231 = 2.0 * t230;
+    const real t232 = v[1] * t139;
+    const real t233 = t153 * d_v[1];
+    const real t234 = t232 + t233;
+    const real t235 = 2.0 * t234;
+    const real t236 = t231 - t235;
+    const real t237 = H[0] * d_s[0];
+    const real t238 = s[0] * d_H[0];
+    const real t239 = t237 + t238;
+    const real t240 = d_c[0] + t239;
+    const real t241 = t236 + t240;
+    const real t242 = Rt[0] * d[0];
+    const real t243 = Rt[1] * d[1];
+    const real t244 = t242 + t243;
+    const real t245 = Rt[2] * d[2];
+    const real t246 = t244 + t245;
+    const real t247 = t246 + ro[0];
+    const real t248 = motion_I[0] * motion_I[2];
+    const real t249 = t248 - motion_I[4];
+    const real t250 = t247 * t249;
+    const real t251 = Rt[3] * d[0];
+    const real t252 = Rt[4] * d[1];
+    const real t253 = t251 + t252;
+    const real t254 = Rt[5] * d[2];
+    const real t255 = t253 + t254;
+    const real t256 = t255 + ro[1];
+    const real t257 = motion_I[1] * motion_I[2];
+    const real t258 = motion_I[3] + t257;
+    const real t259 = t256 * t258;
+    const real t260 = t250 + t259;
+    const real t261 = Rt[6] * d[0];
+    const real t262 = Rt[7] * d[1];
+    const real t263 = t261 + t262;
+    const real t264 = Rt[8] * d[2];
+    const real t265 = t263 + t264;
+    const real t266 = t265 + ro[2];
+    const real t267 = motion_I[1] * motion_I[1];
+    const real t268 = motion_I[0] * motion_I[0];
+    const real t269 = t267 + t268;
+    const real t270 = t266 * t269;
+    const real t271 = t260 - t270;
+    const real t272 = t271 + motion_I[8];
+    const real t273 = t272 * t34;
+    const real t274 = t258 * t54;
+    const real t275 = motion_I[2] * d_motion_I[1];
+    const real t276 = motion_I[1] * d_motion_I[2];
+    const real t277 = t275 + t276;
+    const real t278 = d_motion_I[3] + t277;
+    const real t279 = t256 * t278;
+    const real t280 = t274 + t279;
+    const real t281 = t249 * t49;
+    const real t282 = motion_I[2] * d_motion_I[0];
+    const real t283 = motion_I[0] * d_motion_I[2];
+    const real t284 = t282 + t283;
+    const real t285 = t284 - d_motion_I[4];
+    const real t286 = t247 * t285;
+    const real t287 = t281 + t286;
+    const real t288 = t280 + t287;
+    const real t289 = t269 * t59;
+    const real t290 = motion_I[0] * d_motion_I[0];
+    const real t291 = t290 + t290;
+    const real t292 = motion_I[1] * d_motion_I[1];
+    const real t293 = t292 + t292;
+    const real t294 = t291 + t293;
+    const real t295 = t266 * t294;
+    const real t296 = t289 + t295;
+    const real t297 = t288 - t296;
+    const real t298 = d_motion_I[8] + t297;
+    const real t299 = t65 * t298;
+    const real t300 = t273 + t299;
+    const real t301 = motion_I[0] * motion_I[1];
+    const real t302 = motion_I[5] + t301;
+    const real t303 = t247 * t302;
+    const real t304 = motion_I[2] * motion_I[2];
+    const real t305 = t304 + t268;
+    const real t306 = t256 * t305;
+    const real t307 = t303 - t306;
+    const real t308 = t257 - motion_I[3];
+    const real t309 = t266 * t308;
+    const real t310 = t307 + t309;
+    const real t311 = t310 + motion_I[7];
+    const real t312 = t311 * t19;
+    const real t313 = t308 * t59;
+    const real t314 = t277 - d_motion_I[3];
+    const real t315 = t266 * t314;
+    const real t316 = t313 + t315;
+    const real t317 = t302 * t49;
+    const real t318 = motion_I[1] * d_motion_I[0];
+    const real t319 = motion_I[0] * d_motion_I[1];
+    const real t320 = t318 + t319;
+    const real t321 = d_motion_I[5] + t320;
+    const real t322 = t247 * t321;
+    const real t323 = t317 + t322;
+    const real t324 = t305 * t54;
+    const real t325 = motion_I[2] * d_motion_I[2];
+    const real t326 = t325 + t325;
+    const real t327 = t291 + t326;
+    const real t328 = t256 * t327;
+    const real t329 = t324 + t328;
+    const real t330 = t323 - t329;
+    const real t331 = t316 + t330;
+    const real t332 = d_motion_I[7] + t331;
+    const real t333 = t73 * t332;
+    const real t334 = t312 + t333;
+    const real t335 = t301 - motion_I[5];
+    const real t336 = t256 * t335;
+    const real t337 = t267 + t304;
+    const real t338 = t247 * t337;
+    const real t339 = t336 - t338;
+    const real t340 = motion_I[4] + t248;
+    const real t341 = t266 * t340;
+    const real t342 = t339 + t341;
+    const real t343 = t342 + motion_I[6];
+    const real t344 = t343 * t4;
+    const real t345 = t340 * t59;
+    const real t346 = d_motion_I[4] + t284;
+    const real t347 = t266 * t346;
+    const real t348 = t345 + t347;
+    const real t349 = t335 * t54;
+    const real t350 = t320 - d_motion_I[5];
+    const real t351 = t256 * t350;
+    const real t352 = t349 + t351;
+    const real t353 = t337 * t49;
+    const real t354 = t293 + t326;
+    const real t355 = t247 * t354;
+    const real t356 = t353 + t355;
+    const real t357 = t352 - t356;
+    const real t358 = t348 + t357;
+    const real t359 = d_motion_I[6] + t358;
+    const real t360 = t81 * t359;
+    const real t361 = t344 + t360;
+    const real t362 = t334 + t361;
+    const real t363 = t300 + t362;
+    const real t364 = t241 + t363;
+    d_motion[6] = t364;
+    const real t365 = v[0] * t139;
+    const real t366 = t153 * d_v[0];
+    const real t367 = t365 + t366;
+    const real t368 = 2.0 * t367;
+    const real t369 = v[2] * t85;
+    const real t370 = t183 * d_v[2];
+    const real t371 = t369 + t370;
+    const real t372 = 2.0 * t371;
+    const real t373 = t368 - t372;
+    const real t374 = H[1] * d_s[0];
+    const real t375 = s[0] * d_H[1];
+    const real t376 = t374 + t375;
+    const real t377 = d_c[1] + t376;
+    const real t378 = t373 + t377;
+    const real t379 = t272 * t39;
+    const real t380 = t92 * t298;
+    const real t381 = t379 + t380;
+    const real t382 = t311 * t24;
+    const real t383 = t100 * t332;
+    const real t384 = t382 + t383;
+    const real t385 = t343 * t9;
+    const real t386 = t108 * t359;
+    const real t387 = t385 + t386;
+    const real t388 = t384 + t387;
+    const real t389 = t381 + t388;
+    const real t390 = t378 + t389;
+    d_motion[7] = t390;
+    const real t391 = v[1] * t85;
+    const real t392 = t183 * d_v[1];
+    const real t393 = t391 + t392;
+    const real t394 = 2.0 * t393;
+    const real t395 = v[0] * t112;
+    const real t396 = t146 * d_v[0];
+    const real t397 = t395 + t396;
+    const real t398 = 2.0 * t397;
+    const real t399 = t394 - t398;
+    const real t400 = H[2] * d_s[0];
+    const real t401 = s[0] * d_H[2];
+    const real t402 = t400 + t401;
+    const real t403 = d_c[2] + t402;
+    const real t404 = t399 + t403;
+    const real t405 = t272 * t44;
+    const real t406 = t119 * t298;
+    const real t407 = t405 + t406;
+    const real t408 = t311 * t29;
+    const real t409 = t127 * t332;
+    const real t410 = t408 + t409;
+    const real t411 = t343 * t14;
+    const real t412 = t135 * t359;
+    const real t413 = t411 + t412;
+    const real t414 = t410 + t413;
+    const real t415 = t407 + t414;
+    const real t416 = t404 + t415;
+    d_motion[8] = t416;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 1, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[1] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[5];
+    const real t1 = H[5] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[4];
+    const real t4 = H[4] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[3];
+    const real t7 = H[3] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[2];
+    const real t10 = H[2] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[1];
+    const real t13 = H[1] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_effort_slope_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 6, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_effort_slope_outputs[] = {
+    {"d_tau", 1, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -1696,13 +2267,37 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
+        .call = mstmm_sweep_generic1_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic1_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic1_forward_slope_outputs,
+        .ir_hash = "485ece46b2c602d608a2d3d9a7e116d7df0476f417c5a53044a33a544e9bfdf5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_effort_slope,
+        .call = mstmm_sweep_generic1_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic1_effort_slope_outputs,
+        .ir_hash = "447de3da211f3eeb91eb0dd72de82715b3afaa62c30bba0fc11b82192a3cd00f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "629147231fa319330564f88dd569b9bc5179a40ea558d5e355c8f09587f60a29",
+    .hash = "d2b24162604ac606bf557eacaa54592f98b04052ee31e2f4f6a64749e10b658d",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1712,6 +2307,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic1_kernels,
 };

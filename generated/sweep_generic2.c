@@ -34,6 +34,15 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2073,6 +2082,616 @@ static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][2]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[2]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][2] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[2] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[1] * d_H[7];
+    const real t159 = H[7] * d_s[1];
+    const real t160 = t158 + t159;
+    const real t161 = s[0] * d_H[6];
+    const real t162 = H[6] * d_s[0];
+    const real t163 = t161 + t162;
+    const real t164 = t160 + t163;
+    const real t165 = d_c[3] + t164;
+    const real t166 = t157 + t165;
+    const real t167 = motion_I[5] * t34;
+    const real t168 = t65 * d_motion_I[5];
+    const real t169 = t167 + t168;
+    const real t170 = motion_I[4] * t19;
+    const real t171 = t73 * d_motion_I[4];
+    const real t172 = t170 + t171;
+    const real t173 = motion_I[3] * t4;
+    const real t174 = t81 * d_motion_I[3];
+    const real t175 = t173 + t174;
+    const real t176 = t172 + t175;
+    const real t177 = t169 + t176;
+    const real t178 = t166 + t177;
+    d_motion[3] = t178;
+    const real t179 = t153 * d_w[0];
+    const real t180 = w[0] * t139;
+    const real t181 = t179 + t180;
+    const real t182 = w[2] * t85;
+    const real t183 = t81 * motion_I[0];
+    const real t184 = t73 * motion_I[1];
+    const real t185 = t183 + t184;
+    const real t186 = t65 * motion_I[2];
+    const real t187 = t185 + t186;
+    const real t188 = t187 * d_w[2];
+    const real t189 = t182 + t188;
+    const real t190 = t181 - t189;
+    const real t191 = H[9] * d_s[1];
+    const real t192 = s[1] * d_H[9];
+    const real t193 = t191 + t192;
+    const real t194 = H[8] * d_s[0];
+    const real t195 = s[0] * d_H[8];
+    const real t196 = t194 + t195;
+    const real t197 = t193 + t196;
+    const real t198 = d_c[4] + t197;
+    const real t199 = t190 + t198;
+    const real t200 = motion_I[5] * t39;
+    const real t201 = t92 * d_motion_I[5];
+    const real t202 = t200 + t201;
+    const real t203 = motion_I[4] * t24;
+    const real t204 = t100 * d_motion_I[4];
+    const real t205 = t203 + t204;
+    const real t206 = motion_I[3] * t9;
+    const real t207 = t108 * d_motion_I[3];
+    const real t208 = t206 + t207;
+    const real t209 = t205 + t208;
+    const real t210 = t202 + t209;
+    const real t211 = t199 + t210;
+    d_motion[4] = t211;
+    const real t212 = w[1] * t85;
+    const real t213 = t187 * d_w[1];
+    const real t214 = t212 + t213;
+    const real t215 = t146 * d_w[0];
+    const real t216 = w[0] * t112;
+    const real t217 = t215 + t216;
+    const real t218 = t214 - t217;
+    const real t219 = H[11] * d_s[1];
+    const real t220 = s[1] * d_H[11];
+    const real t221 = t219 + t220;
+    const real t222 = H[10] * d_s[0];
+    const real t223 = s[0] * d_H[10];
+    const real t224 = t222 + t223;
+    const real t225 = t221 + t224;
+    const real t226 = d_c[5] + t225;
+    const real t227 = t218 + t226;
+    const real t228 = motion_I[5] * t44;
+    const real t229 = t119 * d_motion_I[5];
+    const real t230 = t228 + t229;
+    const real t231 = motion_I[4] * t29;
+    const real t232 = t127 * d_motion_I[4];
+    const real t233 = t231 + t232;
+    const real t234 = motion_I[3] * t14;
+    const real t235 = t135 * d_motion_I[3];
+    const real t236 = t234 + t235;
+    const real t237 = t233 + t236;
+    const real t238 = t230 + t237;
+    const real t239 = t227 + t238;
+    d_motion[5] = t239;
+    const real t240 = v[2] * t112;
+    const real t241 = t146 * d_v[2];
+    const real t242 = t240 + t241;
+    const real t243 = 2.0 * t242;
+    const real t244 = v[1] * t139;
+    const real t245 = t153 * d_v[1];
+    const real t246 = t244 + t245;
+    const real t247 = 2.0 * t246;
+    const real t248 = t243 - t247;
+    const real t249 = H[1] * d_s[1];
+    const real t250 = s[1] * d_H[1];
+    const real t251 = t249 + t250;
+    const real t252 = H[0] * d_s[0];
+    const real t253 = s[0] * d_H[0];
+    const real t254 = t252 + t253;
+    const real t255 = t251 + t254;
+    const real t256 = d_c[0] + t255;
+    const real t257 = t248 + t256;
+    const real t258 = Rt[0] * d[0];
+    const real t259 = Rt[1] * d[1];
+    const real t260 = t258 + t259;
+    const real t261 = Rt[2] * d[2];
+    const real t262 = t260 + t261;
+    const real t263 = t262 + ro[0];
+    const real t264 = motion_I[0] * motion_I[2];
+    const real t265 = t264 - motion_I[4];
+    const real t266 = t263 * t265;
+    const real t267 = Rt[3] * d[0];
+    const real t268 = Rt[4] * d[1];
+    const real t269 = t267 + t268;
+    const real t270 = Rt[5] * d[2];
+    const real t271 = t269 + t270;
+    const real t272 = t271 + ro[1];
+    const real t273 = motion_I[1] * motion_I[2];
+    const real t274 = motion_I[3] + t273;
+    const real t275 = t272 * t274;
+    const real t276 = t266 + t275;
+    const real t277 = Rt[6] * d[0];
+    const real t278 = Rt[7] * d[1];
+    const real t279 = t277 + t278;
+    const real t280 = Rt[8] * d[2];
+    const real t281 = t279 + t280;
+    const real t282 = t281 + ro[2];
+    const real t283 = motion_I[1] * motion_I[1];
+    const real t284 = motion_I[0] * motion_I[0];
+    const real t285 = t283 + t284;
+    const real t286 = t282 * t285;
+    const real t287 = t276 - t286;
+    const real t288 = t287 + motion_I[8];
+    const real t289 = t288 * t34;
+    const real t290 = t274 * t54;
+    const real t291 = motion_I[2] * d_motion_I[1];
+    const real t292 = motion_I[1] * d_motion_I[2];
+    const real t293 = t291 + t292;
+    const real t294 = d_motion_I[3] + t293;
+    const real t295 = t272 * t294;
+    const real t296 = t290 + t295;
+    const real t297 = t265 * t49;
+    const real t298 = motion_I[2] * d_motion_I[0];
+    const real t299 = motion_I[0] * d_motion_I[2];
+    const real t300 = t298 + t299;
+    const real t301 = t300 - d_motion_I[4];
+    const real t302 = t263 * t301;
+    const real t303 = t297 + t302;
+    const real t304 = t296 + t303;
+    const real t305 = t285 * t59;
+    const real t306 = motion_I[0] * d_motion_I[0];
+    const real t307 = t306 + t306;
+    const real t308 = motion_I[1] * d_motion_I[1];
+    const real t309 = t308 + t308;
+    const real t310 = t307 + t309;
+    const real t311 = t282 * t310;
+    const real t312 = t305 + t311;
+    const real t313 = t304 - t312;
+    const real t314 = d_motion_I[8] + t313;
+    const real t315 = t65 * t314;
+    const real t316 = t289 + t315;
+    const real t317 = motion_I[0] * motion_I[1];
+    const real t318 = motion_I[5] + t317;
+    const real t319 = t263 * t318;
+    const real t320 = motion_I[2] * motion_I[2];
+    const real t321 = t320 + t284;
+    const real t322 = t272 * t321;
+    const real t323 = t319 - t322;
+    const real t324 = t273 - motion_I[3];
+    const real t325 = t282 * t324;
+    const real t326 = t323 + t325;
+    const real t327 = t326 + motion_I[7];
+    const real t328 = t327 * t19;
+    const real t329 = t324 * t59;
+    const real t330 = t293 - d_motion_I[3];
+    const real t331 = t282 * t330;
+    const real t332 = t329 + t331;
+    const real t333 = t318 * t49;
+    const real t334 = motion_I[1] * d_motion_I[0];
+    const real t335 = motion_I[0] * d_motion_I[1];
+    const real t336 = t334 + t335;
+    const real t337 = d_motion_I[5] + t336;
+    const real t338 = t263 * t337;
+    const real t339 = t333 + t338;
+    const real t340 = t321 * t54;
+    const real t341 = motion_I[2] * d_motion_I[2];
+    const real t342 = t341 + t341;
+    const real t343 = t307 + t342;
+    const real t344 = t272 * t343;
+    const real t345 = t340 + t344;
+    const real t346 = t339 - t345;
+    const real t347 = t332 + t346;
+    const real t348 = d_motion_I[7] + t347;
+    const real t349 = t73 * t348;
+    const real t350 = t328 + t349;
+    const real t351 = t317 - motion_I[5];
+    const real t352 = t272 * t351;
+    const real t353 = t283 + t320;
+    const real t354 = t263 * t353;
+    const real t355 = t352 - t354;
+    const real t356 = motion_I[4] + t264;
+    const real t357 = t282 * t356;
+    const real t358 = t355 + t357;
+    const real t359 = t358 + motion_I[6];
+    const real t360 = t359 * t4;
+    const real t361 = t356 * t59;
+    const real t362 = d_motion_I[4] + t300;
+    const real t363 = t282 * t362;
+    const real t364 = t361 + t363;
+    const real t365 = t351 * t54;
+    const real t366 = t336 - d_motion_I[5];
+    const real t367 = t272 * t366;
+    const real t368 = t365 + t367;
+    const real t369 = t353 * t49;
+    const real t370 = t309 + t342;
+    const real t371 = t263 * t370;
+    const real t372 = t369 + t371;
+    const real t373 = t368 - t372;
+    const real t374 = t364 + t373;
+    const real t375 = d_motion_I[6] + t374;
+    const real t376 = t81 * t375;
+    const real t377 = t360 + t376;
+    const real t378 = t350 + t377;
+    const real t379 = t316 + t378;
+    const real t380 = t257 + t379;
+    d_motion[6] = t380;
+    const real t381 = v[0] * t139;
+    const real t382 = t153 * d_v[0];
+    const real t383 = t381 + t382;
+    const real t384 = 2.0 * t383;
+    const real t385 = v[2] * t85;
+    const real t386 = t187 * d_v[2];
+    const real t387 = t385 + t386;
+    const real t388 = 2.0 * t387;
+    const real t389 = t384 - t388;
+    const real t390 = H[3] * d_s[1];
+    const real t391 = s[1] * d_H[3];
+    const real t392 = t390 + t391;
+    const real t393 = H[2] * d_s[0];
+    const real t394 = s[0] * d_H[2];
+    const real t395 = t393 + t394;
+    const real t396 = t392 + t395;
+    const real t397 = d_c[1] + t396;
+    const real t398 = t389 + t397;
+    const real t399 = t288 * t39;
+    const real t400 = t92 * t314;
+    const real t401 = t399 + t400;
+    const real t402 = t327 * t24;
+    const real t403 = t100 * t348;
+    const real t404 = t402 + t403;
+    const real t405 = t359 * t9;
+    const real t406 = t108 * t375;
+    const real t407 = t405 + t406;
+    const real t408 = t404 + t407;
+    const real t409 = t401 + t408;
+    const real t410 = t398 + t409;
+    d_motion[7] = t410;
+    const real t411 = v[1] * t85;
+    const real t412 = t187 * d_v[1];
+    const real t413 = t411 + t412;
+    const real t414 = 2.0 * t413;
+    const real t415 = v[0] * t112;
+    const real t416 = t146 * d_v[0];
+    const real t417 = t415 + t416;
+    const real t418 = 2.0 * t417;
+    const real t419 = t414 - t418;
+    const real t420 = H[5] * d_s[1];
+    const real t421 = s[1] * d_H[5];
+    const real t422 = t420 + t421;
+    const real t423 = H[4] * d_s[0];
+    const real t424 = s[0] * d_H[4];
+    const real t425 = t423 + t424;
+    const real t426 = t422 + t425;
+    const real t427 = d_c[2] + t426;
+    const real t428 = t419 + t427;
+    const real t429 = t288 * t44;
+    const real t430 = t119 * t314;
+    const real t431 = t429 + t430;
+    const real t432 = t327 * t29;
+    const real t433 = t127 * t348;
+    const real t434 = t432 + t433;
+    const real t435 = t359 * t14;
+    const real t436 = t135 * t375;
+    const real t437 = t435 + t436;
+    const real t438 = t434 + t437;
+    const real t439 = t431 + t438;
+    const real t440 = t428 + t439;
+    d_motion[8] = t440;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 12, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 2, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][2] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][2] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[2] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[10];
+    const real t1 = H[10] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[8];
+    const real t4 = H[8] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[6];
+    const real t7 = H[6] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[4];
+    const real t10 = H[4] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[2];
+    const real t13 = H[2] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    const real t23 = H[11] * d_f[5];
+    const real t24 = f[5] * d_H[11];
+    const real t25 = t23 + t24;
+    const real t26 = H[9] * d_f[4];
+    const real t27 = f[4] * d_H[9];
+    const real t28 = t26 + t27;
+    const real t29 = H[7] * d_f[3];
+    const real t30 = f[3] * d_H[7];
+    const real t31 = t29 + t30;
+    const real t32 = H[5] * d_f[2];
+    const real t33 = f[2] * d_H[5];
+    const real t34 = t32 + t33;
+    const real t35 = H[3] * d_f[1];
+    const real t36 = f[1] * d_H[3];
+    const real t37 = t35 + t36;
+    const real t38 = H[1] * d_f[0];
+    const real t39 = f[0] * d_H[1];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_tau[1] = t45;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_effort_slope_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 12, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_effort_slope_outputs[] = {
+    {"d_tau", 2, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
     {
         .name = "forward",
@@ -2170,13 +2789,37 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
+        .call = mstmm_sweep_generic2_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic2_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic2_forward_slope_outputs,
+        .ir_hash = "c9b74ce91f6ef1d31f5a47ea3fb70f66f15b636d50b2eef1bc0923cdbeffab92",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_effort_slope,
+        .call = mstmm_sweep_generic2_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic2_effort_slope_outputs,
+        .ir_hash = "b81a2bdecc7d7aa144534042477941f6bda227ab1317708dc9a6b54e3499983e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "ea0babe81a86ac1891643997df4b59955b36ab886843b43c2b297bbef967a358",
+    .hash = "deada13699595414a1bb0c5f59a61846bc456d0b513538b90d2beef5efb98113",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2186,6 +2829,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic2_kernels,
 };

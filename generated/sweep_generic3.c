@@ -34,6 +34,15 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2633,6 +2642,664 @@ static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][3]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[3]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][3] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[3] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[2] * d_H[11];
+    const real t159 = H[11] * d_s[2];
+    const real t160 = t158 + t159;
+    const real t161 = s[1] * d_H[10];
+    const real t162 = H[10] * d_s[1];
+    const real t163 = t161 + t162;
+    const real t164 = s[0] * d_H[9];
+    const real t165 = H[9] * d_s[0];
+    const real t166 = t164 + t165;
+    const real t167 = t163 + t166;
+    const real t168 = t160 + t167;
+    const real t169 = d_c[3] + t168;
+    const real t170 = t157 + t169;
+    const real t171 = motion_I[5] * t34;
+    const real t172 = t65 * d_motion_I[5];
+    const real t173 = t171 + t172;
+    const real t174 = motion_I[4] * t19;
+    const real t175 = t73 * d_motion_I[4];
+    const real t176 = t174 + t175;
+    const real t177 = motion_I[3] * t4;
+    const real t178 = t81 * d_motion_I[3];
+    const real t179 = t177 + t178;
+    const real t180 = t176 + t179;
+    const real t181 = t173 + t180;
+    const real t182 = t170 + t181;
+    d_motion[3] = t182;
+    const real t183 = t153 * d_w[0];
+    const real t184 = w[0] * t139;
+    const real t185 = t183 + t184;
+    const real t186 = w[2] * t85;
+    const real t187 = t81 * motion_I[0];
+    const real t188 = t73 * motion_I[1];
+    const real t189 = t187 + t188;
+    const real t190 = t65 * motion_I[2];
+    const real t191 = t189 + t190;
+    const real t192 = t191 * d_w[2];
+    const real t193 = t186 + t192;
+    const real t194 = t185 - t193;
+    const real t195 = H[14] * d_s[2];
+    const real t196 = s[2] * d_H[14];
+    const real t197 = t195 + t196;
+    const real t198 = H[13] * d_s[1];
+    const real t199 = s[1] * d_H[13];
+    const real t200 = t198 + t199;
+    const real t201 = H[12] * d_s[0];
+    const real t202 = s[0] * d_H[12];
+    const real t203 = t201 + t202;
+    const real t204 = t200 + t203;
+    const real t205 = t197 + t204;
+    const real t206 = d_c[4] + t205;
+    const real t207 = t194 + t206;
+    const real t208 = motion_I[5] * t39;
+    const real t209 = t92 * d_motion_I[5];
+    const real t210 = t208 + t209;
+    const real t211 = motion_I[4] * t24;
+    const real t212 = t100 * d_motion_I[4];
+    const real t213 = t211 + t212;
+    const real t214 = motion_I[3] * t9;
+    const real t215 = t108 * d_motion_I[3];
+    const real t216 = t214 + t215;
+    const real t217 = t213 + t216;
+    const real t218 = t210 + t217;
+    const real t219 = t207 + t218;
+    d_motion[4] = t219;
+    const real t220 = w[1] * t85;
+    const real t221 = t191 * d_w[1];
+    const real t222 = t220 + t221;
+    const real t223 = t146 * d_w[0];
+    const real t224 = w[0] * t112;
+    const real t225 = t223 + t224;
+    const real t226 = t222 - t225;
+    const real t227 = H[17] * d_s[2];
+    const real t228 = s[2] * d_H[17];
+    const real t229 = t227 + t228;
+    const real t230 = H[16] * d_s[1];
+    const real t231 = s[1] * d_H[16];
+    const real t232 = t230 + t231;
+    const real t233 = H[15] * d_s[0];
+    const real t234 = s[0] * d_H[15];
+    const real t235 = t233 + t234;
+    const real t236 = t232 + t235;
+    const real t237 = t229 + t236;
+    const real t238 = d_c[5] + t237;
+    const real t239 = t226 + t238;
+    const real t240 = motion_I[5] * t44;
+    const real t241 = t119 * d_motion_I[5];
+    const real t242 = t240 + t241;
+    const real t243 = motion_I[4] * t29;
+    const real t244 = t127 * d_motion_I[4];
+    const real t245 = t243 + t244;
+    const real t246 = motion_I[3] * t14;
+    const real t247 = t135 * d_motion_I[3];
+    const real t248 = t246 + t247;
+    const real t249 = t245 + t248;
+    const real t250 = t242 + t249;
+    const real t251 = t239 + t250;
+    d_motion[5] = t251;
+    const real t252 = v[2] * t112;
+    const real t253 = t146 * d_v[2];
+    const real t254 = t252 + t253;
+    const real t255 = 2.0 * t254;
+    const real t256 = v[1] * t139;
+    const real t257 = t153 * d_v[1];
+    const real t258 = t256 + t257;
+    const real t259 = 2.0 * t258;
+    const real t260 = t255 - t259;
+    const real t261 = H[2] * d_s[2];
+    const real t262 = s[2] * d_H[2];
+    const real t263 = t261 + t262;
+    const real t264 = H[1] * d_s[1];
+    const real t265 = s[1] * d_H[1];
+    const real t266 = t264 + t265;
+    const real t267 = H[0] * d_s[0];
+    const real t268 = s[0] * d_H[0];
+    const real t269 = t267 + t268;
+    const real t270 = t266 + t269;
+    const real t271 = t263 + t270;
+    const real t272 = d_c[0] + t271;
+    const real t273 = t260 + t272;
+    const real t274 = Rt[0] * d[0];
+    const real t275 = Rt[1] * d[1];
+    const real t276 = t274 + t275;
+    const real t277 = Rt[2] * d[2];
+    const real t278 = t276 + t277;
+    const real t279 = t278 + ro[0];
+    const real t280 = motion_I[0] * motion_I[2];
+    const real t281 = t280 - motion_I[4];
+    const real t282 = t279 * t281;
+    const real t283 = Rt[3] * d[0];
+    const real t284 = Rt[4] * d[1];
+    const real t285 = t283 + t284;
+    const real t286 = Rt[5] * d[2];
+    const real t287 = t285 + t286;
+    const real t288 = t287 + ro[1];
+    const real t289 = motion_I[1] * motion_I[2];
+    const real t290 = motion_I[3] + t289;
+    const real t291 = t288 * t290;
+    const real t292 = t282 + t291;
+    const real t293 = Rt[6] * d[0];
+    const real t294 = Rt[7] * d[1];
+    const real t295 = t293 + t294;
+    const real t296 = Rt[8] * d[2];
+    const real t297 = t295 + t296;
+    const real t298 = t297 + ro[2];
+    const real t299 = motion_I[1] * motion_I[1];
+    const real t300 = motion_I[0] * motion_I[0];
+    const real t301 = t299 + t300;
+    const real t302 = t298 * t301;
+    const real t303 = t292 - t302;
+    const real t304 = t303 + motion_I[8];
+    const real t305 = t304 * t34;
+    const real t306 = t290 * t54;
+    const real t307 = motion_I[2] * d_motion_I[1];
+    const real t308 = motion_I[1] * d_motion_I[2];
+    const real t309 = t307 + t308;
+    const real t310 = d_motion_I[3] + t309;
+    const real t311 = t288 * t310;
+    const real t312 = t306 + t311;
+    const real t313 = t281 * t49;
+    const real t314 = motion_I[2] * d_motion_I[0];
+    const real t315 = motion_I[0] * d_motion_I[2];
+    const real t316 = t314 + t315;
+    const real t317 = t316 - d_motion_I[4];
+    const real t318 = t279 * t317;
+    const real t319 = t313 + t318;
+    const real t320 = t312 + t319;
+    const real t321 = t301 * t59;
+    const real t322 = motion_I[0] * d_motion_I[0];
+    const real t323 = t322 + t322;
+    const real t324 = motion_I[1] * d_motion_I[1];
+    const real t325 = t324 + t324;
+    const real t326 = t323 + t325;
+    const real t327 = t298 * t326;
+    const real t328 = t321 + t327;
+    const real t329 = t320 - t328;
+    const real t330 = d_motion_I[8] + t329;
+    const real t331 = t65 * t330;
+    const real t332 = t305 + t331;
+    const real t333 = motion_I[0] * motion_I[1];
+    const real t334 = motion_I[5] + t333;
+    const real t335 = t279 * t334;
+    const real t336 = motion_I[2] * motion_I[2];
+    const real t337 = t336 + t300;
+    const real t338 = t288 * t337;
+    const real t339 = t335 - t338;
+    const real t340 = t289 - motion_I[3];
+    const real t341 = t298 * t340;
+    const real t342 = t339 + t341;
+    const real t343 = t342 + motion_I[7];
+    const real t344 = t343 * t19;
+    const real t345 = t340 * t59;
+    const real t346 = t309 - d_motion_I[3];
+    const real t347 = t298 * t346;
+    const real t348 = t345 + t347;
+    const real t349 = t334 * t49;
+    const real t350 = motion_I[1] * d_motion_I[0];
+    const real t351 = motion_I[0] * d_motion_I[1];
+    const real t352 = t350 + t351;
+    const real t353 = d_motion_I[5] + t352;
+    const real t354 = t279 * t353;
+    const real t355 = t349 + t354;
+    const real t356 = t337 * t54;
+    const real t357 = motion_I[2] * d_motion_I[2];
+    const real t358 = t357 + t357;
+    const real t359 = t323 + t358;
+    const real t360 = t288 * t359;
+    const real t361 = t356 + t360;
+    const real t362 = t355 - t361;
+    const real t363 = t348 + t362;
+    const real t364 = d_motion_I[7] + t363;
+    const real t365 = t73 * t364;
+    const real t366 = t344 + t365;
+    const real t367 = t333 - motion_I[5];
+    const real t368 = t288 * t367;
+    const real t369 = t299 + t336;
+    const real t370 = t279 * t369;
+    const real t371 = t368 - t370;
+    const real t372 = motion_I[4] + t280;
+    const real t373 = t298 * t372;
+    const real t374 = t371 + t373;
+    const real t375 = t374 + motion_I[6];
+    const real t376 = t375 * t4;
+    const real t377 = t372 * t59;
+    const real t378 = d_motion_I[4] + t316;
+    const real t379 = t298 * t378;
+    const real t380 = t377 + t379;
+    const real t381 = t367 * t54;
+    const real t382 = t352 - d_motion_I[5];
+    const real t383 = t288 * t382;
+    const real t384 = t381 + t383;
+    const real t385 = t369 * t49;
+    const real t386 = t325 + t358;
+    const real t387 = t279 * t386;
+    const real t388 = t385 + t387;
+    const real t389 = t384 - t388;
+    const real t390 = t380 + t389;
+    const real t391 = d_motion_I[6] + t390;
+    const real t392 = t81 * t391;
+    const real t393 = t376 + t392;
+    const real t394 = t366 + t393;
+    const real t395 = t332 + t394;
+    const real t396 = t273 + t395;
+    d_motion[6] = t396;
+    const real t397 = v[0] * t139;
+    const real t398 = t153 * d_v[0];
+    const real t399 = t397 + t398;
+    const real t400 = 2.0 * t399;
+    const real t401 = v[2] * t85;
+    const real t402 = t191 * d_v[2];
+    const real t403 = t401 + t402;
+    const real t404 = 2.0 * t403;
+    const real t405 = t400 - t404;
+    const real t406 = H[5] * d_s[2];
+    const real t407 = s[2] * d_H[5];
+    const real t408 = t406 + t407;
+    const real t409 = H[4] * d_s[1];
+    const real t410 = s[1] * d_H[4];
+    const real t411 = t409 + t410;
+    const real t412 = H[3] * d_s[0];
+    const real t413 = s[0] * d_H[3];
+    const real t414 = t412 + t413;
+    const real t415 = t411 + t414;
+    const real t416 = t408 + t415;
+    const real t417 = d_c[1] + t416;
+    const real t418 = t405 + t417;
+    const real t419 = t304 * t39;
+    const real t420 = t92 * t330;
+    const real t421 = t419 + t420;
+    const real t422 = t343 * t24;
+    const real t423 = t100 * t364;
+    const real t424 = t422 + t423;
+    const real t425 = t375 * t9;
+    const real t426 = t108 * t391;
+    const real t427 = t425 + t426;
+    const real t428 = t424 + t427;
+    const real t429 = t421 + t428;
+    const real t430 = t418 + t429;
+    d_motion[7] = t430;
+    const real t431 = v[1] * t85;
+    const real t432 = t191 * d_v[1];
+    const real t433 = t431 + t432;
+    const real t434 = 2.0 * t433;
+    const real t435 = v[0] * t112;
+    const real t436 = t146 * d_v[0];
+    const real t437 = t435 + t436;
+    const real t438 = 2.0 * t437;
+    const real t439 = t434 - t438;
+    const real t440 = H[8] * d_s[2];
+    const real t441 = s[2] * d_H[8];
+    const real t442 = t440 + t441;
+    const real t443 = H[7] * d_s[1];
+    const real t444 = s[1] * d_H[7];
+    const real t445 = t443 + t444;
+    const real t446 = H[6] * d_s[0];
+    const real t447 = s[0] * d_H[6];
+    const real t448 = t446 + t447;
+    const real t449 = t445 + t448;
+    const real t450 = t442 + t449;
+    const real t451 = d_c[2] + t450;
+    const real t452 = t439 + t451;
+    const real t453 = t304 * t44;
+    const real t454 = t119 * t330;
+    const real t455 = t453 + t454;
+    const real t456 = t343 * t29;
+    const real t457 = t127 * t364;
+    const real t458 = t456 + t457;
+    const real t459 = t375 * t14;
+    const real t460 = t135 * t391;
+    const real t461 = t459 + t460;
+    const real t462 = t458 + t461;
+    const real t463 = t455 + t462;
+    const real t464 = t452 + t463;
+    d_motion[8] = t464;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 3, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][3] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][3] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[3] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[15];
+    const real t1 = H[15] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[12];
+    const real t4 = H[12] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[9];
+    const real t7 = H[9] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[6];
+    const real t10 = H[6] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[3];
+    const real t13 = H[3] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    const real t23 = H[16] * d_f[5];
+    const real t24 = f[5] * d_H[16];
+    const real t25 = t23 + t24;
+    const real t26 = H[13] * d_f[4];
+    const real t27 = f[4] * d_H[13];
+    const real t28 = t26 + t27;
+    const real t29 = H[10] * d_f[3];
+    const real t30 = f[3] * d_H[10];
+    const real t31 = t29 + t30;
+    const real t32 = H[7] * d_f[2];
+    const real t33 = f[2] * d_H[7];
+    const real t34 = t32 + t33;
+    const real t35 = H[4] * d_f[1];
+    const real t36 = f[1] * d_H[4];
+    const real t37 = t35 + t36;
+    const real t38 = H[1] * d_f[0];
+    const real t39 = f[0] * d_H[1];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_tau[1] = t45;
+    const real t46 = H[17] * d_f[5];
+    const real t47 = f[5] * d_H[17];
+    const real t48 = t46 + t47;
+    const real t49 = H[14] * d_f[4];
+    const real t50 = f[4] * d_H[14];
+    const real t51 = t49 + t50;
+    const real t52 = H[11] * d_f[3];
+    const real t53 = f[3] * d_H[11];
+    const real t54 = t52 + t53;
+    const real t55 = H[8] * d_f[2];
+    const real t56 = f[2] * d_H[8];
+    const real t57 = t55 + t56;
+    const real t58 = H[5] * d_f[1];
+    const real t59 = f[1] * d_H[5];
+    const real t60 = t58 + t59;
+    const real t61 = H[2] * d_f[0];
+    const real t62 = f[0] * d_H[2];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    const real t66 = t54 + t65;
+    const real t67 = t51 + t66;
+    const real t68 = t48 + t67;
+    d_tau[2] = t68;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_effort_slope_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_effort_slope_outputs[] = {
+    {"d_tau", 3, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
     {
         .name = "forward",
@@ -2730,13 +3397,37 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
+        .call = mstmm_sweep_generic3_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic3_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic3_forward_slope_outputs,
+        .ir_hash = "d3d0f6249d9ae57c1298a7ec541406fb3cf1109b1417361ecd07efc136c4475b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic3_effort_slope,
+        .call = mstmm_sweep_generic3_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic3_effort_slope_outputs,
+        .ir_hash = "2e186256f7a6c5632133cf28ae36bcf5727e591d24a3f9a5fb04a0a24e50bb89",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "e673c6ae697d00227dcff9379df79bec6cd6651b4f42e82c810bdb581a3a36eb",
+    .hash = "2bdbcfddf8e3f4b8b1f5d3992ec10621a54ece66e5dc01cc594cb510753e17ba",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2746,6 +3437,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -34,6 +34,15 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 4 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3285,6 +3294,712 @@ static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][4]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[4]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][4] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[4] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[3] * d_H[15];
+    const real t159 = H[15] * d_s[3];
+    const real t160 = t158 + t159;
+    const real t161 = s[2] * d_H[14];
+    const real t162 = H[14] * d_s[2];
+    const real t163 = t161 + t162;
+    const real t164 = s[1] * d_H[13];
+    const real t165 = H[13] * d_s[1];
+    const real t166 = t164 + t165;
+    const real t167 = s[0] * d_H[12];
+    const real t168 = H[12] * d_s[0];
+    const real t169 = t167 + t168;
+    const real t170 = t166 + t169;
+    const real t171 = t163 + t170;
+    const real t172 = t160 + t171;
+    const real t173 = d_c[3] + t172;
+    const real t174 = t157 + t173;
+    const real t175 = motion_I[5] * t34;
+    const real t176 = t65 * d_motion_I[5];
+    const real t177 = t175 + t176;
+    const real t178 = motion_I[4] * t19;
+    const real t179 = t73 * d_motion_I[4];
+    const real t180 = t178 + t179;
+    const real t181 = motion_I[3] * t4;
+    const real t182 = t81 * d_motion_I[3];
+    const real t183 = t181 + t182;
+    const real t184 = t180 + t183;
+    const real t185 = t177 + t184;
+    const real t186 = t174 + t185;
+    d_motion[3] = t186;
+    const real t187 = t153 * d_w[0];
+    const real t188 = w[0] * t139;
+    const real t189 = t187 + t188;
+    const real t190 = w[2] * t85;
+    const real t191 = t81 * motion_I[0];
+    const real t192 = t73 * motion_I[1];
+    const real t193 = t191 + t192;
+    const real t194 = t65 * motion_I[2];
+    const real t195 = t193 + t194;
+    const real t196 = t195 * d_w[2];
+    const real t197 = t190 + t196;
+    const real t198 = t189 - t197;
+    const real t199 = H[19] * d_s[3];
+    const real t200 = s[3] * d_H[19];
+    const real t201 = t199 + t200;
+    const real t202 = H[18] * d_s[2];
+    const real t203 = s[2] * d_H[18];
+    const real t204 = t202 + t203;
+    const real t205 = H[17] * d_s[1];
+    const real t206 = s[1] * d_H[17];
+    const real t207 = t205 + t206;
+    const real t208 = H[16] * d_s[0];
+    const real t209 = s[0] * d_H[16];
+    const real t210 = t208 + t209;
+    const real t211 = t207 + t210;
+    const real t212 = t204 + t211;
+    const real t213 = t201 + t212;
+    const real t214 = d_c[4] + t213;
+    const real t215 = t198 + t214;
+    const real t216 = motion_I[5] * t39;
+    const real t217 = t92 * d_motion_I[5];
+    const real t218 = t216 + t217;
+    const real t219 = motion_I[4] * t24;
+    const real t220 = t100 * d_motion_I[4];
+    const real t221 = t219 + t220;
+    const real t222 = motion_I[3] * t9;
+    const real t223 = t108 * d_motion_I[3];
+    const real t224 = t222 + t223;
+    const real t225 = t221 + t224;
+    const real t226 = t218 + t225;
+    const real t227 = t215 + t226;
+    d_motion[4] = t227;
+    const real t228 = w[1] * t85;
+    const real t229 = t195 * d_w[1];
+    const real t230 = t228 + t229;
+    const real t231 = t146 * d_w[0];
+    const real t232 = w[0] * t112;
+    const real t233 = t231 + t232;
+    const real t234 = t230 - t233;
+    const real t235 = H[23] * d_s[3];
+    const real t236 = s[3] * d_H[23];
+    const real t237 = t235 + t236;
+    const real t238 = H[22] * d_s[2];
+    const real t239 = s[2] * d_H[22];
+    const real t240 = t238 + t239;
+    const real t241 = H[21] * d_s[1];
+    const real t242 = s[1] * d_H[21];
+    const real t243 = t241 + t242;
+    const real t244 = H[20] * d_s[0];
+    const real t245 = s[0] * d_H[20];
+    const real t246 = t244 + t245;
+    const real t247 = t243 + t246;
+    const real t248 = t240 + t247;
+    const real t249 = t237 + t248;
+    const real t250 = d_c[5] + t249;
+    const real t251 = t234 + t250;
+    const real t252 = motion_I[5] * t44;
+    const real t253 = t119 * d_motion_I[5];
+    const real t254 = t252 + t253;
+    const real t255 = motion_I[4] * t29;
+    const real t256 = t127 * d_motion_I[4];
+    const real t257 = t255 + t256;
+    const real t258 = motion_I[3] * t14;
+    const real t259 = t135 * d_motion_I[3];
+    const real t260 = t258 + t259;
+    const real t261 = t257 + t260;
+    const real t262 = t254 + t261;
+    const real t263 = t251 + t262;
+    d_motion[5] = t263;
+    const real t264 = v[2] * t112;
+    const real t265 = t146 * d_v[2];
+    const real t266 = t264 + t265;
+    const real t267 = 2.0 * t266;
+    const real t268 = v[1] * t139;
+    const real t269 = t153 * d_v[1];
+    const real t270 = t268 + t269;
+    const real t271 = 2.0 * t270;
+    const real t272 = t267 - t271;
+    const real t273 = H[3] * d_s[3];
+    const real t274 = s[3] * d_H[3];
+    const real t275 = t273 + t274;
+    const real t276 = H[2] * d_s[2];
+    const real t277 = s[2] * d_H[2];
+    const real t278 = t276 + t277;
+    const real t279 = H[1] * d_s[1];
+    const real t280 = s[1] * d_H[1];
+    const real t281 = t279 + t280;
+    const real t282 = H[0] * d_s[0];
+    const real t283 = s[0] * d_H[0];
+    const real t284 = t282 + t283;
+    const real t285 = t281 + t284;
+    const real t286 = t278 + t285;
+    const real t287 = t275 + t286;
+    const real t288 = d_c[0] + t287;
+    const real t289 = t272 + t288;
+    const real t290 = Rt[0] * d[0];
+    const real t291 = Rt[1] * d[1];
+    const real t292 = t290 + t291;
+    const real t293 = Rt[2] * d[2];
+    const real t294 = t292 + t293;
+    const real t295 = t294 + ro[0];
+    const real t296 = motion_I[0] * motion_I[2];
+    const real t297 = t296 - motion_I[4];
+    const real t298 = t295 * t297;
+    const real t299 = Rt[3] * d[0];
+    const real t300 = Rt[4] * d[1];
+    const real t301 = t299 + t300;
+    const real t302 = Rt[5] * d[2];
+    const real t303 = t301 + t302;
+    const real t304 = t303 + ro[1];
+    const real t305 = motion_I[1] * motion_I[2];
+    const real t306 = motion_I[3] + t305;
+    const real t307 = t304 * t306;
+    const real t308 = t298 + t307;
+    const real t309 = Rt[6] * d[0];
+    const real t310 = Rt[7] * d[1];
+    const real t311 = t309 + t310;
+    const real t312 = Rt[8] * d[2];
+    const real t313 = t311 + t312;
+    const real t314 = t313 + ro[2];
+    const real t315 = motion_I[1] * motion_I[1];
+    const real t316 = motion_I[0] * motion_I[0];
+    const real t317 = t315 + t316;
+    const real t318 = t314 * t317;
+    const real t319 = t308 - t318;
+    const real t320 = t319 + motion_I[8];
+    const real t321 = t320 * t34;
+    const real t322 = t306 * t54;
+    const real t323 = motion_I[2] * d_motion_I[1];
+    const real t324 = motion_I[1] * d_motion_I[2];
+    const real t325 = t323 + t324;
+    const real t326 = d_motion_I[3] + t325;
+    const real t327 = t304 * t326;
+    const real t328 = t322 + t327;
+    const real t329 = t297 * t49;
+    const real t330 = motion_I[2] * d_motion_I[0];
+    const real t331 = motion_I[0] * d_motion_I[2];
+    const real t332 = t330 + t331;
+    const real t333 = t332 - d_motion_I[4];
+    const real t334 = t295 * t333;
+    const real t335 = t329 + t334;
+    const real t336 = t328 + t335;
+    const real t337 = t317 * t59;
+    const real t338 = motion_I[0] * d_motion_I[0];
+    const real t339 = t338 + t338;
+    const real t340 = motion_I[1] * d_motion_I[1];
+    const real t341 = t340 + t340;
+    const real t342 = t339 + t341;
+    const real t343 = t314 * t342;
+    const real t344 = t337 + t343;
+    const real t345 = t336 - t344;
+    const real t346 = d_motion_I[8] + t345;
+    const real t347 = t65 * t346;
+    const real t348 = t321 + t347;
+    const real t349 = motion_I[0] * motion_I[1];
+    const real t350 = motion_I[5] + t349;
+    const real t351 = t295 * t350;
+    const real t352 = motion_I[2] * motion_I[2];
+    const real t353 = t352 + t316;
+    const real t354 = t304 * t353;
+    const real t355 = t351 - t354;
+    const real t356 = t305 - motion_I[3];
+    const real t357 = t314 * t356;
+    const real t358 = t355 + t357;
+    const real t359 = t358 + motion_I[7];
+    const real t360 = t359 * t19;
+    const real t361 = t356 * t59;
+    const real t362 = t325 - d_motion_I[3];
+    const real t363 = t314 * t362;
+    const real t364 = t361 + t363;
+    const real t365 = t350 * t49;
+    const real t366 = motion_I[1] * d_motion_I[0];
+    const real t367 = motion_I[0] * d_motion_I[1];
+    const real t368 = t366 + t367;
+    const real t369 = d_motion_I[5] + t368;
+    const real t370 = t295 * t369;
+    const real t371 = t365 + t370;
+    const real t372 = t353 * t54;
+    const real t373 = motion_I[2] * d_motion_I[2];
+    const real t374 = t373 + t373;
+    const real t375 = t339 + t374;
+    const real t376 = t304 * t375;
+    const real t377 = t372 + t376;
+    const real t378 = t371 - t377;
+    const real t379 = t364 + t378;
+    const real t380 = d_motion_I[7] + t379;
+    const real t381 = t73 * t380;
+    const real t382 = t360 + t381;
+    const real t383 = t349 - motion_I[5];
+    const real t384 = t304 * t383;
+    const real t385 = t315 + t352;
+    const real t386 = t295 * t385;
+    const real t387 = t384 - t386;
+    const real t388 = motion_I[4] + t296;
+    const real t389 = t314 * t388;
+    const real t390 = t387 + t389;
+    const real t391 = t390 + motion_I[6];
+    const real t392 = t391 * t4;
+    const real t393 = t388 * t59;
+    const real t394 = d_motion_I[4] + t332;
+    const real t395 = t314 * t394;
+    const real t396 = t393 + t395;
+    const real t397 = t383 * t54;
+    const real t398 = t368 - d_motion_I[5];
+    const real t399 = t304 * t398;
+    const real t400 = t397 + t399;
+    const real t401 = t385 * t49;
+    const real t402 = t341 + t374;
+    const real t403 = t295 * t402;
+    const real t404 = t401 + t403;
+    const real t405 = t400 - t404;
+    const real t406 = t396 + t405;
+    const real t407 = d_motion_I[6] + t406;
+    const real t408 = t81 * t407;
+    const real t409 = t392 + t408;
+    const real t410 = t382 + t409;
+    const real t411 = t348 + t410;
+    const real t412 = t289 + t411;
+    d_motion[6] = t412;
+    const real t413 = v[0] * t139;
+    const real t414 = t153 * d_v[0];
+    const real t415 = t413 + t414;
+    const real t416 = 2.0 * t415;
+    const real t417 = v[2] * t85;
+    const real t418 = t195 * d_v[2];
+    const real t419 = t417 + t418;
+    const real t420 = 2.0 * t419;
+    const real t421 = t416 - t420;
+    const real t422 = H[7] * d_s[3];
+    const real t423 = s[3] * d_H[7];
+    const real t424 = t422 + t423;
+    const real t425 = H[6] * d_s[2];
+    const real t426 = s[2] * d_H[6];
+    const real t427 = t425 + t426;
+    const real t428 = H[5] * d_s[1];
+    const real t429 = s[1] * d_H[5];
+    const real t430 = t428 + t429;
+    const real t431 = H[4] * d_s[0];
+    const real t432 = s[0] * d_H[4];
+    const real t433 = t431 + t432;
+    const real t434 = t430 + t433;
+    const real t435 = t427 + t434;
+    const real t436 = t424 + t435;
+    const real t437 = d_c[1] + t436;
+    const real t438 = t421 + t437;
+    const real t439 = t320 * t39;
+    const real t440 = t92 * t346;
+    const real t441 = t439 + t440;
+    const real t442 = t359 * t24;
+    const real t443 = t100 * t380;
+    const real t444 = t442 + t443;
+    const real t445 = t391 * t9;
+    const real t446 = t108 * t407;
+    const real t447 = t445 + t446;
+    const real t448 = t444 + t447;
+    const real t449 = t441 + t448;
+    const real t450 = t438 + t449;
+    d_motion[7] = t450;
+    const real t451 = v[1] * t85;
+    const real t452 = t195 * d_v[1];
+    const real t453 = t451 + t452;
+    const real t454 = 2.0 * t453;
+    const real t455 = v[0] * t112;
+    const real t456 = t146 * d_v[0];
+    const real t457 = t455 + t456;
+    const real t458 = 2.0 * t457;
+    const real t459 = t454 - t458;
+    const real t460 = H[11] * d_s[3];
+    const real t461 = s[3] * d_H[11];
+    const real t462 = t460 + t461;
+    const real t463 = H[10] * d_s[2];
+    const real t464 = s[2] * d_H[10];
+    const real t465 = t463 + t464;
+    const real t466 = H[9] * d_s[1];
+    const real t467 = s[1] * d_H[9];
+    const real t468 = t466 + t467;
+    const real t469 = H[8] * d_s[0];
+    const real t470 = s[0] * d_H[8];
+    const real t471 = t469 + t470;
+    const real t472 = t468 + t471;
+    const real t473 = t465 + t472;
+    const real t474 = t462 + t473;
+    const real t475 = d_c[2] + t474;
+    const real t476 = t459 + t475;
+    const real t477 = t320 * t44;
+    const real t478 = t119 * t346;
+    const real t479 = t477 + t478;
+    const real t480 = t359 * t29;
+    const real t481 = t127 * t380;
+    const real t482 = t480 + t481;
+    const real t483 = t391 * t14;
+    const real t484 = t135 * t407;
+    const real t485 = t483 + t484;
+    const real t486 = t482 + t485;
+    const real t487 = t479 + t486;
+    const real t488 = t476 + t487;
+    d_motion[8] = t488;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 4, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 24, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 4, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][4] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][4] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[4] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[20];
+    const real t1 = H[20] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[16];
+    const real t4 = H[16] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[12];
+    const real t7 = H[12] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[8];
+    const real t10 = H[8] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[4];
+    const real t13 = H[4] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    const real t23 = H[21] * d_f[5];
+    const real t24 = f[5] * d_H[21];
+    const real t25 = t23 + t24;
+    const real t26 = H[17] * d_f[4];
+    const real t27 = f[4] * d_H[17];
+    const real t28 = t26 + t27;
+    const real t29 = H[13] * d_f[3];
+    const real t30 = f[3] * d_H[13];
+    const real t31 = t29 + t30;
+    const real t32 = H[9] * d_f[2];
+    const real t33 = f[2] * d_H[9];
+    const real t34 = t32 + t33;
+    const real t35 = H[5] * d_f[1];
+    const real t36 = f[1] * d_H[5];
+    const real t37 = t35 + t36;
+    const real t38 = H[1] * d_f[0];
+    const real t39 = f[0] * d_H[1];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_tau[1] = t45;
+    const real t46 = H[22] * d_f[5];
+    const real t47 = f[5] * d_H[22];
+    const real t48 = t46 + t47;
+    const real t49 = H[18] * d_f[4];
+    const real t50 = f[4] * d_H[18];
+    const real t51 = t49 + t50;
+    const real t52 = H[14] * d_f[3];
+    const real t53 = f[3] * d_H[14];
+    const real t54 = t52 + t53;
+    const real t55 = H[10] * d_f[2];
+    const real t56 = f[2] * d_H[10];
+    const real t57 = t55 + t56;
+    const real t58 = H[6] * d_f[1];
+    const real t59 = f[1] * d_H[6];
+    const real t60 = t58 + t59;
+    const real t61 = H[2] * d_f[0];
+    const real t62 = f[0] * d_H[2];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    const real t66 = t54 + t65;
+    const real t67 = t51 + t66;
+    const real t68 = t48 + t67;
+    d_tau[2] = t68;
+    const real t69 = H[23] * d_f[5];
+    const real t70 = f[5] * d_H[23];
+    const real t71 = t69 + t70;
+    const real t72 = H[19] * d_f[4];
+    const real t73 = f[4] * d_H[19];
+    const real t74 = t72 + t73;
+    const real t75 = H[15] * d_f[3];
+    const real t76 = f[3] * d_H[15];
+    const real t77 = t75 + t76;
+    const real t78 = H[11] * d_f[2];
+    const real t79 = f[2] * d_H[11];
+    const real t80 = t78 + t79;
+    const real t81 = H[7] * d_f[1];
+    const real t82 = f[1] * d_H[7];
+    const real t83 = t81 + t82;
+    const real t84 = H[3] * d_f[0];
+    const real t85 = f[0] * d_H[3];
+    const real t86 = t84 + t85;
+    const real t87 = t83 + t86;
+    const real t88 = t80 + t87;
+    const real t89 = t77 + t88;
+    const real t90 = t74 + t89;
+    const real t91 = t71 + t90;
+    d_tau[3] = t91;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_effort_slope_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 24, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_effort_slope_outputs[] = {
+    {"d_tau", 4, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
     {
         .name = "forward",
@@ -3382,13 +4097,37 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
+        .call = mstmm_sweep_generic4_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic4_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic4_forward_slope_outputs,
+        .ir_hash = "60ab7cd53ba6fc78bda9d63456b533bcdbcc1c3f9b2bfb88db51e761213b4ac1",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_effort_slope,
+        .call = mstmm_sweep_generic4_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic4_effort_slope_outputs,
+        .ir_hash = "8ef138b5e5ffe8291b439bd59a67bf6fbc0829f031f23e332c198b12306fe36c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "53d1448a539d47d7fcc9ee50c55ebc72adced2547cb83c2a4307b3e8feaec30c",
+    .hash = "63c74c3d5a20803d684132ee449821e1e396d5b2320e462f5eeef3587931fec1",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3398,6 +4137,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -34,6 +34,15 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 5 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4035,6 +4044,760 @@ static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][5]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[5]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][5] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[5] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[4] * d_H[19];
+    const real t159 = H[19] * d_s[4];
+    const real t160 = t158 + t159;
+    const real t161 = s[3] * d_H[18];
+    const real t162 = H[18] * d_s[3];
+    const real t163 = t161 + t162;
+    const real t164 = s[2] * d_H[17];
+    const real t165 = H[17] * d_s[2];
+    const real t166 = t164 + t165;
+    const real t167 = s[1] * d_H[16];
+    const real t168 = H[16] * d_s[1];
+    const real t169 = t167 + t168;
+    const real t170 = s[0] * d_H[15];
+    const real t171 = H[15] * d_s[0];
+    const real t172 = t170 + t171;
+    const real t173 = t169 + t172;
+    const real t174 = t166 + t173;
+    const real t175 = t163 + t174;
+    const real t176 = t160 + t175;
+    const real t177 = d_c[3] + t176;
+    const real t178 = t157 + t177;
+    const real t179 = motion_I[5] * t34;
+    const real t180 = t65 * d_motion_I[5];
+    const real t181 = t179 + t180;
+    const real t182 = motion_I[4] * t19;
+    const real t183 = t73 * d_motion_I[4];
+    const real t184 = t182 + t183;
+    const real t185 = motion_I[3] * t4;
+    const real t186 = t81 * d_motion_I[3];
+    const real t187 = t185 + t186;
+    const real t188 = t184 + t187;
+    const real t189 = t181 + t188;
+    const real t190 = t178 + t189;
+    d_motion[3] = t190;
+    const real t191 = t153 * d_w[0];
+    const real t192 = w[0] * t139;
+    const real t193 = t191 + t192;
+    const real t194 = w[2] * t85;
+    const real t195 = t81 * motion_I[0];
+    const real t196 = t73 * motion_I[1];
+    const real t197 = t195 + t196;
+    const real t198 = t65 * motion_I[2];
+    const real t199 = t197 + t198;
+    const real t200 = t199 * d_w[2];
+    const real t201 = t194 + t200;
+    const real t202 = t193 - t201;
+    const real t203 = H[24] * d_s[4];
+    const real t204 = s[4] * d_H[24];
+    const real t205 = t203 + t204;
+    const real t206 = H[23] * d_s[3];
+    const real t207 = s[3] * d_H[23];
+    const real t208 = t206 + t207;
+    const real t209 = H[22] * d_s[2];
+    const real t210 = s[2] * d_H[22];
+    const real t211 = t209 + t210;
+    const real t212 = H[21] * d_s[1];
+    const real t213 = s[1] * d_H[21];
+    const real t214 = t212 + t213;
+    const real t215 = H[20] * d_s[0];
+    const real t216 = s[0] * d_H[20];
+    const real t217 = t215 + t216;
+    const real t218 = t214 + t217;
+    const real t219 = t211 + t218;
+    const real t220 = t208 + t219;
+    const real t221 = t205 + t220;
+    const real t222 = d_c[4] + t221;
+    const real t223 = t202 + t222;
+    const real t224 = motion_I[5] * t39;
+    const real t225 = t92 * d_motion_I[5];
+    const real t226 = t224 + t225;
+    const real t227 = motion_I[4] * t24;
+    const real t228 = t100 * d_motion_I[4];
+    const real t229 = t227 + t228;
+    const real t230 = motion_I[3] * t9;
+    const real t231 = t108 * d_motion_I[3];
+    const real t232 = t230 + t231;
+    const real t233 = t229 + t232;
+    const real t234 = t226 + t233;
+    const real t235 = t223 + t234;
+    d_motion[4] = t235;
+    const real t236 = w[1] * t85;
+    const real t237 = t199 * d_w[1];
+    const real t238 = t236 + t237;
+    const real t239 = t146 * d_w[0];
+    const real t240 = w[0] * t112;
+    const real t241 = t239 + t240;
+    const real t242 = t238 - t241;
+    const real t243 = H[29] * d_s[4];
+    const real t244 = s[4] * d_H[29];
+    const real t245 = t243 + t244;
+    const real t246 = H[28] * d_s[3];
+    const real t247 = s[3] * d_H[28];
+    const real t248 = t246 + t247;
+    const real t249 = H[27] * d_s[2];
+    const real t250 = s[2] * d_H[27];
+    const real t251 = t249 + t250;
+    const real t252 = H[26] * d_s[1];
+    const real t253 = s[1] * d_H[26];
+    const real t254 = t252 + t253;
+    const real t255 = H[25] * d_s[0];
+    const real t256 = s[0] * d_H[25];
+    const real t257 = t255 + t256;
+    const real t258 = t254 + t257;
+    const real t259 = t251 + t258;
+    const real t260 = t248 + t259;
+    const real t261 = t245 + t260;
+    const real t262 = d_c[5] + t261;
+    const real t263 = t242 + t262;
+    const real t264 = motion_I[5] * t44;
+    const real t265 = t119 * d_motion_I[5];
+    const real t266 = t264 + t265;
+    const real t267 = motion_I[4] * t29;
+    const real t268 = t127 * d_motion_I[4];
+    const real t269 = t267 + t268;
+    const real t270 = motion_I[3] * t14;
+    const real t271 = t135 * d_motion_I[3];
+    const real t272 = t270 + t271;
+    const real t273 = t269 + t272;
+    const real t274 = t266 + t273;
+    const real t275 = t263 + t274;
+    d_motion[5] = t275;
+    const real t276 = v[2] * t112;
+    const real t277 = t146 * d_v[2];
+    const real t278 = t276 + t277;
+    const real t279 = 2.0 * t278;
+    const real t280 = v[1] * t139;
+    const real t281 = t153 * d_v[1];
+    const real t282 = t280 + t281;
+    const real t283 = 2.0 * t282;
+    const real t284 = t279 - t283;
+    const real t285 = H[4] * d_s[4];
+    const real t286 = s[4] * d_H[4];
+    const real t287 = t285 + t286;
+    const real t288 = H[3] * d_s[3];
+    const real t289 = s[3] * d_H[3];
+    const real t290 = t288 + t289;
+    const real t291 = H[2] * d_s[2];
+    const real t292 = s[2] * d_H[2];
+    const real t293 = t291 + t292;
+    const real t294 = H[1] * d_s[1];
+    const real t295 = s[1] * d_H[1];
+    const real t296 = t294 + t295;
+    const real t297 = H[0] * d_s[0];
+    const real t298 = s[0] * d_H[0];
+    const real t299 = t297 + t298;
+    const real t300 = t296 + t299;
+    const real t301 = t293 + t300;
+    const real t302 = t290 + t301;
+    const real t303 = t287 + t302;
+    const real t304 = d_c[0] + t303;
+    const real t305 = t284 + t304;
+    const real t306 = Rt[0] * d[0];
+    const real t307 = Rt[1] * d[1];
+    const real t308 = t306 + t307;
+    const real t309 = Rt[2] * d[2];
+    const real t310 = t308 + t309;
+    const real t311 = t310 + ro[0];
+    const real t312 = motion_I[0] * motion_I[2];
+    const real t313 = t312 - motion_I[4];
+    const real t314 = t311 * t313;
+    const real t315 = Rt[3] * d[0];
+    const real t316 = Rt[4] * d[1];
+    const real t317 = t315 + t316;
+    const real t318 = Rt[5] * d[2];
+    const real t319 = t317 + t318;
+    const real t320 = t319 + ro[1];
+    const real t321 = motion_I[1] * motion_I[2];
+    const real t322 = motion_I[3] + t321;
+    const real t323 = t320 * t322;
+    const real t324 = t314 + t323;
+    const real t325 = Rt[6] * d[0];
+    const real t326 = Rt[7] * d[1];
+    const real t327 = t325 + t326;
+    const real t328 = Rt[8] * d[2];
+    const real t329 = t327 + t328;
+    const real t330 = t329 + ro[2];
+    const real t331 = motion_I[1] * motion_I[1];
+    const real t332 = motion_I[0] * motion_I[0];
+    const real t333 = t331 + t332;
+    const real t334 = t330 * t333;
+    const real t335 = t324 - t334;
+    const real t336 = t335 + motion_I[8];
+    const real t337 = t336 * t34;
+    const real t338 = t322 * t54;
+    const real t339 = motion_I[2] * d_motion_I[1];
+    const real t340 = motion_I[1] * d_motion_I[2];
+    const real t341 = t339 + t340;
+    const real t342 = d_motion_I[3] + t341;
+    const real t343 = t320 * t342;
+    const real t344 = t338 + t343;
+    const real t345 = t313 * t49;
+    const real t346 = motion_I[2] * d_motion_I[0];
+    const real t347 = motion_I[0] * d_motion_I[2];
+    const real t348 = t346 + t347;
+    const real t349 = t348 - d_motion_I[4];
+    const real t350 = t311 * t349;
+    const real t351 = t345 + t350;
+    const real t352 = t344 + t351;
+    const real t353 = t333 * t59;
+    const real t354 = motion_I[0] * d_motion_I[0];
+    const real t355 = t354 + t354;
+    const real t356 = motion_I[1] * d_motion_I[1];
+    const real t357 = t356 + t356;
+    const real t358 = t355 + t357;
+    const real t359 = t330 * t358;
+    const real t360 = t353 + t359;
+    const real t361 = t352 - t360;
+    const real t362 = d_motion_I[8] + t361;
+    const real t363 = t65 * t362;
+    const real t364 = t337 + t363;
+    const real t365 = motion_I[0] * motion_I[1];
+    const real t366 = motion_I[5] + t365;
+    const real t367 = t311 * t366;
+    const real t368 = motion_I[2] * motion_I[2];
+    const real t369 = t368 + t332;
+    const real t370 = t320 * t369;
+    const real t371 = t367 - t370;
+    const real t372 = t321 - motion_I[3];
+    const real t373 = t330 * t372;
+    const real t374 = t371 + t373;
+    const real t375 = t374 + motion_I[7];
+    const real t376 = t375 * t19;
+    const real t377 = t372 * t59;
+    const real t378 = t341 - d_motion_I[3];
+    const real t379 = t330 * t378;
+    const real t380 = t377 + t379;
+    const real t381 = t366 * t49;
+    const real t382 = motion_I[1] * d_motion_I[0];
+    const real t383 = motion_I[0] * d_motion_I[1];
+    const real t384 = t382 + t383;
+    const real t385 = d_motion_I[5] + t384;
+    const real t386 = t311 * t385;
+    const real t387 = t381 + t386;
+    const real t388 = t369 * t54;
+    const real t389 = motion_I[2] * d_motion_I[2];
+    const real t390 = t389 + t389;
+    const real t391 = t355 + t390;
+    const real t392 = t320 * t391;
+    const real t393 = t388 + t392;
+    const real t394 = t387 - t393;
+    const real t395 = t380 + t394;
+    const real t396 = d_motion_I[7] + t395;
+    const real t397 = t73 * t396;
+    const real t398 = t376 + t397;
+    const real t399 = t365 - motion_I[5];
+    const real t400 = t320 * t399;
+    const real t401 = t331 + t368;
+    const real t402 = t311 * t401;
+    const real t403 = t400 - t402;
+    const real t404 = motion_I[4] + t312;
+    const real t405 = t330 * t404;
+    const real t406 = t403 + t405;
+    const real t407 = t406 + motion_I[6];
+    const real t408 = t407 * t4;
+    const real t409 = t404 * t59;
+    const real t410 = d_motion_I[4] + t348;
+    const real t411 = t330 * t410;
+    const real t412 = t409 + t411;
+    const real t413 = t399 * t54;
+    const real t414 = t384 - d_motion_I[5];
+    const real t415 = t320 * t414;
+    const real t416 = t413 + t415;
+    const real t417 = t401 * t49;
+    const real t418 = t357 + t390;
+    const real t419 = t311 * t418;
+    const real t420 = t417 + t419;
+    const real t421 = t416 - t420;
+    const real t422 = t412 + t421;
+    const real t423 = d_motion_I[6] + t422;
+    const real t424 = t81 * t423;
+    const real t425 = t408 + t424;
+    const real t426 = t398 + t425;
+    const real t427 = t364 + t426;
+    const real t428 = t305 + t427;
+    d_motion[6] = t428;
+    const real t429 = v[0] * t139;
+    const real t430 = t153 * d_v[0];
+    const real t431 = t429 + t430;
+    const real t432 = 2.0 * t431;
+    const real t433 = v[2] * t85;
+    const real t434 = t199 * d_v[2];
+    const real t435 = t433 + t434;
+    const real t436 = 2.0 * t435;
+    const real t437 = t432 - t436;
+    const real t438 = H[9] * d_s[4];
+    const real t439 = s[4] * d_H[9];
+    const real t440 = t438 + t439;
+    const real t441 = H[8] * d_s[3];
+    const real t442 = s[3] * d_H[8];
+    const real t443 = t441 + t442;
+    const real t444 = H[7] * d_s[2];
+    const real t445 = s[2] * d_H[7];
+    const real t446 = t444 + t445;
+    const real t447 = H[6] * d_s[1];
+    const real t448 = s[1] * d_H[6];
+    const real t449 = t447 + t448;
+    const real t450 = H[5] * d_s[0];
+    const real t451 = s[0] * d_H[5];
+    const real t452 = t450 + t451;
+    const real t453 = t449 + t452;
+    const real t454 = t446 + t453;
+    const real t455 = t443 + t454;
+    const real t456 = t440 + t455;
+    const real t457 = d_c[1] + t456;
+    const real t458 = t437 + t457;
+    const real t459 = t336 * t39;
+    const real t460 = t92 * t362;
+    const real t461 = t459 + t460;
+    const real t462 = t375 * t24;
+    const real t463 = t100 * t396;
+    const real t464 = t462 + t463;
+    const real t465 = t407 * t9;
+    const real t466 = t108 * t423;
+    const real t467 = t465 + t466;
+    const real t468 = t464 + t467;
+    const real t469 = t461 + t468;
+    const real t470 = t458 + t469;
+    d_motion[7] = t470;
+    const real t471 = v[1] * t85;
+    const real t472 = t199 * d_v[1];
+    const real t473 = t471 + t472;
+    const real t474 = 2.0 * t473;
+    const real t475 = v[0] * t112;
+    const real t476 = t146 * d_v[0];
+    const real t477 = t475 + t476;
+    const real t478 = 2.0 * t477;
+    const real t479 = t474 - t478;
+    const real t480 = H[14] * d_s[4];
+    const real t481 = s[4] * d_H[14];
+    const real t482 = t480 + t481;
+    const real t483 = H[13] * d_s[3];
+    const real t484 = s[3] * d_H[13];
+    const real t485 = t483 + t484;
+    const real t486 = H[12] * d_s[2];
+    const real t487 = s[2] * d_H[12];
+    const real t488 = t486 + t487;
+    const real t489 = H[11] * d_s[1];
+    const real t490 = s[1] * d_H[11];
+    const real t491 = t489 + t490;
+    const real t492 = H[10] * d_s[0];
+    const real t493 = s[0] * d_H[10];
+    const real t494 = t492 + t493;
+    const real t495 = t491 + t494;
+    const real t496 = t488 + t495;
+    const real t497 = t485 + t496;
+    const real t498 = t482 + t497;
+    const real t499 = d_c[2] + t498;
+    const real t500 = t479 + t499;
+    const real t501 = t336 * t44;
+    const real t502 = t119 * t362;
+    const real t503 = t501 + t502;
+    const real t504 = t375 * t29;
+    const real t505 = t127 * t396;
+    const real t506 = t504 + t505;
+    const real t507 = t407 * t14;
+    const real t508 = t135 * t423;
+    const real t509 = t507 + t508;
+    const real t510 = t506 + t509;
+    const real t511 = t503 + t510;
+    const real t512 = t500 + t511;
+    d_motion[8] = t512;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 5, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 30, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 5, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][5] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][5] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[5] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[25];
+    const real t1 = H[25] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[20];
+    const real t4 = H[20] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[15];
+    const real t7 = H[15] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[10];
+    const real t10 = H[10] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[5];
+    const real t13 = H[5] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    const real t23 = H[26] * d_f[5];
+    const real t24 = f[5] * d_H[26];
+    const real t25 = t23 + t24;
+    const real t26 = H[21] * d_f[4];
+    const real t27 = f[4] * d_H[21];
+    const real t28 = t26 + t27;
+    const real t29 = H[16] * d_f[3];
+    const real t30 = f[3] * d_H[16];
+    const real t31 = t29 + t30;
+    const real t32 = H[11] * d_f[2];
+    const real t33 = f[2] * d_H[11];
+    const real t34 = t32 + t33;
+    const real t35 = H[6] * d_f[1];
+    const real t36 = f[1] * d_H[6];
+    const real t37 = t35 + t36;
+    const real t38 = H[1] * d_f[0];
+    const real t39 = f[0] * d_H[1];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_tau[1] = t45;
+    const real t46 = H[27] * d_f[5];
+    const real t47 = f[5] * d_H[27];
+    const real t48 = t46 + t47;
+    const real t49 = H[22] * d_f[4];
+    const real t50 = f[4] * d_H[22];
+    const real t51 = t49 + t50;
+    const real t52 = H[17] * d_f[3];
+    const real t53 = f[3] * d_H[17];
+    const real t54 = t52 + t53;
+    const real t55 = H[12] * d_f[2];
+    const real t56 = f[2] * d_H[12];
+    const real t57 = t55 + t56;
+    const real t58 = H[7] * d_f[1];
+    const real t59 = f[1] * d_H[7];
+    const real t60 = t58 + t59;
+    const real t61 = H[2] * d_f[0];
+    const real t62 = f[0] * d_H[2];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    const real t66 = t54 + t65;
+    const real t67 = t51 + t66;
+    const real t68 = t48 + t67;
+    d_tau[2] = t68;
+    const real t69 = H[28] * d_f[5];
+    const real t70 = f[5] * d_H[28];
+    const real t71 = t69 + t70;
+    const real t72 = H[23] * d_f[4];
+    const real t73 = f[4] * d_H[23];
+    const real t74 = t72 + t73;
+    const real t75 = H[18] * d_f[3];
+    const real t76 = f[3] * d_H[18];
+    const real t77 = t75 + t76;
+    const real t78 = H[13] * d_f[2];
+    const real t79 = f[2] * d_H[13];
+    const real t80 = t78 + t79;
+    const real t81 = H[8] * d_f[1];
+    const real t82 = f[1] * d_H[8];
+    const real t83 = t81 + t82;
+    const real t84 = H[3] * d_f[0];
+    const real t85 = f[0] * d_H[3];
+    const real t86 = t84 + t85;
+    const real t87 = t83 + t86;
+    const real t88 = t80 + t87;
+    const real t89 = t77 + t88;
+    const real t90 = t74 + t89;
+    const real t91 = t71 + t90;
+    d_tau[3] = t91;
+    const real t92 = H[29] * d_f[5];
+    const real t93 = f[5] * d_H[29];
+    const real t94 = t92 + t93;
+    const real t95 = H[24] * d_f[4];
+    const real t96 = f[4] * d_H[24];
+    const real t97 = t95 + t96;
+    const real t98 = H[19] * d_f[3];
+    const real t99 = f[3] * d_H[19];
+    const real t100 = t98 + t99;
+    const real t101 = H[14] * d_f[2];
+    const real t102 = f[2] * d_H[14];
+    const real t103 = t101 + t102;
+    const real t104 = H[9] * d_f[1];
+    const real t105 = f[1] * d_H[9];
+    const real t106 = t104 + t105;
+    const real t107 = H[4] * d_f[0];
+    const real t108 = f[0] * d_H[4];
+    const real t109 = t107 + t108;
+    const real t110 = t106 + t109;
+    const real t111 = t103 + t110;
+    const real t112 = t100 + t111;
+    const real t113 = t97 + t112;
+    const real t114 = t94 + t113;
+    d_tau[4] = t114;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_effort_slope_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 30, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_effort_slope_outputs[] = {
+    {"d_tau", 5, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
     {
         .name = "forward",
@@ -4132,13 +4895,37 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_forward_slope,
+        .call = mstmm_sweep_generic5_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic5_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic5_forward_slope_outputs,
+        .ir_hash = "a3a4401402f2468d85a1b9c3daa81913485f1837a42c56eaf8c4792029b92df4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_effort_slope,
+        .call = mstmm_sweep_generic5_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic5_effort_slope_outputs,
+        .ir_hash = "607a61a4c9273f00a41168b732a563fdbf3887a9ca947a87637335251adfbb84",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "70b46a5fc0f322590333b7ec523f5d10cfe41cf5c215c15ba686be4c4bb1ed79",
+    .hash = "48998bfcc4044fea5c5423d7acfd9ca7d91d1ff25fa419f7d28184cc26cd3397",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4148,6 +4935,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic5_kernels,
 };

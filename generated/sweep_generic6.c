@@ -34,6 +34,15 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
+int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 
 /* bias motion behind a hinge with 6 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4889,6 +4898,808 @@ static const mstmm_port mstmm_sweep_generic6_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* forward and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  R[3][3]
+ * in  d[3]
+ * in  H[6][6]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  s[6]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * in  d_R[3][3] derivative of R
+ * in  d_d[3] derivative of d
+ * in  d_H[6][6] derivative of H
+ * in  d_v[3] derivative of v
+ * in  d_w[3] derivative of w
+ * in  d_c[6] derivative of c
+ * in  d_s[6] derivative of s
+ * in  d_motion_I[9] derivative of motion_I
+ * out d_Rc[3][3] derivative of Rc
+ * out d_r[3] (m) derivative of r
+ * out d_motion[9] derivative of motion
+ */
+int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
+    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
+    const real *restrict w, const real *restrict c, const real *restrict s,
+    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
+    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
+    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
+    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+{
+    (void)c;
+    const real t0 = Rt[2] * d_R[6];
+    const real t1 = Rt[1] * d_R[3];
+    const real t2 = Rt[0] * d_R[0];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    d_Rc[0] = t4;
+    const real t5 = Rt[2] * d_R[7];
+    const real t6 = Rt[1] * d_R[4];
+    const real t7 = Rt[0] * d_R[1];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    d_Rc[1] = t9;
+    const real t10 = Rt[2] * d_R[8];
+    const real t11 = Rt[1] * d_R[5];
+    const real t12 = Rt[0] * d_R[2];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    d_Rc[2] = t14;
+    const real t15 = Rt[5] * d_R[6];
+    const real t16 = Rt[4] * d_R[3];
+    const real t17 = Rt[3] * d_R[0];
+    const real t18 = t16 + t17;
+    const real t19 = t15 + t18;
+    d_Rc[3] = t19;
+    const real t20 = Rt[5] * d_R[7];
+    const real t21 = Rt[4] * d_R[4];
+    const real t22 = Rt[3] * d_R[1];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    d_Rc[4] = t24;
+    const real t25 = Rt[5] * d_R[8];
+    const real t26 = Rt[4] * d_R[5];
+    const real t27 = Rt[3] * d_R[2];
+    const real t28 = t26 + t27;
+    const real t29 = t25 + t28;
+    d_Rc[5] = t29;
+    const real t30 = Rt[8] * d_R[6];
+    const real t31 = Rt[7] * d_R[3];
+    const real t32 = Rt[6] * d_R[0];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    d_Rc[6] = t34;
+    const real t35 = Rt[8] * d_R[7];
+    const real t36 = Rt[7] * d_R[4];
+    const real t37 = Rt[6] * d_R[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    d_Rc[7] = t39;
+    const real t40 = Rt[8] * d_R[8];
+    const real t41 = Rt[7] * d_R[5];
+    const real t42 = Rt[6] * d_R[2];
+    const real t43 = t41 + t42;
+    const real t44 = t40 + t43;
+    d_Rc[8] = t44;
+    const real t45 = Rt[2] * d_d[2];
+    const real t46 = Rt[1] * d_d[1];
+    const real t47 = Rt[0] * d_d[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    d_r[0] = t49;
+    const real t50 = Rt[5] * d_d[2];
+    const real t51 = Rt[4] * d_d[1];
+    const real t52 = Rt[3] * d_d[0];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    d_r[1] = t54;
+    const real t55 = Rt[8] * d_d[2];
+    const real t56 = Rt[7] * d_d[1];
+    const real t57 = Rt[6] * d_d[0];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    d_r[2] = t59;
+    const real t60 = motion_I[2] * t34;
+    const real t61 = R[0] * Rt[6];
+    const real t62 = R[3] * Rt[7];
+    const real t63 = t61 + t62;
+    const real t64 = R[6] * Rt[8];
+    const real t65 = t63 + t64;
+    const real t66 = t65 * d_motion_I[2];
+    const real t67 = t60 + t66;
+    const real t68 = motion_I[1] * t19;
+    const real t69 = R[0] * Rt[3];
+    const real t70 = R[3] * Rt[4];
+    const real t71 = t69 + t70;
+    const real t72 = R[6] * Rt[5];
+    const real t73 = t71 + t72;
+    const real t74 = t73 * d_motion_I[1];
+    const real t75 = t68 + t74;
+    const real t76 = motion_I[0] * t4;
+    const real t77 = Rt[0] * R[0];
+    const real t78 = Rt[1] * R[3];
+    const real t79 = t77 + t78;
+    const real t80 = Rt[2] * R[6];
+    const real t81 = t79 + t80;
+    const real t82 = t81 * d_motion_I[0];
+    const real t83 = t76 + t82;
+    const real t84 = t75 + t83;
+    const real t85 = t67 + t84;
+    const real t86 = d_w[0] + t85;
+    d_motion[0] = t86;
+    const real t87 = motion_I[2] * t39;
+    const real t88 = R[1] * Rt[6];
+    const real t89 = R[4] * Rt[7];
+    const real t90 = t88 + t89;
+    const real t91 = R[7] * Rt[8];
+    const real t92 = t90 + t91;
+    const real t93 = t92 * d_motion_I[2];
+    const real t94 = t87 + t93;
+    const real t95 = motion_I[1] * t24;
+    const real t96 = R[1] * Rt[3];
+    const real t97 = R[4] * Rt[4];
+    const real t98 = t96 + t97;
+    const real t99 = R[7] * Rt[5];
+    const real t100 = t98 + t99;
+    const real t101 = t100 * d_motion_I[1];
+    const real t102 = t95 + t101;
+    const real t103 = motion_I[0] * t9;
+    const real t104 = Rt[0] * R[1];
+    const real t105 = Rt[1] * R[4];
+    const real t106 = t104 + t105;
+    const real t107 = Rt[2] * R[7];
+    const real t108 = t106 + t107;
+    const real t109 = t108 * d_motion_I[0];
+    const real t110 = t103 + t109;
+    const real t111 = t102 + t110;
+    const real t112 = t94 + t111;
+    const real t113 = d_w[1] + t112;
+    d_motion[1] = t113;
+    const real t114 = motion_I[2] * t44;
+    const real t115 = R[2] * Rt[6];
+    const real t116 = R[5] * Rt[7];
+    const real t117 = t115 + t116;
+    const real t118 = R[8] * Rt[8];
+    const real t119 = t117 + t118;
+    const real t120 = t119 * d_motion_I[2];
+    const real t121 = t114 + t120;
+    const real t122 = motion_I[1] * t29;
+    const real t123 = R[2] * Rt[3];
+    const real t124 = R[5] * Rt[4];
+    const real t125 = t123 + t124;
+    const real t126 = R[8] * Rt[5];
+    const real t127 = t125 + t126;
+    const real t128 = t127 * d_motion_I[1];
+    const real t129 = t122 + t128;
+    const real t130 = motion_I[0] * t14;
+    const real t131 = Rt[0] * R[2];
+    const real t132 = Rt[1] * R[5];
+    const real t133 = t131 + t132;
+    const real t134 = Rt[2] * R[8];
+    const real t135 = t133 + t134;
+    const real t136 = t135 * d_motion_I[0];
+    const real t137 = t130 + t136;
+    const real t138 = t129 + t137;
+    const real t139 = t121 + t138;
+    const real t140 = d_w[2] + t139;
+    d_motion[2] = t140;
+    const real t141 = w[2] * t112;
+    const real t142 = t108 * motion_I[0];
+    const real t143 = t100 * motion_I[1];
+    const real t144 = t142 + t143;
+    const real t145 = t92 * motion_I[2];
+    const real t146 = t144 + t145;
+    const real t147 = t146 * d_w[2];
+    const real t148 = t141 + t147;
+    const real t149 = t135 * motion_I[0];
+    const real t150 = t127 * motion_I[1];
+    const real t151 = t149 + t150;
+    const real t152 = t119 * motion_I[2];
+    const real t153 = t151 + t152;
+    const real t154 = t153 * d_w[1];
+    const real t155 = w[1] * t139;
+    const real t156 = t154 + t155;
+    const real t157 = t148 - t156;
+    const real t158 = s[5] * d_H[23];
+    const real t159 = H[23] * d_s[5];
+    const real t160 = t158 + t159;
+    const real t161 = s[4] * d_H[22];
+    const real t162 = H[22] * d_s[4];
+    const real t163 = t161 + t162;
+    const real t164 = s[3] * d_H[21];
+    const real t165 = H[21] * d_s[3];
+    const real t166 = t164 + t165;
+    const real t167 = s[2] * d_H[20];
+    const real t168 = H[20] * d_s[2];
+    const real t169 = t167 + t168;
+    const real t170 = s[1] * d_H[19];
+    const real t171 = H[19] * d_s[1];
+    const real t172 = t170 + t171;
+    const real t173 = s[0] * d_H[18];
+    const real t174 = H[18] * d_s[0];
+    const real t175 = t173 + t174;
+    const real t176 = t172 + t175;
+    const real t177 = t169 + t176;
+    const real t178 = t166 + t177;
+    const real t179 = t163 + t178;
+    const real t180 = t160 + t179;
+    const real t181 = d_c[3] + t180;
+    const real t182 = t157 + t181;
+    const real t183 = motion_I[5] * t34;
+    const real t184 = t65 * d_motion_I[5];
+    const real t185 = t183 + t184;
+    const real t186 = motion_I[4] * t19;
+    const real t187 = t73 * d_motion_I[4];
+    const real t188 = t186 + t187;
+    const real t189 = motion_I[3] * t4;
+    const real t190 = t81 * d_motion_I[3];
+    const real t191 = t189 + t190;
+    const real t192 = t188 + t191;
+    const real t193 = t185 + t192;
+    const real t194 = t182 + t193;
+    d_motion[3] = t194;
+    const real t195 = t153 * d_w[0];
+    const real t196 = w[0] * t139;
+    const real t197 = t195 + t196;
+    const real t198 = w[2] * t85;
+    const real t199 = t81 * motion_I[0];
+    const real t200 = t73 * motion_I[1];
+    const real t201 = t199 + t200;
+    const real t202 = t65 * motion_I[2];
+    const real t203 = t201 + t202;
+    const real t204 = t203 * d_w[2];
+    const real t205 = t198 + t204;
+    const real t206 = t197 - t205;
+    const real t207 = H[29] * d_s[5];
+    const real t208 = s[5] * d_H[29];
+    const real t209 = t207 + t208;
+    const real t210 = H[28] * d_s[4];
+    const real t211 = s[4] * d_H[28];
+    const real t212 = t210 + t211;
+    const real t213 = H[27] * d_s[3];
+    const real t214 = s[3] * d_H[27];
+    const real t215 = t213 + t214;
+    const real t216 = H[26] * d_s[2];
+    const real t217 = s[2] * d_H[26];
+    const real t218 = t216 + t217;
+    const real t219 = H[25] * d_s[1];
+    const real t220 = s[1] * d_H[25];
+    const real t221 = t219 + t220;
+    const real t222 = H[24] * d_s[0];
+    const real t223 = s[0] * d_H[24];
+    const real t224 = t222 + t223;
+    const real t225 = t221 + t224;
+    const real t226 = t218 + t225;
+    const real t227 = t215 + t226;
+    const real t228 = t212 + t227;
+    const real t229 = t209 + t228;
+    const real t230 = d_c[4] + t229;
+    const real t231 = t206 + t230;
+    const real t232 = motion_I[5] * t39;
+    const real t233 = t92 * d_motion_I[5];
+    const real t234 = t232 + t233;
+    const real t235 = motion_I[4] * t24;
+    const real t236 = t100 * d_motion_I[4];
+    const real t237 = t235 + t236;
+    const real t238 = motion_I[3] * t9;
+    const real t239 = t108 * d_motion_I[3];
+    const real t240 = t238 + t239;
+    const real t241 = t237 + t240;
+    const real t242 = t234 + t241;
+    const real t243 = t231 + t242;
+    d_motion[4] = t243;
+    const real t244 = w[1] * t85;
+    const real t245 = t203 * d_w[1];
+    const real t246 = t244 + t245;
+    const real t247 = t146 * d_w[0];
+    const real t248 = w[0] * t112;
+    const real t249 = t247 + t248;
+    const real t250 = t246 - t249;
+    const real t251 = H[35] * d_s[5];
+    const real t252 = s[5] * d_H[35];
+    const real t253 = t251 + t252;
+    const real t254 = H[34] * d_s[4];
+    const real t255 = s[4] * d_H[34];
+    const real t256 = t254 + t255;
+    const real t257 = H[33] * d_s[3];
+    const real t258 = s[3] * d_H[33];
+    const real t259 = t257 + t258;
+    const real t260 = H[32] * d_s[2];
+    const real t261 = s[2] * d_H[32];
+    const real t262 = t260 + t261;
+    const real t263 = H[31] * d_s[1];
+    const real t264 = s[1] * d_H[31];
+    const real t265 = t263 + t264;
+    const real t266 = H[30] * d_s[0];
+    const real t267 = s[0] * d_H[30];
+    const real t268 = t266 + t267;
+    const real t269 = t265 + t268;
+    const real t270 = t262 + t269;
+    const real t271 = t259 + t270;
+    const real t272 = t256 + t271;
+    const real t273 = t253 + t272;
+    const real t274 = d_c[5] + t273;
+    const real t275 = t250 + t274;
+    const real t276 = motion_I[5] * t44;
+    const real t277 = t119 * d_motion_I[5];
+    const real t278 = t276 + t277;
+    const real t279 = motion_I[4] * t29;
+    const real t280 = t127 * d_motion_I[4];
+    const real t281 = t279 + t280;
+    const real t282 = motion_I[3] * t14;
+    const real t283 = t135 * d_motion_I[3];
+    const real t284 = t282 + t283;
+    const real t285 = t281 + t284;
+    const real t286 = t278 + t285;
+    const real t287 = t275 + t286;
+    d_motion[5] = t287;
+    const real t288 = v[2] * t112;
+    const real t289 = t146 * d_v[2];
+    const real t290 = t288 + t289;
+    const real t291 = 2.0 * t290;
+    const real t292 = v[1] * t139;
+    const real t293 = t153 * d_v[1];
+    const real t294 = t292 + t293;
+    const real t295 = 2.0 * t294;
+    const real t296 = t291 - t295;
+    const real t297 = H[5] * d_s[5];
+    const real t298 = s[5] * d_H[5];
+    const real t299 = t297 + t298;
+    const real t300 = H[4] * d_s[4];
+    const real t301 = s[4] * d_H[4];
+    const real t302 = t300 + t301;
+    const real t303 = H[3] * d_s[3];
+    const real t304 = s[3] * d_H[3];
+    const real t305 = t303 + t304;
+    const real t306 = H[2] * d_s[2];
+    const real t307 = s[2] * d_H[2];
+    const real t308 = t306 + t307;
+    const real t309 = H[1] * d_s[1];
+    const real t310 = s[1] * d_H[1];
+    const real t311 = t309 + t310;
+    const real t312 = H[0] * d_s[0];
+    const real t313 = s[0] * d_H[0];
+    const real t314 = t312 + t313;
+    const real t315 = t311 + t314;
+    const real t316 = t308 + t315;
+    const real t317 = t305 + t316;
+    const real t318 = t302 + t317;
+    const real t319 = t299 + t318;
+    const real t320 = d_c[0] + t319;
+    const real t321 = t296 + t320;
+    const real t322 = Rt[0] * d[0];
+    const real t323 = Rt[1] * d[1];
+    const real t324 = t322 + t323;
+    const real t325 = Rt[2] * d[2];
+    const real t326 = t324 + t325;
+    const real t327 = t326 + ro[0];
+    const real t328 = motion_I[0] * motion_I[2];
+    const real t329 = t328 - motion_I[4];
+    const real t330 = t327 * t329;
+    const real t331 = Rt[3] * d[0];
+    const real t332 = Rt[4] * d[1];
+    const real t333 = t331 + t332;
+    const real t334 = Rt[5] * d[2];
+    const real t335 = t333 + t334;
+    const real t336 = t335 + ro[1];
+    const real t337 = motion_I[1] * motion_I[2];
+    const real t338 = motion_I[3] + t337;
+    const real t339 = t336 * t338;
+    const real t340 = t330 + t339;
+    const real t341 = Rt[6] * d[0];
+    const real t342 = Rt[7] * d[1];
+    const real t343 = t341 + t342;
+    const real t344 = Rt[8] * d[2];
+    const real t345 = t343 + t344;
+    const real t346 = t345 + ro[2];
+    const real t347 = motion_I[1] * motion_I[1];
+    const real t348 = motion_I[0] * motion_I[0];
+    const real t349 = t347 + t348;
+    const real t350 = t346 * t349;
+    const real t351 = t340 - t350;
+    const real t352 = t351 + motion_I[8];
+    const real t353 = t352 * t34;
+    const real t354 = t338 * t54;
+    const real t355 = motion_I[2] * d_motion_I[1];
+    const real t356 = motion_I[1] * d_motion_I[2];
+    const real t357 = t355 + t356;
+    const real t358 = d_motion_I[3] + t357;
+    const real t359 = t336 * t358;
+    const real t360 = t354 + t359;
+    const real t361 = t329 * t49;
+    const real t362 = motion_I[2] * d_motion_I[0];
+    const real t363 = motion_I[0] * d_motion_I[2];
+    const real t364 = t362 + t363;
+    const real t365 = t364 - d_motion_I[4];
+    const real t366 = t327 * t365;
+    const real t367 = t361 + t366;
+    const real t368 = t360 + t367;
+    const real t369 = t349 * t59;
+    const real t370 = motion_I[0] * d_motion_I[0];
+    const real t371 = t370 + t370;
+    const real t372 = motion_I[1] * d_motion_I[1];
+    const real t373 = t372 + t372;
+    const real t374 = t371 + t373;
+    const real t375 = t346 * t374;
+    const real t376 = t369 + t375;
+    const real t377 = t368 - t376;
+    const real t378 = d_motion_I[8] + t377;
+    const real t379 = t65 * t378;
+    const real t380 = t353 + t379;
+    const real t381 = motion_I[0] * motion_I[1];
+    const real t382 = motion_I[5] + t381;
+    const real t383 = t327 * t382;
+    const real t384 = motion_I[2] * motion_I[2];
+    const real t385 = t384 + t348;
+    const real t386 = t336 * t385;
+    const real t387 = t383 - t386;
+    const real t388 = t337 - motion_I[3];
+    const real t389 = t346 * t388;
+    const real t390 = t387 + t389;
+    const real t391 = t390 + motion_I[7];
+    const real t392 = t391 * t19;
+    const real t393 = t388 * t59;
+    const real t394 = t357 - d_motion_I[3];
+    const real t395 = t346 * t394;
+    const real t396 = t393 + t395;
+    const real t397 = t382 * t49;
+    const real t398 = motion_I[1] * d_motion_I[0];
+    const real t399 = motion_I[0] * d_motion_I[1];
+    const real t400 = t398 + t399;
+    const real t401 = d_motion_I[5] + t400;
+    const real t402 = t327 * t401;
+    const real t403 = t397 + t402;
+    const real t404 = t385 * t54;
+    const real t405 = motion_I[2] * d_motion_I[2];
+    const real t406 = t405 + t405;
+    const real t407 = t371 + t406;
+    const real t408 = t336 * t407;
+    const real t409 = t404 + t408;
+    const real t410 = t403 - t409;
+    const real t411 = t396 + t410;
+    const real t412 = d_motion_I[7] + t411;
+    const real t413 = t73 * t412;
+    const real t414 = t392 + t413;
+    const real t415 = t381 - motion_I[5];
+    const real t416 = t336 * t415;
+    const real t417 = t347 + t384;
+    const real t418 = t327 * t417;
+    const real t419 = t416 - t418;
+    const real t420 = motion_I[4] + t328;
+    const real t421 = t346 * t420;
+    const real t422 = t419 + t421;
+    const real t423 = t422 + motion_I[6];
+    const real t424 = t423 * t4;
+    const real t425 = t420 * t59;
+    const real t426 = d_motion_I[4] + t364;
+    const real t427 = t346 * t426;
+    const real t428 = t425 + t427;
+    const real t429 = t415 * t54;
+    const real t430 = t400 - d_motion_I[5];
+    const real t431 = t336 * t430;
+    const real t432 = t429 + t431;
+    const real t433 = t417 * t49;
+    const real t434 = t373 + t406;
+    const real t435 = t327 * t434;
+    const real t436 = t433 + t435;
+    const real t437 = t432 - t436;
+    const real t438 = t428 + t437;
+    const real t439 = d_motion_I[6] + t438;
+    const real t440 = t81 * t439;
+    const real t441 = t424 + t440;
+    const real t442 = t414 + t441;
+    const real t443 = t380 + t442;
+    const real t444 = t321 + t443;
+    d_motion[6] = t444;
+    const real t445 = v[0] * t139;
+    const real t446 = t153 * d_v[0];
+    const real t447 = t445 + t446;
+    const real t448 = 2.0 * t447;
+    const real t449 = v[2] * t85;
+    const real t450 = t203 * d_v[2];
+    const real t451 = t449 + t450;
+    const real t452 = 2.0 * t451;
+    const real t453 = t448 - t452;
+    const real t454 = H[11] * d_s[5];
+    const real t455 = s[5] * d_H[11];
+    const real t456 = t454 + t455;
+    const real t457 = H[10] * d_s[4];
+    const real t458 = s[4] * d_H[10];
+    const real t459 = t457 + t458;
+    const real t460 = H[9] * d_s[3];
+    const real t461 = s[3] * d_H[9];
+    const real t462 = t460 + t461;
+    const real t463 = H[8] * d_s[2];
+    const real t464 = s[2] * d_H[8];
+    const real t465 = t463 + t464;
+    const real t466 = H[7] * d_s[1];
+    const real t467 = s[1] * d_H[7];
+    const real t468 = t466 + t467;
+    const real t469 = H[6] * d_s[0];
+    const real t470 = s[0] * d_H[6];
+    const real t471 = t469 + t470;
+    const real t472 = t468 + t471;
+    const real t473 = t465 + t472;
+    const real t474 = t462 + t473;
+    const real t475 = t459 + t474;
+    const real t476 = t456 + t475;
+    const real t477 = d_c[1] + t476;
+    const real t478 = t453 + t477;
+    const real t479 = t352 * t39;
+    const real t480 = t92 * t378;
+    const real t481 = t479 + t480;
+    const real t482 = t391 * t24;
+    const real t483 = t100 * t412;
+    const real t484 = t482 + t483;
+    const real t485 = t423 * t9;
+    const real t486 = t108 * t439;
+    const real t487 = t485 + t486;
+    const real t488 = t484 + t487;
+    const real t489 = t481 + t488;
+    const real t490 = t478 + t489;
+    d_motion[7] = t490;
+    const real t491 = v[1] * t85;
+    const real t492 = t203 * d_v[1];
+    const real t493 = t491 + t492;
+    const real t494 = 2.0 * t493;
+    const real t495 = v[0] * t112;
+    const real t496 = t146 * d_v[0];
+    const real t497 = t495 + t496;
+    const real t498 = 2.0 * t497;
+    const real t499 = t494 - t498;
+    const real t500 = H[17] * d_s[5];
+    const real t501 = s[5] * d_H[17];
+    const real t502 = t500 + t501;
+    const real t503 = H[16] * d_s[4];
+    const real t504 = s[4] * d_H[16];
+    const real t505 = t503 + t504;
+    const real t506 = H[15] * d_s[3];
+    const real t507 = s[3] * d_H[15];
+    const real t508 = t506 + t507;
+    const real t509 = H[14] * d_s[2];
+    const real t510 = s[2] * d_H[14];
+    const real t511 = t509 + t510;
+    const real t512 = H[13] * d_s[1];
+    const real t513 = s[1] * d_H[13];
+    const real t514 = t512 + t513;
+    const real t515 = H[12] * d_s[0];
+    const real t516 = s[0] * d_H[12];
+    const real t517 = t515 + t516;
+    const real t518 = t514 + t517;
+    const real t519 = t511 + t518;
+    const real t520 = t508 + t519;
+    const real t521 = t505 + t520;
+    const real t522 = t502 + t521;
+    const real t523 = d_c[2] + t522;
+    const real t524 = t499 + t523;
+    const real t525 = t352 * t44;
+    const real t526 = t119 * t378;
+    const real t527 = t525 + t526;
+    const real t528 = t391 * t29;
+    const real t529 = t127 * t412;
+    const real t530 = t528 + t529;
+    const real t531 = t423 * t14;
+    const real t532 = t135 * t439;
+    const real t533 = t531 + t532;
+    const real t534 = t530 + t533;
+    const real t535 = t527 + t534;
+    const real t536 = t524 + t535;
+    d_motion[8] = t536;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_forward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_forward_slope_inputs[] = {
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"R", 9, "", 0, 0},
+    {"d", 3, "", 0, 0},
+    {"H", 36, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"s", 6, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 36, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 6, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_forward_slope_outputs[] = {
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0},
+};
+
+/* effort and its derivative along a direction
+ * in  H[6][6] motion subspace
+ * in  f[6] (N, N*m) load of the inboard on the outboard side at P
+ * in  d_H[6][6] derivative of H
+ * in  d_f[6] (N, N*m) derivative of f
+ * out d_tau[6] (N, N*m) derivative of tau
+ */
+int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
+    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+{
+    const real t0 = f[5] * d_H[30];
+    const real t1 = H[30] * d_f[5];
+    const real t2 = t0 + t1;
+    const real t3 = f[4] * d_H[24];
+    const real t4 = H[24] * d_f[4];
+    const real t5 = t3 + t4;
+    const real t6 = f[3] * d_H[18];
+    const real t7 = H[18] * d_f[3];
+    const real t8 = t6 + t7;
+    const real t9 = f[2] * d_H[12];
+    const real t10 = H[12] * d_f[2];
+    const real t11 = t9 + t10;
+    const real t12 = f[1] * d_H[6];
+    const real t13 = H[6] * d_f[1];
+    const real t14 = t12 + t13;
+    const real t15 = f[0] * d_H[0];
+    const real t16 = H[0] * d_f[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_tau[0] = t22;
+    const real t23 = H[31] * d_f[5];
+    const real t24 = f[5] * d_H[31];
+    const real t25 = t23 + t24;
+    const real t26 = H[25] * d_f[4];
+    const real t27 = f[4] * d_H[25];
+    const real t28 = t26 + t27;
+    const real t29 = H[19] * d_f[3];
+    const real t30 = f[3] * d_H[19];
+    const real t31 = t29 + t30;
+    const real t32 = H[13] * d_f[2];
+    const real t33 = f[2] * d_H[13];
+    const real t34 = t32 + t33;
+    const real t35 = H[7] * d_f[1];
+    const real t36 = f[1] * d_H[7];
+    const real t37 = t35 + t36;
+    const real t38 = H[1] * d_f[0];
+    const real t39 = f[0] * d_H[1];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_tau[1] = t45;
+    const real t46 = H[32] * d_f[5];
+    const real t47 = f[5] * d_H[32];
+    const real t48 = t46 + t47;
+    const real t49 = H[26] * d_f[4];
+    const real t50 = f[4] * d_H[26];
+    const real t51 = t49 + t50;
+    const real t52 = H[20] * d_f[3];
+    const real t53 = f[3] * d_H[20];
+    const real t54 = t52 + t53;
+    const real t55 = H[14] * d_f[2];
+    const real t56 = f[2] * d_H[14];
+    const real t57 = t55 + t56;
+    const real t58 = H[8] * d_f[1];
+    const real t59 = f[1] * d_H[8];
+    const real t60 = t58 + t59;
+    const real t61 = H[2] * d_f[0];
+    const real t62 = f[0] * d_H[2];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    const real t66 = t54 + t65;
+    const real t67 = t51 + t66;
+    const real t68 = t48 + t67;
+    d_tau[2] = t68;
+    const real t69 = H[33] * d_f[5];
+    const real t70 = f[5] * d_H[33];
+    const real t71 = t69 + t70;
+    const real t72 = H[27] * d_f[4];
+    const real t73 = f[4] * d_H[27];
+    const real t74 = t72 + t73;
+    const real t75 = H[21] * d_f[3];
+    const real t76 = f[3] * d_H[21];
+    const real t77 = t75 + t76;
+    const real t78 = H[15] * d_f[2];
+    const real t79 = f[2] * d_H[15];
+    const real t80 = t78 + t79;
+    const real t81 = H[9] * d_f[1];
+    const real t82 = f[1] * d_H[9];
+    const real t83 = t81 + t82;
+    const real t84 = H[3] * d_f[0];
+    const real t85 = f[0] * d_H[3];
+    const real t86 = t84 + t85;
+    const real t87 = t83 + t86;
+    const real t88 = t80 + t87;
+    const real t89 = t77 + t88;
+    const real t90 = t74 + t89;
+    const real t91 = t71 + t90;
+    d_tau[3] = t91;
+    const real t92 = H[34] * d_f[5];
+    const real t93 = f[5] * d_H[34];
+    const real t94 = t92 + t93;
+    const real t95 = H[28] * d_f[4];
+    const real t96 = f[4] * d_H[28];
+    const real t97 = t95 + t96;
+    const real t98 = H[22] * d_f[3];
+    const real t99 = f[3] * d_H[22];
+    const real t100 = t98 + t99;
+    const real t101 = H[16] * d_f[2];
+    const real t102 = f[2] * d_H[16];
+    const real t103 = t101 + t102;
+    const real t104 = H[10] * d_f[1];
+    const real t105 = f[1] * d_H[10];
+    const real t106 = t104 + t105;
+    const real t107 = H[4] * d_f[0];
+    const real t108 = f[0] * d_H[4];
+    const real t109 = t107 + t108;
+    const real t110 = t106 + t109;
+    const real t111 = t103 + t110;
+    const real t112 = t100 + t111;
+    const real t113 = t97 + t112;
+    const real t114 = t94 + t113;
+    d_tau[4] = t114;
+    const real t115 = H[35] * d_f[5];
+    const real t116 = f[5] * d_H[35];
+    const real t117 = t115 + t116;
+    const real t118 = H[29] * d_f[4];
+    const real t119 = f[4] * d_H[29];
+    const real t120 = t118 + t119;
+    const real t121 = H[23] * d_f[3];
+    const real t122 = f[3] * d_H[23];
+    const real t123 = t121 + t122;
+    const real t124 = H[17] * d_f[2];
+    const real t125 = f[2] * d_H[17];
+    const real t126 = t124 + t125;
+    const real t127 = H[11] * d_f[1];
+    const real t128 = f[1] * d_H[11];
+    const real t129 = t127 + t128;
+    const real t130 = H[5] * d_f[0];
+    const real t131 = f[0] * d_H[5];
+    const real t132 = t130 + t131;
+    const real t133 = t129 + t132;
+    const real t134 = t126 + t133;
+    const real t135 = t123 + t134;
+    const real t136 = t120 + t135;
+    const real t137 = t117 + t136;
+    d_tau[5] = t137;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_effort_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_effort_slope_inputs[] = {
+    {"H", 36, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 36, "", 0, 0},
+    {"d_f", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_effort_slope_outputs[] = {
+    {"d_tau", 6, "N, N*m", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
     {
         .name = "forward",
@@ -4986,13 +5797,37 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_forward_slope,
+        .call = mstmm_sweep_generic6_forward_slope_call,
+        .n_inputs = 18,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic6_forward_slope_inputs,
+        .outputs = mstmm_sweep_generic6_forward_slope_outputs,
+        .ir_hash = "5337aa6243e10319be4a333e6d0c762d44dc651d9122e232ade58c0c640a361b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_effort_slope,
+        .call = mstmm_sweep_generic6_effort_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic6_effort_slope_outputs,
+        .ir_hash = "97054ee63554574eeef50be1608d13d62bc632b4723953f2eaf267267887dfba",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "2a3511394946f766834b67e6d1da8a757b92e78ba0863a25bbb3bbb0d1bd2164",
+    .hash = "82f73557ff51c7e0a94bc65ecd6007033693e4d03eba792cfd834274c30100b1",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5002,6 +5837,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -69,6 +69,60 @@ int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restric
 int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
     const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
     real *restrict work);
+int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
+    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
+    real *restrict d_e_f);
+int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, const real *restrict S_rf, const real *restrict A,
+    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
+    real *restrict d_h, real *restrict d_h_f);
+int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
+    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
+    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd);
+int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c);
+int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c);
+int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
+    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H);
+int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
+    const real *restrict d_c, real *restrict d_c_s);
+int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
+    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
+    real *restrict d_e, real *restrict d_e_f);
+int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
+    const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
+    const real *restrict d_e_f, real *restrict d_tau);
 
 #ifndef MSTMM_SOLVE_LDL
 #define MSTMM_SOLVE_LDL
@@ -112,6 +166,52 @@ int mstmm_solve_ldl(
             x[i * m + column] = rest;
         }
     }
+    return 0;
+}
+
+/* x = a^-1 b by LU with row exchange; sizes as above.  `work` (n x n) keeps the factors.  Returns 1
+ * if a pivot is not above relative_pivot times the magnitude of its column in a (NaN included),
+ * else 0. */
+static inline __attribute__((always_inline))
+int mstmm_solve_lu(
+    int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
+    real *restrict work, real relative_pivot)
+{
+    for (int i = 0; i < n * n; ++i) work[i] = a[i];
+    for (int i = 0; i < n * m; ++i) x[i] = b[i];
+#pragma GCC unroll 4
+    for (int i = 0; i < n; ++i) {
+        int best = i;
+        for (int k = i + 1; k < n; ++k)
+            if (fabs(work[best * n + i]) < fabs(work[k * n + i])) best = k;
+        if (best != i) {
+            for (int j = i; j < n; ++j) {
+                const real entry = work[i * n + j];
+                work[i * n + j] = work[best * n + j];
+                work[best * n + j] = entry;
+            }
+            for (int j = 0; j < m; ++j) {
+                const real entry = x[i * m + j];
+                x[i * m + j] = x[best * m + j];
+                x[best * m + j] = entry;
+            }
+        }
+        real size = 0;
+        for (int k = 0; k < n; ++k) size += fabs(a[k * n + i]);
+        const real pivot = work[i * n + i];
+        if (!(fabs(pivot) > relative_pivot * size)) return 1;
+        for (int k = i + 1; k < n; ++k) {
+            const real factor = work[k * n + i] / pivot;
+            for (int j = i + 1; j < n; ++j) work[k * n + j] -= factor * work[i * n + j];
+            for (int j = 0; j < m; ++j) x[k * m + j] -= factor * x[i * m + j];
+        }
+    }
+    for (int i = n - 1; i >= 0; --i)
+        for (int j = 0; j < m; ++j) {
+            real rest = x[i * m + j];
+            for (int k = i + 1; k < n; ++k) rest -= work[i * n + k] * x[k * m + j];
+            x[i * m + j] = rest / work[i * n + i];
+        }
     return 0;
 }
 #endif
@@ -4101,6 +4201,4853 @@ static const mstmm_guard mstmm_sweep_modal_answer_guards[] = {
     {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
 };
 
+/* residual and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  p[10] m, c0 (3), R2 (xx xy xz yy yz zz); frame axes, about o
+ * in  C[3][n] int rho phi
+ * in  P[3][n] int rho r0 x phi
+ * in  B[6][n] first derivatives of the second moments: E_ab + E_ba
+ * in  Z_xx[n][n] second derivative of the second moment xx
+ * in  Z_xy[n][n] second derivative of the second moment xy
+ * in  Z_xz[n][n] second derivative of the second moment xz
+ * in  Z_yy[n][n] second derivative of the second moment yy
+ * in  Z_yz[n][n] second derivative of the second moment yz
+ * in  Z_zz[n][n] second derivative of the second moment zz
+ * in  Y_x[n][n] (int rho phi x phi - r0 x g)_x
+ * in  Y_y[n][n] (int rho phi x phi - r0 x g)_y
+ * in  Y_z[n][n] (int rho phi x phi - r0 x g)_z
+ * in  G_x[n][n] int rho g_x
+ * in  G_y[n][n] int rho g_y
+ * in  G_z[n][n] int rho g_z
+ * in  M[n][n] int rho phi . phi
+ * in  K[n][n] stiffness
+ * in  D[n][n] damping
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
+ * in  A[6][n] derivatives of the second moments by the modes
+ * in  d_eta[n] derivative of eta
+ * in  d_etad[n] derivative of etad
+ * in  d_motion[9] derivative of motion
+ * out d_S_rf[6][n] derivative of S_rf
+ * out d_A[6][n] derivative of A
+ * out d_e[6] (N, N*m) derivative of e
+ * out d_e_f[n] derivative of e_f
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_residual_slope_sized(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
+    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
+    real *restrict d_e_f)
+{
+    (void)P;
+    (void)M;
+    for (int k = 0; k < n; ++k) {
+        real t1 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t0 = G_x[n * l + k] * d_eta[l];
+            t1 += t0;
+        }
+        const real t2 = -t1;
+        d_S_rf[k] = t2;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t4 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t3 = G_y[n * l + k] * d_eta[l];
+            t4 += t3;
+        }
+        const real t5 = -t4;
+        d_S_rf[n + k] = t5;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t7 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t6 = G_z[n * l + k] * d_eta[l];
+            t7 += t6;
+        }
+        const real t8 = -t7;
+        d_S_rf[2 * n + k] = t8;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t10 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t9 = Y_x[n * l + k] * d_eta[l];
+            t10 += t9;
+        }
+        d_S_rf[3 * n + k] = t10;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t12 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t11 = Y_y[n * l + k] * d_eta[l];
+            t12 += t11;
+        }
+        d_S_rf[4 * n + k] = t12;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t14 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t13 = Y_z[n * l + k] * d_eta[l];
+            t14 += t13;
+        }
+        d_S_rf[5 * n + k] = t14;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t16 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t15 = Z_xx[n * l + k] * d_eta[l];
+            t16 += t15;
+        }
+        d_A[k] = t16;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t18 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t17 = Z_xy[n * l + k] * d_eta[l];
+            t18 += t17;
+        }
+        d_A[n + k] = t18;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t20 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t19 = Z_xz[n * l + k] * d_eta[l];
+            t20 += t19;
+        }
+        d_A[2 * n + k] = t20;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t22 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t21 = Z_yy[n * l + k] * d_eta[l];
+            t22 += t21;
+        }
+        d_A[3 * n + k] = t22;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t24 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t23 = Z_yz[n * l + k] * d_eta[l];
+            t24 += t23;
+        }
+        d_A[4 * n + k] = t24;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t26 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t25 = Z_zz[n * l + k] * d_eta[l];
+            t26 += t25;
+        }
+        d_A[5 * n + k] = t26;
+    }
+    real t28 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t27 = S_rf[2 * n + k] * eta[k];
+        t28 += t27;
+    }
+    const real t29 = 0.5 * t28;
+    real t31 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t30 = C[2 * n + k] * eta[k];
+        t31 += t30;
+    }
+    const real t32 = 0.5 * t31;
+    const real t33 = t29 + t32;
+    const real t34 = t33 + p[3];
+    const real t35 = t34 * d_motion[4];
+    real t37 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t36 = C[2 * n + k] * d_eta[k];
+        t37 += t36;
+    }
+    const real t38 = 0.5 * t37;
+    real t42 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t39 = eta[k] * d_S_rf[2 * n + k];
+        const real t40 = S_rf[2 * n + k] * d_eta[k];
+        const real t41 = t39 + t40;
+        t42 += t41;
+    }
+    const real t43 = 0.5 * t42;
+    const real t44 = t38 + t43;
+    const real t45 = motion[4] * t44;
+    const real t46 = t35 + t45;
+    const real t47 = p[0] * d_motion[6];
+    const real t48 = t46 + t47;
+    real t50 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t49 = S_rf[n + k] * eta[k];
+        t50 += t49;
+    }
+    const real t51 = 0.5 * t50;
+    real t53 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t52 = C[n + k] * eta[k];
+        t53 += t52;
+    }
+    const real t54 = 0.5 * t53;
+    const real t55 = t51 + t54;
+    const real t56 = t55 + p[2];
+    const real t57 = t56 * d_motion[5];
+    real t59 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t58 = C[n + k] * d_eta[k];
+        t59 += t58;
+    }
+    const real t60 = 0.5 * t59;
+    real t64 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t61 = eta[k] * d_S_rf[n + k];
+        const real t62 = S_rf[n + k] * d_eta[k];
+        const real t63 = t61 + t62;
+        t64 += t63;
+    }
+    const real t65 = 0.5 * t64;
+    const real t66 = t60 + t65;
+    const real t67 = motion[5] * t66;
+    const real t68 = t57 + t67;
+    const real t69 = t48 - t68;
+    const real t70 = motion[0] * t56;
+    real t72 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t71 = S_rf[k] * eta[k];
+        t72 += t71;
+    }
+    const real t73 = 0.5 * t72;
+    real t75 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t74 = C[k] * eta[k];
+        t75 += t74;
+    }
+    const real t76 = 0.5 * t75;
+    const real t77 = t73 + t76;
+    const real t78 = t77 + p[1];
+    const real t79 = motion[1] * t78;
+    const real t80 = t70 - t79;
+    const real t81 = t80 * d_motion[1];
+    const real t82 = t56 * d_motion[0];
+    const real t83 = motion[0] * t66;
+    const real t84 = t82 + t83;
+    const real t85 = t78 * d_motion[1];
+    real t87 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t86 = C[k] * d_eta[k];
+        t87 += t86;
+    }
+    const real t88 = 0.5 * t87;
+    real t92 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t89 = eta[k] * d_S_rf[k];
+        const real t90 = S_rf[k] * d_eta[k];
+        const real t91 = t89 + t90;
+        t92 += t91;
+    }
+    const real t93 = 0.5 * t92;
+    const real t94 = t88 + t93;
+    const real t95 = motion[1] * t94;
+    const real t96 = t85 + t95;
+    const real t97 = t84 - t96;
+    const real t98 = motion[1] * t97;
+    const real t99 = t81 + t98;
+    const real t100 = motion[2] * t78;
+    const real t101 = motion[0] * t34;
+    const real t102 = t100 - t101;
+    const real t103 = t102 * d_motion[2];
+    const real t104 = t78 * d_motion[2];
+    const real t105 = motion[2] * t94;
+    const real t106 = t104 + t105;
+    const real t107 = t34 * d_motion[0];
+    const real t108 = motion[0] * t44;
+    const real t109 = t107 + t108;
+    const real t110 = t106 - t109;
+    const real t111 = motion[2] * t110;
+    const real t112 = t103 + t111;
+    const real t113 = t99 - t112;
+    real t115 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t114 = S_rf[n + k] * etad[k];
+        t115 += t114;
+    }
+    const real t116 = t115 * d_motion[2];
+    real t120 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t117 = etad[k] * d_S_rf[n + k];
+        const real t118 = S_rf[n + k] * d_etad[k];
+        const real t119 = t117 + t118;
+        t120 += t119;
+    }
+    const real t121 = motion[2] * t120;
+    const real t122 = t116 + t121;
+    const real t123 = 2.0 * t122;
+    const real t124 = t113 - t123;
+    real t126 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t125 = S_rf[2 * n + k] * etad[k];
+        t126 += t125;
+    }
+    const real t127 = t126 * d_motion[1];
+    real t131 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t128 = etad[k] * d_S_rf[2 * n + k];
+        const real t129 = S_rf[2 * n + k] * d_etad[k];
+        const real t130 = t128 + t129;
+        t131 += t130;
+    }
+    const real t132 = motion[1] * t131;
+    const real t133 = t127 + t132;
+    const real t134 = 2.0 * t133;
+    const real t135 = t124 + t134;
+    real t143 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t137 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t136 = etad[l] * G_x[n * k + l];
+            t137 += t136;
+        }
+        const real t138 = t137 * d_etad[k];
+        real t140 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t139 = G_x[n * k + l] * d_etad[l];
+            t140 += t139;
+        }
+        const real t141 = etad[k] * t140;
+        const real t142 = t138 + t141;
+        t143 += t142;
+    }
+    const real t144 = t135 - t143;
+    const real t145 = t69 + t144;
+    d_e[0] = t145;
+    const real t146 = t78 * d_motion[5];
+    const real t147 = motion[5] * t94;
+    const real t148 = t146 + t147;
+    const real t149 = p[0] * d_motion[7];
+    const real t150 = t34 * d_motion[3];
+    const real t151 = motion[3] * t44;
+    const real t152 = t150 + t151;
+    const real t153 = t149 - t152;
+    const real t154 = t148 + t153;
+    const real t155 = motion[1] * t34;
+    const real t156 = motion[2] * t56;
+    const real t157 = t155 - t156;
+    const real t158 = t157 * d_motion[2];
+    const real t159 = t34 * d_motion[1];
+    const real t160 = motion[1] * t44;
+    const real t161 = t159 + t160;
+    const real t162 = t56 * d_motion[2];
+    const real t163 = motion[2] * t66;
+    const real t164 = t162 + t163;
+    const real t165 = t161 - t164;
+    const real t166 = motion[2] * t165;
+    const real t167 = t158 + t166;
+    const real t168 = t80 * d_motion[0];
+    const real t169 = motion[0] * t97;
+    const real t170 = t168 + t169;
+    const real t171 = t167 - t170;
+    real t173 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t172 = S_rf[k] * etad[k];
+        t173 += t172;
+    }
+    const real t174 = t173 * d_motion[2];
+    real t178 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t175 = etad[k] * d_S_rf[k];
+        const real t176 = S_rf[k] * d_etad[k];
+        const real t177 = t175 + t176;
+        t178 += t177;
+    }
+    const real t179 = motion[2] * t178;
+    const real t180 = t174 + t179;
+    const real t181 = 2.0 * t180;
+    const real t182 = t171 + t181;
+    const real t183 = t126 * d_motion[0];
+    const real t184 = motion[0] * t131;
+    const real t185 = t183 + t184;
+    const real t186 = 2.0 * t185;
+    const real t187 = t182 - t186;
+    real t195 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t189 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t188 = etad[l] * G_y[n * k + l];
+            t189 += t188;
+        }
+        const real t190 = t189 * d_etad[k];
+        real t192 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t191 = G_y[n * k + l] * d_etad[l];
+            t192 += t191;
+        }
+        const real t193 = etad[k] * t192;
+        const real t194 = t190 + t193;
+        t195 += t194;
+    }
+    const real t196 = t187 - t195;
+    const real t197 = t154 + t196;
+    d_e[1] = t197;
+    const real t198 = t56 * d_motion[3];
+    const real t199 = motion[3] * t66;
+    const real t200 = t198 + t199;
+    const real t201 = p[0] * d_motion[8];
+    const real t202 = t200 + t201;
+    const real t203 = t78 * d_motion[4];
+    const real t204 = motion[4] * t94;
+    const real t205 = t203 + t204;
+    const real t206 = t202 - t205;
+    const real t207 = t102 * d_motion[0];
+    const real t208 = motion[0] * t110;
+    const real t209 = t207 + t208;
+    const real t210 = t157 * d_motion[1];
+    const real t211 = motion[1] * t165;
+    const real t212 = t210 + t211;
+    const real t213 = t209 - t212;
+    const real t214 = t173 * d_motion[1];
+    const real t215 = motion[1] * t178;
+    const real t216 = t214 + t215;
+    const real t217 = 2.0 * t216;
+    const real t218 = t213 - t217;
+    const real t219 = t115 * d_motion[0];
+    const real t220 = motion[0] * t120;
+    const real t221 = t219 + t220;
+    const real t222 = 2.0 * t221;
+    const real t223 = t218 + t222;
+    real t231 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t225 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t224 = etad[l] * G_z[n * k + l];
+            t225 += t224;
+        }
+        const real t226 = t225 * d_etad[k];
+        real t228 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t227 = G_z[n * k + l] * d_etad[l];
+            t228 += t227;
+        }
+        const real t229 = etad[k] * t228;
+        const real t230 = t226 + t229;
+        t231 += t230;
+    }
+    const real t232 = t223 - t231;
+    const real t233 = t206 + t232;
+    d_e[2] = t233;
+    real t235 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t234 = A[3 * n + k] * eta[k];
+        t235 += t234;
+    }
+    const real t236 = 0.5 * t235;
+    real t238 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t237 = B[3 * n + k] * eta[k];
+        t238 += t237;
+    }
+    const real t239 = 0.5 * t238;
+    const real t240 = t236 + t239;
+    const real t241 = t240 + p[7];
+    real t243 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t242 = A[5 * n + k] * eta[k];
+        t243 += t242;
+    }
+    const real t244 = 0.5 * t243;
+    real t246 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t245 = B[5 * n + k] * eta[k];
+        t246 += t245;
+    }
+    const real t247 = 0.5 * t246;
+    const real t248 = t244 + t247;
+    const real t249 = t248 + p[9];
+    const real t250 = t241 + t249;
+    const real t251 = t250 * d_motion[3];
+    real t253 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t252 = B[5 * n + k] * d_eta[k];
+        t253 += t252;
+    }
+    const real t254 = 0.5 * t253;
+    real t258 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t255 = eta[k] * d_A[5 * n + k];
+        const real t256 = A[5 * n + k] * d_eta[k];
+        const real t257 = t255 + t256;
+        t258 += t257;
+    }
+    const real t259 = 0.5 * t258;
+    const real t260 = t254 + t259;
+    real t262 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t261 = B[3 * n + k] * d_eta[k];
+        t262 += t261;
+    }
+    const real t263 = 0.5 * t262;
+    real t267 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t264 = eta[k] * d_A[3 * n + k];
+        const real t265 = A[3 * n + k] * d_eta[k];
+        const real t266 = t264 + t265;
+        t267 += t266;
+    }
+    const real t268 = 0.5 * t267;
+    const real t269 = t263 + t268;
+    const real t270 = t260 + t269;
+    const real t271 = motion[3] * t270;
+    const real t272 = t251 + t271;
+    const real t273 = t56 * d_motion[8];
+    const real t274 = motion[8] * t66;
+    const real t275 = t273 + t274;
+    const real t276 = t34 * d_motion[7];
+    const real t277 = motion[7] * t44;
+    const real t278 = t276 + t277;
+    const real t279 = t275 - t278;
+    const real t280 = t272 + t279;
+    real t282 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t281 = A[n + k] * eta[k];
+        t282 += t281;
+    }
+    const real t283 = 0.5 * t282;
+    real t285 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t284 = B[n + k] * eta[k];
+        t285 += t284;
+    }
+    const real t286 = 0.5 * t285;
+    const real t287 = t283 + t286;
+    const real t288 = t287 + p[5];
+    const real t289 = t288 * d_motion[4];
+    real t291 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t290 = B[n + k] * d_eta[k];
+        t291 += t290;
+    }
+    const real t292 = 0.5 * t291;
+    real t296 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t293 = eta[k] * d_A[n + k];
+        const real t294 = A[n + k] * d_eta[k];
+        const real t295 = t293 + t294;
+        t296 += t295;
+    }
+    const real t297 = 0.5 * t296;
+    const real t298 = t292 + t297;
+    const real t299 = motion[4] * t298;
+    const real t300 = t289 + t299;
+    const real t301 = t280 - t300;
+    real t303 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t302 = A[2 * n + k] * eta[k];
+        t303 += t302;
+    }
+    const real t304 = 0.5 * t303;
+    real t306 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t305 = B[2 * n + k] * eta[k];
+        t306 += t305;
+    }
+    const real t307 = 0.5 * t306;
+    const real t308 = t304 + t307;
+    const real t309 = t308 + p[6];
+    const real t310 = t309 * d_motion[5];
+    real t312 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t311 = B[2 * n + k] * d_eta[k];
+        t312 += t311;
+    }
+    const real t313 = 0.5 * t312;
+    real t317 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t314 = eta[k] * d_A[2 * n + k];
+        const real t315 = A[2 * n + k] * d_eta[k];
+        const real t316 = t314 + t315;
+        t317 += t316;
+    }
+    const real t318 = 0.5 * t317;
+    const real t319 = t313 + t318;
+    const real t320 = motion[5] * t319;
+    const real t321 = t310 + t320;
+    const real t322 = t301 - t321;
+    real t324 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t323 = S_rf[5 * n + k] * etad[k];
+        t324 += t323;
+    }
+    real t326 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t325 = A[k] * eta[k];
+        t326 += t325;
+    }
+    const real t327 = 0.5 * t326;
+    real t329 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t328 = B[k] * eta[k];
+        t329 += t328;
+    }
+    const real t330 = 0.5 * t329;
+    const real t331 = t327 + t330;
+    const real t332 = t331 + p[4];
+    const real t333 = t241 + t332;
+    const real t334 = motion[2] * t333;
+    const real t335 = motion[0] * t309;
+    const real t336 = t334 - t335;
+    real t338 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t337 = A[4 * n + k] * eta[k];
+        t338 += t337;
+    }
+    const real t339 = 0.5 * t338;
+    real t341 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t340 = B[4 * n + k] * eta[k];
+        t341 += t340;
+    }
+    const real t342 = 0.5 * t341;
+    const real t343 = t339 + t342;
+    const real t344 = t343 + p[8];
+    const real t345 = motion[1] * t344;
+    const real t346 = t336 - t345;
+    const real t347 = t324 + t346;
+    const real t348 = t347 * d_motion[1];
+    const real t349 = t333 * d_motion[2];
+    real t351 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t350 = B[k] * d_eta[k];
+        t351 += t350;
+    }
+    const real t352 = 0.5 * t351;
+    real t356 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t353 = eta[k] * d_A[k];
+        const real t354 = A[k] * d_eta[k];
+        const real t355 = t353 + t354;
+        t356 += t355;
+    }
+    const real t357 = 0.5 * t356;
+    const real t358 = t352 + t357;
+    const real t359 = t269 + t358;
+    const real t360 = motion[2] * t359;
+    const real t361 = t349 + t360;
+    const real t362 = t309 * d_motion[0];
+    const real t363 = motion[0] * t319;
+    const real t364 = t362 + t363;
+    const real t365 = t361 - t364;
+    const real t366 = t344 * d_motion[1];
+    real t368 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t367 = B[4 * n + k] * d_eta[k];
+        t368 += t367;
+    }
+    const real t369 = 0.5 * t368;
+    real t373 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t370 = eta[k] * d_A[4 * n + k];
+        const real t371 = A[4 * n + k] * d_eta[k];
+        const real t372 = t370 + t371;
+        t373 += t372;
+    }
+    const real t374 = 0.5 * t373;
+    const real t375 = t369 + t374;
+    const real t376 = motion[1] * t375;
+    const real t377 = t366 + t376;
+    const real t378 = t365 - t377;
+    real t382 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t379 = etad[k] * d_S_rf[5 * n + k];
+        const real t380 = S_rf[5 * n + k] * d_etad[k];
+        const real t381 = t379 + t380;
+        t382 += t381;
+    }
+    const real t383 = t378 + t382;
+    const real t384 = motion[1] * t383;
+    const real t385 = t348 + t384;
+    real t387 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t386 = A[3 * n + k] * etad[k];
+        t387 += t386;
+    }
+    real t389 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t388 = A[5 * n + k] * etad[k];
+        t389 += t388;
+    }
+    const real t390 = t387 + t389;
+    const real t391 = t390 * d_motion[0];
+    real t395 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t392 = etad[k] * d_A[5 * n + k];
+        const real t393 = A[5 * n + k] * d_etad[k];
+        const real t394 = t392 + t393;
+        t395 += t394;
+    }
+    real t399 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t396 = etad[k] * d_A[3 * n + k];
+        const real t397 = A[3 * n + k] * d_etad[k];
+        const real t398 = t396 + t397;
+        t399 += t398;
+    }
+    const real t400 = t395 + t399;
+    const real t401 = motion[0] * t400;
+    const real t402 = t391 + t401;
+    const real t403 = t385 + t402;
+    real t405 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t404 = S_rf[4 * n + k] * etad[k];
+        t405 += t404;
+    }
+    const real t406 = t249 + t332;
+    const real t407 = motion[1] * t406;
+    const real t408 = motion[0] * t288;
+    const real t409 = t407 - t408;
+    const real t410 = motion[2] * t344;
+    const real t411 = t409 - t410;
+    const real t412 = t405 + t411;
+    const real t413 = t412 * d_motion[2];
+    const real t414 = t406 * d_motion[1];
+    const real t415 = t260 + t358;
+    const real t416 = motion[1] * t415;
+    const real t417 = t414 + t416;
+    const real t418 = t288 * d_motion[0];
+    const real t419 = motion[0] * t298;
+    const real t420 = t418 + t419;
+    const real t421 = t417 - t420;
+    const real t422 = t344 * d_motion[2];
+    const real t423 = motion[2] * t375;
+    const real t424 = t422 + t423;
+    const real t425 = t421 - t424;
+    real t429 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t426 = etad[k] * d_S_rf[4 * n + k];
+        const real t427 = S_rf[4 * n + k] * d_etad[k];
+        const real t428 = t426 + t427;
+        t429 += t428;
+    }
+    const real t430 = t425 + t429;
+    const real t431 = motion[2] * t430;
+    const real t432 = t413 + t431;
+    const real t433 = t403 - t432;
+    real t435 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t434 = A[n + k] * etad[k];
+        t435 += t434;
+    }
+    const real t436 = t435 * d_motion[1];
+    real t440 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t437 = etad[k] * d_A[n + k];
+        const real t438 = A[n + k] * d_etad[k];
+        const real t439 = t437 + t438;
+        t440 += t439;
+    }
+    const real t441 = motion[1] * t440;
+    const real t442 = t436 + t441;
+    const real t443 = t433 - t442;
+    real t445 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t444 = A[2 * n + k] * etad[k];
+        t445 += t444;
+    }
+    const real t446 = t445 * d_motion[2];
+    real t450 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t447 = etad[k] * d_A[2 * n + k];
+        const real t448 = A[2 * n + k] * d_etad[k];
+        const real t449 = t447 + t448;
+        t450 += t449;
+    }
+    const real t451 = motion[2] * t450;
+    const real t452 = t446 + t451;
+    const real t453 = t443 - t452;
+    real t461 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t455 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t454 = Y_x[n * k + l] * d_etad[l];
+            t455 += t454;
+        }
+        const real t456 = etad[k] * t455;
+        real t458 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t457 = etad[l] * Y_x[n * k + l];
+            t458 += t457;
+        }
+        const real t459 = t458 * d_etad[k];
+        const real t460 = t456 + t459;
+        t461 += t460;
+    }
+    const real t462 = t453 + t461;
+    const real t463 = t322 + t462;
+    d_e[3] = t463;
+    const real t464 = t406 * d_motion[4];
+    const real t465 = motion[4] * t415;
+    const real t466 = t464 + t465;
+    const real t467 = t34 * d_motion[6];
+    const real t468 = motion[6] * t44;
+    const real t469 = t467 + t468;
+    const real t470 = t78 * d_motion[8];
+    const real t471 = motion[8] * t94;
+    const real t472 = t470 + t471;
+    const real t473 = t469 - t472;
+    const real t474 = t288 * d_motion[3];
+    const real t475 = motion[3] * t298;
+    const real t476 = t474 + t475;
+    const real t477 = t473 - t476;
+    const real t478 = t466 + t477;
+    const real t479 = t344 * d_motion[5];
+    const real t480 = motion[5] * t375;
+    const real t481 = t479 + t480;
+    const real t482 = t478 - t481;
+    real t484 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t483 = A[k] * etad[k];
+        t484 += t483;
+    }
+    const real t485 = t389 + t484;
+    const real t486 = t485 * d_motion[1];
+    real t490 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t487 = etad[k] * d_A[k];
+        const real t488 = A[k] * d_etad[k];
+        const real t489 = t487 + t488;
+        t490 += t489;
+    }
+    const real t491 = t395 + t490;
+    const real t492 = motion[1] * t491;
+    const real t493 = t486 + t492;
+    const real t494 = t347 * d_motion[0];
+    const real t495 = motion[0] * t383;
+    const real t496 = t494 + t495;
+    const real t497 = t493 - t496;
+    real t499 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t498 = S_rf[3 * n + k] * etad[k];
+        t499 += t498;
+    }
+    const real t500 = motion[0] * t250;
+    const real t501 = motion[1] * t288;
+    const real t502 = t500 - t501;
+    const real t503 = motion[2] * t309;
+    const real t504 = t502 - t503;
+    const real t505 = t499 + t504;
+    const real t506 = t505 * d_motion[2];
+    const real t507 = t250 * d_motion[0];
+    const real t508 = motion[0] * t270;
+    const real t509 = t507 + t508;
+    const real t510 = t288 * d_motion[1];
+    const real t511 = motion[1] * t298;
+    const real t512 = t510 + t511;
+    const real t513 = t509 - t512;
+    const real t514 = t309 * d_motion[2];
+    const real t515 = motion[2] * t319;
+    const real t516 = t514 + t515;
+    const real t517 = t513 - t516;
+    real t521 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t518 = etad[k] * d_S_rf[3 * n + k];
+        const real t519 = S_rf[3 * n + k] * d_etad[k];
+        const real t520 = t518 + t519;
+        t521 += t520;
+    }
+    const real t522 = t517 + t521;
+    const real t523 = motion[2] * t522;
+    const real t524 = t506 + t523;
+    const real t525 = t497 + t524;
+    const real t526 = t435 * d_motion[0];
+    const real t527 = motion[0] * t440;
+    const real t528 = t526 + t527;
+    const real t529 = t525 - t528;
+    real t531 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t530 = A[4 * n + k] * etad[k];
+        t531 += t530;
+    }
+    const real t532 = t531 * d_motion[2];
+    real t536 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t533 = etad[k] * d_A[4 * n + k];
+        const real t534 = A[4 * n + k] * d_etad[k];
+        const real t535 = t533 + t534;
+        t536 += t535;
+    }
+    const real t537 = motion[2] * t536;
+    const real t538 = t532 + t537;
+    const real t539 = t529 - t538;
+    real t547 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t541 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t540 = Y_y[n * k + l] * d_etad[l];
+            t541 += t540;
+        }
+        const real t542 = etad[k] * t541;
+        real t544 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t543 = etad[l] * Y_y[n * k + l];
+            t544 += t543;
+        }
+        const real t545 = t544 * d_etad[k];
+        const real t546 = t542 + t545;
+        t547 += t546;
+    }
+    const real t548 = t539 + t547;
+    const real t549 = t482 + t548;
+    d_e[4] = t549;
+    const real t550 = t333 * d_motion[5];
+    const real t551 = motion[5] * t359;
+    const real t552 = t550 + t551;
+    const real t553 = t78 * d_motion[7];
+    const real t554 = motion[7] * t94;
+    const real t555 = t553 + t554;
+    const real t556 = t56 * d_motion[6];
+    const real t557 = motion[6] * t66;
+    const real t558 = t556 + t557;
+    const real t559 = t555 - t558;
+    const real t560 = t309 * d_motion[3];
+    const real t561 = motion[3] * t319;
+    const real t562 = t560 + t561;
+    const real t563 = t559 - t562;
+    const real t564 = t344 * d_motion[4];
+    const real t565 = motion[4] * t375;
+    const real t566 = t564 + t565;
+    const real t567 = t563 - t566;
+    const real t568 = t552 + t567;
+    const real t569 = t412 * d_motion[0];
+    const real t570 = motion[0] * t430;
+    const real t571 = t569 + t570;
+    const real t572 = t387 + t484;
+    const real t573 = t572 * d_motion[2];
+    const real t574 = t399 + t490;
+    const real t575 = motion[2] * t574;
+    const real t576 = t573 + t575;
+    const real t577 = t571 + t576;
+    const real t578 = t505 * d_motion[1];
+    const real t579 = motion[1] * t522;
+    const real t580 = t578 + t579;
+    const real t581 = t577 - t580;
+    const real t582 = t445 * d_motion[0];
+    const real t583 = motion[0] * t450;
+    const real t584 = t582 + t583;
+    const real t585 = t581 - t584;
+    const real t586 = t531 * d_motion[1];
+    const real t587 = motion[1] * t536;
+    const real t588 = t586 + t587;
+    const real t589 = t585 - t588;
+    real t597 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t591 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t590 = Y_z[n * k + l] * d_etad[l];
+            t591 += t590;
+        }
+        const real t592 = etad[k] * t591;
+        real t594 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t593 = etad[l] * Y_z[n * k + l];
+            t594 += t593;
+        }
+        const real t595 = t594 * d_etad[k];
+        const real t596 = t592 + t595;
+        t597 += t596;
+    }
+    const real t598 = t589 + t597;
+    const real t599 = t568 + t598;
+    d_e[5] = t599;
+    const real t605 = motion[2] * d_motion[1];
+    const real t606 = motion[1] * d_motion[2];
+    const real t607 = t605 + t606;
+    const real t609 = motion[1] * motion[2];
+    const real t612 = motion[2] * d_motion[0];
+    const real t613 = motion[0] * d_motion[2];
+    const real t614 = t612 + t613;
+    const real t616 = motion[0] * motion[2];
+    const real t619 = motion[1] * d_motion[0];
+    const real t620 = motion[0] * d_motion[1];
+    const real t621 = t619 + t620;
+    const real t623 = motion[0] * motion[1];
+    const real t626 = motion[1] * d_motion[1];
+    const real t627 = t626 + t626;
+    const real t628 = motion[2] * d_motion[2];
+    const real t629 = t628 + t628;
+    const real t630 = t627 + t629;
+    const real t631 = 0.5 * t630;
+    const real t633 = motion[1] * motion[1];
+    const real t634 = motion[2] * motion[2];
+    const real t635 = t633 + t634;
+    const real t636 = t635 * 0.5;
+    const real t641 = motion[0] * d_motion[0];
+    const real t642 = t641 + t641;
+    const real t643 = t642 + t629;
+    const real t644 = 0.5 * t643;
+    const real t646 = motion[0] * motion[0];
+    const real t647 = t634 + t646;
+    const real t648 = 0.5 * t647;
+    const real t653 = t642 + t627;
+    const real t654 = 0.5 * t653;
+    const real t656 = t633 + t646;
+    const real t657 = 0.5 * t656;
+    for (int k = 0; k < n; ++k) {
+        real t601 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t600 = K[n * k + l] * d_eta[l];
+            t601 += t600;
+        }
+        real t603 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t602 = D[n * k + l] * d_etad[l];
+            t603 += t602;
+        }
+        const real t604 = t601 + t603;
+        const real t608 = A[4 * n + k] * t607;
+        const real t610 = t609 * d_A[4 * n + k];
+        const real t611 = t608 + t610;
+        const real t615 = A[2 * n + k] * t614;
+        const real t617 = t616 * d_A[2 * n + k];
+        const real t618 = t615 + t617;
+        const real t622 = A[n + k] * t621;
+        const real t624 = t623 * d_A[n + k];
+        const real t625 = t622 + t624;
+        const real t632 = A[k] * t631;
+        const real t637 = t636 * d_A[k];
+        const real t638 = t632 + t637;
+        const real t639 = t625 - t638;
+        const real t640 = t618 + t639;
+        const real t645 = A[3 * n + k] * t644;
+        const real t649 = t648 * d_A[3 * n + k];
+        const real t650 = t645 + t649;
+        const real t651 = t640 - t650;
+        const real t652 = t611 + t651;
+        const real t655 = A[5 * n + k] * t654;
+        const real t658 = t657 * d_A[5 * n + k];
+        const real t659 = t655 + t658;
+        const real t660 = t652 - t659;
+        const real t661 = t604 + t660;
+        const real t662 = S_rf[5 * n + k] * d_motion[5];
+        const real t663 = motion[5] * d_S_rf[5 * n + k];
+        const real t664 = t662 + t663;
+        const real t665 = S_rf[4 * n + k] * d_motion[4];
+        const real t666 = motion[4] * d_S_rf[4 * n + k];
+        const real t667 = t665 + t666;
+        const real t668 = S_rf[3 * n + k] * d_motion[3];
+        const real t669 = motion[3] * d_S_rf[3 * n + k];
+        const real t670 = t668 + t669;
+        const real t671 = S_rf[2 * n + k] * d_motion[8];
+        const real t672 = motion[8] * d_S_rf[2 * n + k];
+        const real t673 = t671 + t672;
+        const real t674 = S_rf[n + k] * d_motion[7];
+        const real t675 = motion[7] * d_S_rf[n + k];
+        const real t676 = t674 + t675;
+        const real t677 = S_rf[k] * d_motion[6];
+        const real t678 = motion[6] * d_S_rf[k];
+        const real t679 = t677 + t678;
+        const real t680 = t676 + t679;
+        const real t681 = t673 + t680;
+        const real t682 = t670 + t681;
+        const real t683 = t667 + t682;
+        const real t684 = t664 + t683;
+        const real t685 = t661 + t684;
+        real t687 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t686 = etad[l] * Y_x[n * k + l];
+            t687 += t686;
+        }
+        const real t688 = t687 * d_motion[0];
+        real t690 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t689 = Y_x[n * k + l] * d_etad[l];
+            t690 += t689;
+        }
+        const real t691 = motion[0] * t690;
+        const real t692 = t688 + t691;
+        const real t693 = t685 - t692;
+        real t695 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t694 = Y_x[n * l + k] * etad[l];
+            t695 += t694;
+        }
+        const real t696 = t695 * d_motion[0];
+        real t698 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t697 = Y_x[n * l + k] * d_etad[l];
+            t698 += t697;
+        }
+        const real t699 = motion[0] * t698;
+        const real t700 = t696 + t699;
+        const real t701 = t693 + t700;
+        real t703 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t702 = etad[l] * Y_y[n * k + l];
+            t703 += t702;
+        }
+        const real t704 = t703 * d_motion[1];
+        real t706 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t705 = Y_y[n * k + l] * d_etad[l];
+            t706 += t705;
+        }
+        const real t707 = motion[1] * t706;
+        const real t708 = t704 + t707;
+        const real t709 = t701 - t708;
+        real t711 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t710 = Y_y[n * l + k] * etad[l];
+            t711 += t710;
+        }
+        const real t712 = t711 * d_motion[1];
+        real t714 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t713 = Y_y[n * l + k] * d_etad[l];
+            t714 += t713;
+        }
+        const real t715 = motion[1] * t714;
+        const real t716 = t712 + t715;
+        const real t717 = t709 + t716;
+        real t719 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t718 = etad[l] * Y_z[n * k + l];
+            t719 += t718;
+        }
+        const real t720 = t719 * d_motion[2];
+        real t722 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t721 = Y_z[n * k + l] * d_etad[l];
+            t722 += t721;
+        }
+        const real t723 = motion[2] * t722;
+        const real t724 = t720 + t723;
+        const real t725 = t717 - t724;
+        real t727 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t726 = Y_z[n * l + k] * etad[l];
+            t727 += t726;
+        }
+        const real t728 = t727 * d_motion[2];
+        real t730 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t729 = Y_z[n * l + k] * d_etad[l];
+            t730 += t729;
+        }
+        const real t731 = motion[2] * t730;
+        const real t732 = t728 + t731;
+        const real t733 = t725 + t732;
+        d_e_f[k] = t733;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict K, const real *restrict D, const real *restrict eta,
+    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
+    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
+    real *restrict d_e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_residual_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+    case 2: return mstmm_sweep_modal_residual_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+    case 3: return mstmm_sweep_modal_residual_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+    case 4: return mstmm_sweep_modal_residual_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+    default: return mstmm_sweep_modal_residual_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+    }
+}
+
+static int mstmm_sweep_modal_residual_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_residual_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_modal_residual_slope_inputs[] = {
+    {"p", 10, "", 0, 0},
+    {"C", 3, "", 0, 1},
+    {"P", 3, "", 0, 1},
+    {"B", 6, "", 0, 1},
+    {"Z_xx", 1, "", 0, 2},
+    {"Z_xy", 1, "", 0, 2},
+    {"Z_xz", 1, "", 0, 2},
+    {"Z_yy", 1, "", 0, 2},
+    {"Z_yz", 1, "", 0, 2},
+    {"Z_zz", 1, "", 0, 2},
+    {"Y_x", 1, "", 0, 2},
+    {"Y_y", 1, "", 0, 2},
+    {"Y_z", 1, "", 0, 2},
+    {"G_x", 1, "", 0, 2},
+    {"G_y", 1, "", 0, 2},
+    {"G_z", 1, "", 0, 2},
+    {"M", 1, "", 0, 2},
+    {"K", 1, "", 0, 2},
+    {"D", 1, "", 0, 2},
+    {"eta", 1, "", 0, 1},
+    {"etad", 1, "", 0, 1},
+    {"motion", 9, "", 0, 0},
+    {"S_rf", 6, "", 0, 1},
+    {"A", 6, "", 0, 1},
+    {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1},
+    {"d_motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_residual_slope_outputs[] = {
+    {"d_S_rf", 6, "", 0, 1},
+    {"d_A", 6, "", 0, 1},
+    {"d_e", 6, "N, N*m", 0, 0},
+    {"d_e_f", 1, "", 0, 1},
+};
+
+/* momentum and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  p[10] m, c0 (3), R2 (xx xy xz yy yz zz); frame axes, about o
+ * in  C[3][n] int rho phi
+ * in  P[3][n] int rho r0 x phi
+ * in  B[6][n] first derivatives of the second moments: E_ab + E_ba
+ * in  Z_xx[n][n] second derivative of the second moment xx
+ * in  Z_xy[n][n] second derivative of the second moment xy
+ * in  Z_xz[n][n] second derivative of the second moment xz
+ * in  Z_yy[n][n] second derivative of the second moment yy
+ * in  Z_yz[n][n] second derivative of the second moment yz
+ * in  Z_zz[n][n] second derivative of the second moment zz
+ * in  Y_x[n][n] (int rho phi x phi - r0 x g)_x
+ * in  Y_y[n][n] (int rho phi x phi - r0 x g)_y
+ * in  Y_z[n][n] (int rho phi x phi - r0 x g)_z
+ * in  G_x[n][n] int rho g_x
+ * in  G_y[n][n] int rho g_y
+ * in  G_z[n][n] int rho g_z
+ * in  M[n][n] int rho phi . phi
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * in  v[3] (m/s) velocity of the frame's origin, frame axes
+ * in  w[3] (rad/s) angular velocity of the frame, frame axes
+ * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
+ * in  A[6][n] derivatives of the second moments by the modes
+ * in  h_f[n] modal momentum
+ * in  d_eta[n] derivative of eta
+ * in  d_etad[n] derivative of etad
+ * in  d_v[3] (m/s) derivative of v
+ * in  d_w[3] (rad/s) derivative of w
+ * out d_S_rf[6][n] derivative of S_rf
+ * out d_A[6][n] derivative of A
+ * out d_h[6] (N*s, N*m*s) derivative of h
+ * out d_h_f[n] derivative of h_f
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_momentum_slope_sized(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, const real *restrict S_rf, const real *restrict A,
+    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
+    real *restrict d_h, real *restrict d_h_f)
+{
+    (void)P;
+    (void)h_f;
+    for (int k = 0; k < n; ++k) {
+        real t1 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t0 = G_x[n * l + k] * d_eta[l];
+            t1 += t0;
+        }
+        const real t2 = -t1;
+        d_S_rf[k] = t2;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t4 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t3 = G_y[n * l + k] * d_eta[l];
+            t4 += t3;
+        }
+        const real t5 = -t4;
+        d_S_rf[n + k] = t5;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t7 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t6 = G_z[n * l + k] * d_eta[l];
+            t7 += t6;
+        }
+        const real t8 = -t7;
+        d_S_rf[2 * n + k] = t8;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t10 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t9 = Y_x[n * l + k] * d_eta[l];
+            t10 += t9;
+        }
+        d_S_rf[3 * n + k] = t10;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t12 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t11 = Y_y[n * l + k] * d_eta[l];
+            t12 += t11;
+        }
+        d_S_rf[4 * n + k] = t12;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t14 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t13 = Y_z[n * l + k] * d_eta[l];
+            t14 += t13;
+        }
+        d_S_rf[5 * n + k] = t14;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t16 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t15 = Z_xx[n * l + k] * d_eta[l];
+            t16 += t15;
+        }
+        d_A[k] = t16;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t18 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t17 = Z_xy[n * l + k] * d_eta[l];
+            t18 += t17;
+        }
+        d_A[n + k] = t18;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t20 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t19 = Z_xz[n * l + k] * d_eta[l];
+            t20 += t19;
+        }
+        d_A[2 * n + k] = t20;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t22 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t21 = Z_yy[n * l + k] * d_eta[l];
+            t22 += t21;
+        }
+        d_A[3 * n + k] = t22;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t24 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t23 = Z_yz[n * l + k] * d_eta[l];
+            t24 += t23;
+        }
+        d_A[4 * n + k] = t24;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t26 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t25 = Z_zz[n * l + k] * d_eta[l];
+            t26 += t25;
+        }
+        d_A[5 * n + k] = t26;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t27 = S_rf[5 * n + k] * d_w[2];
+        const real t28 = w[2] * d_S_rf[5 * n + k];
+        const real t29 = t27 + t28;
+        const real t30 = S_rf[4 * n + k] * d_w[1];
+        const real t31 = w[1] * d_S_rf[4 * n + k];
+        const real t32 = t30 + t31;
+        const real t33 = S_rf[3 * n + k] * d_w[0];
+        const real t34 = w[0] * d_S_rf[3 * n + k];
+        const real t35 = t33 + t34;
+        const real t36 = S_rf[2 * n + k] * d_v[2];
+        const real t37 = v[2] * d_S_rf[2 * n + k];
+        const real t38 = t36 + t37;
+        const real t39 = S_rf[n + k] * d_v[1];
+        const real t40 = v[1] * d_S_rf[n + k];
+        const real t41 = t39 + t40;
+        const real t42 = S_rf[k] * d_v[0];
+        const real t43 = v[0] * d_S_rf[k];
+        const real t44 = t42 + t43;
+        const real t45 = t41 + t44;
+        const real t46 = t38 + t45;
+        const real t47 = t35 + t46;
+        const real t48 = t32 + t47;
+        const real t49 = t29 + t48;
+        real t51 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t50 = M[n * k + l] * d_etad[l];
+            t51 += t50;
+        }
+        const real t52 = t49 + t51;
+        d_h_f[k] = t52;
+    }
+    real t56 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t53 = etad[k] * d_S_rf[k];
+        const real t54 = S_rf[k] * d_etad[k];
+        const real t55 = t53 + t54;
+        t56 += t55;
+    }
+    real t58 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t57 = S_rf[2 * n + k] * eta[k];
+        t58 += t57;
+    }
+    const real t59 = t58 * 0.5;
+    real t61 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t60 = C[2 * n + k] * eta[k];
+        t61 += t60;
+    }
+    const real t62 = 0.5 * t61;
+    const real t63 = t59 + t62;
+    const real t64 = t63 + p[3];
+    const real t65 = t64 * d_w[1];
+    real t67 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t66 = C[2 * n + k] * d_eta[k];
+        t67 += t66;
+    }
+    const real t68 = 0.5 * t67;
+    real t72 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t69 = eta[k] * d_S_rf[2 * n + k];
+        const real t70 = S_rf[2 * n + k] * d_eta[k];
+        const real t71 = t69 + t70;
+        t72 += t71;
+    }
+    const real t73 = 0.5 * t72;
+    const real t74 = t68 + t73;
+    const real t75 = w[1] * t74;
+    const real t76 = t65 + t75;
+    const real t77 = p[0] * d_v[0];
+    const real t78 = t76 + t77;
+    real t80 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t79 = S_rf[n + k] * eta[k];
+        t80 += t79;
+    }
+    const real t81 = 0.5 * t80;
+    real t83 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t82 = C[n + k] * eta[k];
+        t83 += t82;
+    }
+    const real t84 = 0.5 * t83;
+    const real t85 = t81 + t84;
+    const real t86 = t85 + p[2];
+    const real t87 = t86 * d_w[2];
+    real t89 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t88 = C[n + k] * d_eta[k];
+        t89 += t88;
+    }
+    const real t90 = 0.5 * t89;
+    real t94 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t91 = eta[k] * d_S_rf[n + k];
+        const real t92 = S_rf[n + k] * d_eta[k];
+        const real t93 = t91 + t92;
+        t94 += t93;
+    }
+    const real t95 = 0.5 * t94;
+    const real t96 = t90 + t95;
+    const real t97 = w[2] * t96;
+    const real t98 = t87 + t97;
+    const real t99 = t78 - t98;
+    const real t100 = t56 + t99;
+    d_h[0] = t100;
+    real t104 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t101 = etad[k] * d_S_rf[n + k];
+        const real t102 = S_rf[n + k] * d_etad[k];
+        const real t103 = t101 + t102;
+        t104 += t103;
+    }
+    real t106 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t105 = S_rf[k] * eta[k];
+        t106 += t105;
+    }
+    const real t107 = 0.5 * t106;
+    real t109 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t108 = C[k] * eta[k];
+        t109 += t108;
+    }
+    const real t110 = 0.5 * t109;
+    const real t111 = t107 + t110;
+    const real t112 = t111 + p[1];
+    const real t113 = t112 * d_w[2];
+    real t115 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t114 = C[k] * d_eta[k];
+        t115 += t114;
+    }
+    const real t116 = 0.5 * t115;
+    real t120 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t117 = eta[k] * d_S_rf[k];
+        const real t118 = S_rf[k] * d_eta[k];
+        const real t119 = t117 + t118;
+        t120 += t119;
+    }
+    const real t121 = 0.5 * t120;
+    const real t122 = t116 + t121;
+    const real t123 = w[2] * t122;
+    const real t124 = t113 + t123;
+    const real t125 = p[0] * d_v[1];
+    const real t126 = t64 * d_w[0];
+    const real t127 = w[0] * t74;
+    const real t128 = t126 + t127;
+    const real t129 = t125 - t128;
+    const real t130 = t124 + t129;
+    const real t131 = t104 + t130;
+    d_h[1] = t131;
+    real t135 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t132 = etad[k] * d_S_rf[2 * n + k];
+        const real t133 = S_rf[2 * n + k] * d_etad[k];
+        const real t134 = t132 + t133;
+        t135 += t134;
+    }
+    const real t136 = t86 * d_w[0];
+    const real t137 = w[0] * t96;
+    const real t138 = t136 + t137;
+    const real t139 = p[0] * d_v[2];
+    const real t140 = t138 + t139;
+    const real t141 = t112 * d_w[1];
+    const real t142 = w[1] * t122;
+    const real t143 = t141 + t142;
+    const real t144 = t140 - t143;
+    const real t145 = t135 + t144;
+    d_h[2] = t145;
+    real t149 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t146 = etad[k] * d_S_rf[3 * n + k];
+        const real t147 = S_rf[3 * n + k] * d_etad[k];
+        const real t148 = t146 + t147;
+        t149 += t148;
+    }
+    real t151 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t150 = eta[k] * A[3 * n + k];
+        t151 += t150;
+    }
+    const real t152 = 0.5 * t151;
+    real t154 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t153 = B[3 * n + k] * eta[k];
+        t154 += t153;
+    }
+    const real t155 = 0.5 * t154;
+    const real t156 = t152 + t155;
+    const real t157 = t156 + p[7];
+    real t159 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t158 = eta[k] * A[5 * n + k];
+        t159 += t158;
+    }
+    const real t160 = 0.5 * t159;
+    real t162 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t161 = B[5 * n + k] * eta[k];
+        t162 += t161;
+    }
+    const real t163 = 0.5 * t162;
+    const real t164 = t160 + t163;
+    const real t165 = t164 + p[9];
+    const real t166 = t157 + t165;
+    const real t167 = t166 * d_w[0];
+    real t169 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t168 = B[5 * n + k] * d_eta[k];
+        t169 += t168;
+    }
+    const real t170 = 0.5 * t169;
+    real t174 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t171 = A[5 * n + k] * d_eta[k];
+        const real t172 = eta[k] * d_A[5 * n + k];
+        const real t173 = t171 + t172;
+        t174 += t173;
+    }
+    const real t175 = 0.5 * t174;
+    const real t176 = t170 + t175;
+    real t178 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t177 = B[3 * n + k] * d_eta[k];
+        t178 += t177;
+    }
+    const real t179 = 0.5 * t178;
+    real t183 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t180 = A[3 * n + k] * d_eta[k];
+        const real t181 = eta[k] * d_A[3 * n + k];
+        const real t182 = t180 + t181;
+        t183 += t182;
+    }
+    const real t184 = 0.5 * t183;
+    const real t185 = t179 + t184;
+    const real t186 = t176 + t185;
+    const real t187 = w[0] * t186;
+    const real t188 = t167 + t187;
+    const real t189 = t86 * d_v[2];
+    const real t190 = v[2] * t96;
+    const real t191 = t189 + t190;
+    const real t192 = t64 * d_v[1];
+    const real t193 = v[1] * t74;
+    const real t194 = t192 + t193;
+    const real t195 = t191 - t194;
+    const real t196 = t188 + t195;
+    real t198 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t197 = eta[k] * A[n + k];
+        t198 += t197;
+    }
+    const real t199 = 0.5 * t198;
+    real t201 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t200 = B[n + k] * eta[k];
+        t201 += t200;
+    }
+    const real t202 = 0.5 * t201;
+    const real t203 = t199 + t202;
+    const real t204 = t203 + p[5];
+    const real t205 = t204 * d_w[1];
+    real t207 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t206 = B[n + k] * d_eta[k];
+        t207 += t206;
+    }
+    const real t208 = 0.5 * t207;
+    real t212 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t209 = A[n + k] * d_eta[k];
+        const real t210 = eta[k] * d_A[n + k];
+        const real t211 = t209 + t210;
+        t212 += t211;
+    }
+    const real t213 = 0.5 * t212;
+    const real t214 = t208 + t213;
+    const real t215 = w[1] * t214;
+    const real t216 = t205 + t215;
+    const real t217 = t196 - t216;
+    real t219 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t218 = eta[k] * A[2 * n + k];
+        t219 += t218;
+    }
+    const real t220 = 0.5 * t219;
+    real t222 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t221 = B[2 * n + k] * eta[k];
+        t222 += t221;
+    }
+    const real t223 = 0.5 * t222;
+    const real t224 = t220 + t223;
+    const real t225 = t224 + p[6];
+    const real t226 = t225 * d_w[2];
+    real t228 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t227 = B[2 * n + k] * d_eta[k];
+        t228 += t227;
+    }
+    const real t229 = 0.5 * t228;
+    real t233 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t230 = A[2 * n + k] * d_eta[k];
+        const real t231 = eta[k] * d_A[2 * n + k];
+        const real t232 = t230 + t231;
+        t233 += t232;
+    }
+    const real t234 = 0.5 * t233;
+    const real t235 = t229 + t234;
+    const real t236 = w[2] * t235;
+    const real t237 = t226 + t236;
+    const real t238 = t217 - t237;
+    const real t239 = t149 + t238;
+    d_h[3] = t239;
+    real t243 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t240 = etad[k] * d_S_rf[4 * n + k];
+        const real t241 = S_rf[4 * n + k] * d_etad[k];
+        const real t242 = t240 + t241;
+        t243 += t242;
+    }
+    real t245 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t244 = eta[k] * A[k];
+        t245 += t244;
+    }
+    const real t246 = 0.5 * t245;
+    real t248 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t247 = B[k] * eta[k];
+        t248 += t247;
+    }
+    const real t249 = 0.5 * t248;
+    const real t250 = t246 + t249;
+    const real t251 = t250 + p[4];
+    const real t252 = t165 + t251;
+    const real t253 = t252 * d_w[1];
+    real t255 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t254 = B[k] * d_eta[k];
+        t255 += t254;
+    }
+    const real t256 = 0.5 * t255;
+    real t260 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t257 = A[k] * d_eta[k];
+        const real t258 = eta[k] * d_A[k];
+        const real t259 = t257 + t258;
+        t260 += t259;
+    }
+    const real t261 = 0.5 * t260;
+    const real t262 = t256 + t261;
+    const real t263 = t176 + t262;
+    const real t264 = w[1] * t263;
+    const real t265 = t253 + t264;
+    const real t266 = t64 * d_v[0];
+    const real t267 = v[0] * t74;
+    const real t268 = t266 + t267;
+    const real t269 = t112 * d_v[2];
+    const real t270 = v[2] * t122;
+    const real t271 = t269 + t270;
+    const real t272 = t268 - t271;
+    const real t273 = t204 * d_w[0];
+    const real t274 = w[0] * t214;
+    const real t275 = t273 + t274;
+    const real t276 = t272 - t275;
+    const real t277 = t265 + t276;
+    real t279 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t278 = eta[k] * A[4 * n + k];
+        t279 += t278;
+    }
+    const real t280 = 0.5 * t279;
+    real t282 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t281 = B[4 * n + k] * eta[k];
+        t282 += t281;
+    }
+    const real t283 = 0.5 * t282;
+    const real t284 = t280 + t283;
+    const real t285 = t284 + p[8];
+    const real t286 = t285 * d_w[2];
+    real t288 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t287 = B[4 * n + k] * d_eta[k];
+        t288 += t287;
+    }
+    const real t289 = 0.5 * t288;
+    real t293 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t290 = A[4 * n + k] * d_eta[k];
+        const real t291 = eta[k] * d_A[4 * n + k];
+        const real t292 = t290 + t291;
+        t293 += t292;
+    }
+    const real t294 = 0.5 * t293;
+    const real t295 = t289 + t294;
+    const real t296 = w[2] * t295;
+    const real t297 = t286 + t296;
+    const real t298 = t277 - t297;
+    const real t299 = t243 + t298;
+    d_h[4] = t299;
+    real t303 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t300 = etad[k] * d_S_rf[5 * n + k];
+        const real t301 = S_rf[5 * n + k] * d_etad[k];
+        const real t302 = t300 + t301;
+        t303 += t302;
+    }
+    const real t304 = t157 + t251;
+    const real t305 = t304 * d_w[2];
+    const real t306 = t185 + t262;
+    const real t307 = w[2] * t306;
+    const real t308 = t305 + t307;
+    const real t309 = t112 * d_v[1];
+    const real t310 = v[1] * t122;
+    const real t311 = t309 + t310;
+    const real t312 = t86 * d_v[0];
+    const real t313 = v[0] * t96;
+    const real t314 = t312 + t313;
+    const real t315 = t311 - t314;
+    const real t316 = t225 * d_w[0];
+    const real t317 = w[0] * t235;
+    const real t318 = t316 + t317;
+    const real t319 = t315 - t318;
+    const real t320 = t285 * d_w[1];
+    const real t321 = w[1] * t295;
+    const real t322 = t320 + t321;
+    const real t323 = t319 - t322;
+    const real t324 = t308 + t323;
+    const real t325 = t303 + t324;
+    d_h[5] = t325;
+    return 0;
+}
+
+int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *restrict C,
+    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
+    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
+    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
+    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
+    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
+    const real *restrict eta, const real *restrict etad, const real *restrict v,
+    const real *restrict w, const real *restrict S_rf, const real *restrict A,
+    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
+    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
+    real *restrict d_h, real *restrict d_h_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_momentum_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+    case 2: return mstmm_sweep_modal_momentum_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+    case 3: return mstmm_sweep_modal_momentum_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+    case 4: return mstmm_sweep_modal_momentum_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+    default: return mstmm_sweep_modal_momentum_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+    }
+}
+
+static int mstmm_sweep_modal_momentum_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_momentum_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], in[27], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_modal_momentum_slope_inputs[] = {
+    {"p", 10, "", 0, 0},
+    {"C", 3, "", 0, 1},
+    {"P", 3, "", 0, 1},
+    {"B", 6, "", 0, 1},
+    {"Z_xx", 1, "", 0, 2},
+    {"Z_xy", 1, "", 0, 2},
+    {"Z_xz", 1, "", 0, 2},
+    {"Z_yy", 1, "", 0, 2},
+    {"Z_yz", 1, "", 0, 2},
+    {"Z_zz", 1, "", 0, 2},
+    {"Y_x", 1, "", 0, 2},
+    {"Y_y", 1, "", 0, 2},
+    {"Y_z", 1, "", 0, 2},
+    {"G_x", 1, "", 0, 2},
+    {"G_y", 1, "", 0, 2},
+    {"G_z", 1, "", 0, 2},
+    {"M", 1, "", 0, 2},
+    {"eta", 1, "", 0, 1},
+    {"etad", 1, "", 0, 1},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"S_rf", 6, "", 0, 1},
+    {"A", 6, "", 0, 1},
+    {"h_f", 1, "", 0, 1},
+    {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_momentum_slope_outputs[] = {
+    {"d_S_rf", 6, "", 0, 1},
+    {"d_A", 6, "", 0, 1},
+    {"d_h", 6, "N*s, N*m*s", 0, 0},
+    {"d_h_f", 1, "", 0, 1},
+};
+
+/* section and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  r[3] (m) section point at rest from o, frame axes
+ * in  phi[3][n] displacement of the point per mode
+ * in  theta[3][n] rotation vector of the section per mode
+ * in  g_x[n][n] displacement of second order along x: -1/2 eta^T g eta
+ * in  g_y[n][n] displacement of second order along y: -1/2 eta^T g eta
+ * in  g_z[n][n] displacement of second order along z: -1/2 eta^T g eta
+ * in  h_x[n][n] rotation vector of second order about x: -1/2 eta^T h eta
+ * in  h_y[n][n] rotation vector of second order about y: -1/2 eta^T h eta
+ * in  h_z[n][n] rotation vector of second order about z: -1/2 eta^T h eta
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * in  Phi[6][n] rates of point and rotation vector per modal speed
+ * in  d_eta[n] derivative of eta
+ * in  d_etad[n] derivative of etad
+ * out d_Phi[6][n] derivative of Phi
+ * out d_x[3] (m) derivative of x
+ * out d_Psi[3] (rad) derivative of Psi
+ * out d_xd[3] (m/s) derivative of xd
+ * out d_Psid[3] (rad/s) derivative of Psid
+ * out d_xdd[3] (m/s2) derivative of xdd
+ * out d_Psidd[3] (rad/s2) derivative of Psidd
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_section_slope_sized(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
+    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
+    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd)
+{
+    (void)r;
+    for (int k = 0; k < n; ++k) {
+        real t1 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t0 = g_x[n * l + k] * d_eta[l];
+            t1 += t0;
+        }
+        const real t2 = -t1;
+        d_Phi[k] = t2;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t4 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t3 = g_y[n * l + k] * d_eta[l];
+            t4 += t3;
+        }
+        const real t5 = -t4;
+        d_Phi[n + k] = t5;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t7 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t6 = g_z[n * l + k] * d_eta[l];
+            t7 += t6;
+        }
+        const real t8 = -t7;
+        d_Phi[2 * n + k] = t8;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t10 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t9 = h_x[n * l + k] * d_eta[l];
+            t10 += t9;
+        }
+        const real t11 = -t10;
+        d_Phi[3 * n + k] = t11;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t13 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t12 = h_y[n * l + k] * d_eta[l];
+            t13 += t12;
+        }
+        const real t14 = -t13;
+        d_Phi[4 * n + k] = t14;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t16 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t15 = h_z[n * l + k] * d_eta[l];
+            t16 += t15;
+        }
+        const real t17 = -t16;
+        d_Phi[5 * n + k] = t17;
+    }
+    real t19 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t18 = phi[k] * d_eta[k];
+        t19 += t18;
+    }
+    const real t20 = 0.5 * t19;
+    real t24 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t21 = eta[k] * d_Phi[k];
+        const real t22 = Phi[k] * d_eta[k];
+        const real t23 = t21 + t22;
+        t24 += t23;
+    }
+    const real t25 = 0.5 * t24;
+    const real t26 = t20 + t25;
+    d_x[0] = t26;
+    real t28 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t27 = phi[n + k] * d_eta[k];
+        t28 += t27;
+    }
+    const real t29 = 0.5 * t28;
+    real t33 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t30 = Phi[n + k] * d_eta[k];
+        const real t31 = eta[k] * d_Phi[n + k];
+        const real t32 = t30 + t31;
+        t33 += t32;
+    }
+    const real t34 = 0.5 * t33;
+    const real t35 = t29 + t34;
+    d_x[1] = t35;
+    real t37 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t36 = phi[2 * n + k] * d_eta[k];
+        t37 += t36;
+    }
+    const real t38 = 0.5 * t37;
+    real t42 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t39 = Phi[2 * n + k] * d_eta[k];
+        const real t40 = eta[k] * d_Phi[2 * n + k];
+        const real t41 = t39 + t40;
+        t42 += t41;
+    }
+    const real t43 = 0.5 * t42;
+    const real t44 = t38 + t43;
+    d_x[2] = t44;
+    real t46 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t45 = theta[k] * d_eta[k];
+        t46 += t45;
+    }
+    const real t47 = 0.5 * t46;
+    real t51 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t48 = Phi[3 * n + k] * d_eta[k];
+        const real t49 = eta[k] * d_Phi[3 * n + k];
+        const real t50 = t48 + t49;
+        t51 += t50;
+    }
+    const real t52 = 0.5 * t51;
+    const real t53 = t47 + t52;
+    d_Psi[0] = t53;
+    real t55 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t54 = theta[n + k] * d_eta[k];
+        t55 += t54;
+    }
+    const real t56 = 0.5 * t55;
+    real t60 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t57 = Phi[4 * n + k] * d_eta[k];
+        const real t58 = eta[k] * d_Phi[4 * n + k];
+        const real t59 = t57 + t58;
+        t60 += t59;
+    }
+    const real t61 = 0.5 * t60;
+    const real t62 = t56 + t61;
+    d_Psi[1] = t62;
+    real t64 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t63 = theta[2 * n + k] * d_eta[k];
+        t64 += t63;
+    }
+    const real t65 = 0.5 * t64;
+    real t69 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t66 = Phi[5 * n + k] * d_eta[k];
+        const real t67 = eta[k] * d_Phi[5 * n + k];
+        const real t68 = t66 + t67;
+        t69 += t68;
+    }
+    const real t70 = 0.5 * t69;
+    const real t71 = t65 + t70;
+    d_Psi[2] = t71;
+    real t75 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t72 = etad[k] * d_Phi[k];
+        const real t73 = Phi[k] * d_etad[k];
+        const real t74 = t72 + t73;
+        t75 += t74;
+    }
+    d_xd[0] = t75;
+    real t79 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t76 = etad[k] * d_Phi[n + k];
+        const real t77 = Phi[n + k] * d_etad[k];
+        const real t78 = t76 + t77;
+        t79 += t78;
+    }
+    d_xd[1] = t79;
+    real t83 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t80 = etad[k] * d_Phi[2 * n + k];
+        const real t81 = Phi[2 * n + k] * d_etad[k];
+        const real t82 = t80 + t81;
+        t83 += t82;
+    }
+    d_xd[2] = t83;
+    real t87 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t84 = etad[k] * d_Phi[3 * n + k];
+        const real t85 = Phi[3 * n + k] * d_etad[k];
+        const real t86 = t84 + t85;
+        t87 += t86;
+    }
+    d_Psid[0] = t87;
+    real t91 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t88 = etad[k] * d_Phi[4 * n + k];
+        const real t89 = Phi[4 * n + k] * d_etad[k];
+        const real t90 = t88 + t89;
+        t91 += t90;
+    }
+    d_Psid[1] = t91;
+    real t95 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t92 = etad[k] * d_Phi[5 * n + k];
+        const real t93 = Phi[5 * n + k] * d_etad[k];
+        const real t94 = t92 + t93;
+        t95 += t94;
+    }
+    d_Psid[2] = t95;
+    real t103 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t97 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t96 = g_x[n * k + l] * etad[l];
+            t97 += t96;
+        }
+        const real t98 = t97 * d_etad[k];
+        real t100 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t99 = g_x[n * k + l] * d_etad[l];
+            t100 += t99;
+        }
+        const real t101 = etad[k] * t100;
+        const real t102 = t98 + t101;
+        t103 += t102;
+    }
+    const real t104 = -t103;
+    d_xdd[0] = t104;
+    real t112 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t106 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t105 = etad[l] * g_y[n * k + l];
+            t106 += t105;
+        }
+        const real t107 = t106 * d_etad[k];
+        real t109 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t108 = g_y[n * k + l] * d_etad[l];
+            t109 += t108;
+        }
+        const real t110 = etad[k] * t109;
+        const real t111 = t107 + t110;
+        t112 += t111;
+    }
+    const real t113 = -t112;
+    d_xdd[1] = t113;
+    real t121 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t115 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t114 = etad[l] * g_z[n * k + l];
+            t115 += t114;
+        }
+        const real t116 = t115 * d_etad[k];
+        real t118 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t117 = g_z[n * k + l] * d_etad[l];
+            t118 += t117;
+        }
+        const real t119 = etad[k] * t118;
+        const real t120 = t116 + t119;
+        t121 += t120;
+    }
+    const real t122 = -t121;
+    d_xdd[2] = t122;
+    real t130 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t124 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t123 = etad[l] * h_x[n * k + l];
+            t124 += t123;
+        }
+        const real t125 = t124 * d_etad[k];
+        real t127 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t126 = h_x[n * k + l] * d_etad[l];
+            t127 += t126;
+        }
+        const real t128 = etad[k] * t127;
+        const real t129 = t125 + t128;
+        t130 += t129;
+    }
+    const real t131 = -t130;
+    d_Psidd[0] = t131;
+    real t139 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t133 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t132 = etad[l] * h_y[n * k + l];
+            t133 += t132;
+        }
+        const real t134 = t133 * d_etad[k];
+        real t136 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t135 = h_y[n * k + l] * d_etad[l];
+            t136 += t135;
+        }
+        const real t137 = etad[k] * t136;
+        const real t138 = t134 + t137;
+        t139 += t138;
+    }
+    const real t140 = -t139;
+    d_Psidd[1] = t140;
+    real t148 = 0;
+    for (int k = 0; k < n; ++k) {
+        real t142 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t141 = etad[l] * h_z[n * k + l];
+            t142 += t141;
+        }
+        const real t143 = t142 * d_etad[k];
+        real t145 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t144 = h_z[n * k + l] * d_etad[l];
+            t145 += t144;
+        }
+        const real t146 = etad[k] * t145;
+        const real t147 = t143 + t146;
+        t148 += t147;
+    }
+    const real t149 = -t148;
+    d_Psidd[2] = t149;
+    return 0;
+}
+
+int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *restrict phi,
+    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
+    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
+    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
+    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
+    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
+    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_section_slope_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+    case 2: return mstmm_sweep_modal_section_slope_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+    case 3: return mstmm_sweep_modal_section_slope_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+    case 4: return mstmm_sweep_modal_section_slope_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+    default: return mstmm_sweep_modal_section_slope_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+    }
+}
+
+static int mstmm_sweep_modal_section_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_section_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
+}
+
+static const mstmm_port mstmm_sweep_modal_section_slope_inputs[] = {
+    {"r", 3, "m", 0, 0},
+    {"phi", 3, "", 0, 1},
+    {"theta", 3, "", 0, 1},
+    {"g_x", 1, "", 0, 2},
+    {"g_y", 1, "", 0, 2},
+    {"g_z", 1, "", 0, 2},
+    {"h_x", 1, "", 0, 2},
+    {"h_y", 1, "", 0, 2},
+    {"h_z", 1, "", 0, 2},
+    {"eta", 1, "", 0, 1},
+    {"etad", 1, "", 0, 1},
+    {"Phi", 6, "", 0, 1},
+    {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_section_slope_outputs[] = {
+    {"d_Phi", 6, "", 0, 1},
+    {"d_x", 3, "m", 0, 0},
+    {"d_Psi", 3, "rad", 0, 0},
+    {"d_xd", 3, "m/s", 0, 0},
+    {"d_Psid", 3, "rad/s", 0, 0},
+    {"d_xdd", 3, "m/s2", 0, 0},
+    {"d_Psidd", 3, "rad/s2", 0, 0},
+};
+
+/* outward and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  R_end[3][3] rotation, end axes to section axes
+ * in  x[3] (m) section point from o, frame axes
+ * in  Psi[3] (rad) rotation vector of the section, frame axes
+ * in  xd[3] (m/s) rate of x
+ * in  Psid[3] (rad/s) rate of Psi
+ * in  xdd[3] (m/s2) second rate of x at etadd = 0
+ * in  Psidd[3] (rad/s2) second rate of Psi at etadd = 0
+ * in  d_x[3] (m) derivative of x
+ * in  d_Psi[3] (rad) derivative of Psi
+ * in  d_xd[3] (m/s) derivative of xd
+ * in  d_Psid[3] (rad/s) derivative of Psid
+ * in  d_xdd[3] (m/s2) derivative of xdd
+ * in  d_Psidd[3] (rad/s2) derivative of Psidd
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H6[6][6] derivative of H6
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ */
+int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c)
+{
+    (void)x;
+    const real t0 = Psi[2] * Psi[0];
+    const real t1 = Psi[2] * Psi[2];
+    const real t2 = Psi[0] * Psi[0];
+    const real t3 = Psi[1] * Psi[1];
+    const real t4 = t2 + t3;
+    const real t5 = t1 + t4;
+    const real t6 = t5 * 8.896791392450574e-22;
+    const real t7 = t6 + (-4.110317623312165e-19);
+    const real t8 = t5 * t7;
+    const real t9 = t8 + ((real)1 / (real)6402373705728000);
+    const real t10 = t5 * t9;
+    const real t11 = t10 + (-((real)1 / (real)20922789888000));
+    const real t12 = t5 * t11;
+    const real t13 = t12 + ((real)1 / (real)87178291200);
+    const real t14 = t5 * t13;
+    const real t15 = t14 + (-((real)1 / (real)479001600));
+    const real t16 = t5 * t15;
+    const real t17 = t16 + ((real)1 / (real)3628800);
+    const real t18 = t5 * t17;
+    const real t19 = t18 + (-((real)1 / (real)40320));
+    const real t20 = t5 * t19;
+    const real t21 = t20 + ((real)1 / (real)720);
+    const real t22 = t5 * t21;
+    const real t23 = t22 + (-((real)1 / (real)24));
+    const real t24 = Psi[1] * d_Psi[1];
+    const real t25 = t24 + t24;
+    const real t26 = Psi[0] * d_Psi[0];
+    const real t27 = t26 + t26;
+    const real t28 = t25 + t27;
+    const real t29 = Psi[2] * d_Psi[2];
+    const real t30 = t29 + t29;
+    const real t31 = t28 + t30;
+    const real t32 = t23 * t31;
+    const real t33 = t21 * t31;
+    const real t34 = t19 * t31;
+    const real t35 = t17 * t31;
+    const real t36 = t15 * t31;
+    const real t37 = t13 * t31;
+    const real t38 = t11 * t31;
+    const real t39 = t9 * t31;
+    const real t40 = t7 * t31;
+    const real t41 = 8.896791392450574e-22 * t31;
+    const real t42 = t5 * t41;
+    const real t43 = t40 + t42;
+    const real t44 = t5 * t43;
+    const real t45 = t39 + t44;
+    const real t46 = t5 * t45;
+    const real t47 = t38 + t46;
+    const real t48 = t5 * t47;
+    const real t49 = t37 + t48;
+    const real t50 = t5 * t49;
+    const real t51 = t36 + t50;
+    const real t52 = t5 * t51;
+    const real t53 = t35 + t52;
+    const real t54 = t5 * t53;
+    const real t55 = t34 + t54;
+    const real t56 = t5 * t55;
+    const real t57 = t33 + t56;
+    const real t58 = t5 * t57;
+    const real t59 = t32 + t58;
+    const real t60 = t0 * t59;
+    const real t61 = t5 * t23;
+    const real t62 = t61 + 0.5;
+    const real t63 = Psi[0] * d_Psi[2];
+    const real t64 = Psi[2] * d_Psi[0];
+    const real t65 = t63 + t64;
+    const real t66 = t62 * t65;
+    const real t67 = t60 + t66;
+    const real t68 = t5 * 1.9572941063391263e-20;
+    const real t69 = t68 + (-8.22063524662433e-18);
+    const real t70 = t5 * t69;
+    const real t71 = t70 + ((real)1 / (real)355687428096000);
+    const real t72 = t5 * t71;
+    const real t73 = t72 + (-((real)1 / (real)1307674368000));
+    const real t74 = t5 * t73;
+    const real t75 = t74 + ((real)1 / (real)6227020800);
+    const real t76 = t5 * t75;
+    const real t77 = t76 + (-((real)1 / (real)39916800));
+    const real t78 = t5 * t77;
+    const real t79 = t78 + ((real)1 / (real)362880);
+    const real t80 = t5 * t79;
+    const real t81 = t80 + (-((real)1 / (real)5040));
+    const real t82 = t5 * t81;
+    const real t83 = t82 + ((real)1 / (real)120);
+    const real t84 = t5 * t83;
+    const real t85 = t84 + (-((real)1 / (real)6));
+    const real t86 = t5 * t85;
+    const real t87 = 1.0 + t86;
+    const real t88 = t87 * d_Psi[1];
+    const real t89 = t85 * t31;
+    const real t90 = t83 * t31;
+    const real t91 = t81 * t31;
+    const real t92 = t79 * t31;
+    const real t93 = t77 * t31;
+    const real t94 = t75 * t31;
+    const real t95 = t73 * t31;
+    const real t96 = t71 * t31;
+    const real t97 = t69 * t31;
+    const real t98 = 1.9572941063391263e-20 * t31;
+    const real t99 = t5 * t98;
+    const real t100 = t97 + t99;
+    const real t101 = t5 * t100;
+    const real t102 = t96 + t101;
+    const real t103 = t5 * t102;
+    const real t104 = t95 + t103;
+    const real t105 = t5 * t104;
+    const real t106 = t94 + t105;
+    const real t107 = t5 * t106;
+    const real t108 = t93 + t107;
+    const real t109 = t5 * t108;
+    const real t110 = t92 + t109;
+    const real t111 = t5 * t110;
+    const real t112 = t91 + t111;
+    const real t113 = t5 * t112;
+    const real t114 = t90 + t113;
+    const real t115 = t5 * t114;
+    const real t116 = t89 + t115;
+    const real t117 = Psi[1] * t116;
+    const real t118 = t88 + t117;
+    const real t119 = t67 + t118;
+    const real t120 = R_end[6] * t119;
+    const real t121 = Psi[0] * Psi[1];
+    const real t122 = t121 * t59;
+    const real t123 = Psi[1] * d_Psi[0];
+    const real t124 = Psi[0] * d_Psi[1];
+    const real t125 = t123 + t124;
+    const real t126 = t62 * t125;
+    const real t127 = t122 + t126;
+    const real t128 = t87 * d_Psi[2];
+    const real t129 = Psi[2] * t116;
+    const real t130 = t128 + t129;
+    const real t131 = t127 - t130;
+    const real t132 = R_end[3] * t131;
+    const real t133 = t1 + t3;
+    const real t134 = t133 * t59;
+    const real t135 = t25 + t30;
+    const real t136 = t62 * t135;
+    const real t137 = t134 + t136;
+    const real t138 = R_end[0] * t137;
+    const real t139 = t132 - t138;
+    const real t140 = t120 + t139;
+    d_R[0] = t140;
+    const real t141 = R_end[7] * t119;
+    const real t142 = R_end[4] * t131;
+    const real t143 = R_end[1] * t137;
+    const real t144 = t142 - t143;
+    const real t145 = t141 + t144;
+    d_R[1] = t145;
+    const real t146 = R_end[8] * t119;
+    const real t147 = R_end[5] * t131;
+    const real t148 = R_end[2] * t137;
+    const real t149 = t147 - t148;
+    const real t150 = t146 + t149;
+    d_R[2] = t150;
+    const real t151 = Psi[2] * Psi[1];
+    const real t152 = t151 * t59;
+    const real t153 = Psi[1] * d_Psi[2];
+    const real t154 = Psi[2] * d_Psi[1];
+    const real t155 = t153 + t154;
+    const real t156 = t62 * t155;
+    const real t157 = t152 + t156;
+    const real t158 = t87 * d_Psi[0];
+    const real t159 = Psi[0] * t116;
+    const real t160 = t158 + t159;
+    const real t161 = t157 - t160;
+    const real t162 = R_end[6] * t161;
+    const real t163 = t130 + t127;
+    const real t164 = R_end[0] * t163;
+    const real t165 = t1 + t2;
+    const real t166 = t165 * t59;
+    const real t167 = t27 + t30;
+    const real t168 = t62 * t167;
+    const real t169 = t166 + t168;
+    const real t170 = R_end[3] * t169;
+    const real t171 = t164 - t170;
+    const real t172 = t162 + t171;
+    d_R[3] = t172;
+    const real t173 = R_end[7] * t161;
+    const real t174 = R_end[1] * t163;
+    const real t175 = R_end[4] * t169;
+    const real t176 = t174 - t175;
+    const real t177 = t173 + t176;
+    d_R[4] = t177;
+    const real t178 = R_end[8] * t161;
+    const real t179 = R_end[2] * t163;
+    const real t180 = R_end[5] * t169;
+    const real t181 = t179 - t180;
+    const real t182 = t178 + t181;
+    d_R[5] = t182;
+    const real t183 = t160 + t157;
+    const real t184 = R_end[3] * t183;
+    const real t185 = t67 - t118;
+    const real t186 = R_end[0] * t185;
+    const real t187 = t184 + t186;
+    const real t188 = t62 * t28;
+    const real t189 = t4 * t59;
+    const real t190 = t188 + t189;
+    const real t191 = R_end[6] * t190;
+    const real t192 = t187 - t191;
+    d_R[6] = t192;
+    const real t193 = R_end[4] * t183;
+    const real t194 = R_end[1] * t185;
+    const real t195 = t193 + t194;
+    const real t196 = R_end[7] * t190;
+    const real t197 = t195 - t196;
+    d_R[7] = t197;
+    const real t198 = R_end[5] * t183;
+    const real t199 = R_end[2] * t185;
+    const real t200 = t198 + t199;
+    const real t201 = R_end[8] * t190;
+    const real t202 = t200 - t201;
+    d_R[8] = t202;
+    d_d[0] = d_x[0];
+    d_d[1] = d_x[1];
+    d_d[2] = d_x[2];
+    d_H6[0] = t140;
+    d_H6[1] = t172;
+    d_H6[2] = t192;
+    d_H6[3] = 0.0;
+    d_H6[4] = 0.0;
+    d_H6[5] = 0.0;
+    d_H6[6] = t145;
+    d_H6[7] = t177;
+    d_H6[8] = t197;
+    d_H6[9] = 0.0;
+    d_H6[10] = 0.0;
+    d_H6[11] = 0.0;
+    d_H6[12] = t150;
+    d_H6[13] = t182;
+    d_H6[14] = t202;
+    d_H6[15] = 0.0;
+    d_H6[16] = 0.0;
+    d_H6[17] = 0.0;
+    d_H6[18] = 0.0;
+    d_H6[19] = 0.0;
+    d_H6[20] = 0.0;
+    const real t203 = t5 * 3.868170170630684e-23;
+    const real t204 = t203 + (-1.9572941063391263e-20);
+    const real t205 = t5 * t204;
+    const real t206 = t205 + 8.22063524662433e-18;
+    const real t207 = t5 * t206;
+    const real t208 = t207 + (-((real)1 / (real)355687428096000));
+    const real t209 = t5 * t208;
+    const real t210 = t209 + ((real)1 / (real)1307674368000);
+    const real t211 = t5 * t210;
+    const real t212 = t211 + (-((real)1 / (real)6227020800));
+    const real t213 = t5 * t212;
+    const real t214 = t213 + ((real)1 / (real)39916800);
+    const real t215 = t5 * t214;
+    const real t216 = t215 + (-((real)1 / (real)362880));
+    const real t217 = t5 * t216;
+    const real t218 = t217 + ((real)1 / (real)5040);
+    const real t219 = t5 * t218;
+    const real t220 = t219 + (-((real)1 / (real)120));
+    const real t221 = t5 * t220;
+    const real t222 = t221 + ((real)1 / (real)6);
+    const real t223 = t222 * t65;
+    const real t224 = t220 * t31;
+    const real t225 = t218 * t31;
+    const real t226 = t216 * t31;
+    const real t227 = t214 * t31;
+    const real t228 = t212 * t31;
+    const real t229 = t210 * t31;
+    const real t230 = t208 * t31;
+    const real t231 = t206 * t31;
+    const real t232 = t204 * t31;
+    const real t233 = 3.868170170630684e-23 * t31;
+    const real t234 = t5 * t233;
+    const real t235 = t232 + t234;
+    const real t236 = t5 * t235;
+    const real t237 = t231 + t236;
+    const real t238 = t5 * t237;
+    const real t239 = t230 + t238;
+    const real t240 = t5 * t239;
+    const real t241 = t229 + t240;
+    const real t242 = t5 * t241;
+    const real t243 = t228 + t242;
+    const real t244 = t5 * t243;
+    const real t245 = t227 + t244;
+    const real t246 = t5 * t245;
+    const real t247 = t226 + t246;
+    const real t248 = t5 * t247;
+    const real t249 = t225 + t248;
+    const real t250 = t5 * t249;
+    const real t251 = t224 + t250;
+    const real t252 = t0 * t251;
+    const real t253 = t223 + t252;
+    const real t254 = t62 * d_Psi[1];
+    const real t255 = Psi[1] * t59;
+    const real t256 = t254 + t255;
+    const real t257 = t253 + t256;
+    const real t258 = R_end[6] * t257;
+    const real t259 = t222 * t125;
+    const real t260 = t121 * t251;
+    const real t261 = t259 + t260;
+    const real t262 = t62 * d_Psi[2];
+    const real t263 = Psi[2] * t59;
+    const real t264 = t262 + t263;
+    const real t265 = t261 - t264;
+    const real t266 = R_end[3] * t265;
+    const real t267 = t222 * t135;
+    const real t268 = t133 * t251;
+    const real t269 = t267 + t268;
+    const real t270 = R_end[0] * t269;
+    const real t271 = t266 - t270;
+    const real t272 = t258 + t271;
+    d_H6[21] = t272;
+    const real t273 = t222 * t155;
+    const real t274 = t151 * t251;
+    const real t275 = t273 + t274;
+    const real t276 = t62 * d_Psi[0];
+    const real t277 = Psi[0] * t59;
+    const real t278 = t276 + t277;
+    const real t279 = t275 - t278;
+    const real t280 = R_end[6] * t279;
+    const real t281 = t264 + t261;
+    const real t282 = R_end[0] * t281;
+    const real t283 = t222 * t167;
+    const real t284 = t165 * t251;
+    const real t285 = t283 + t284;
+    const real t286 = R_end[3] * t285;
+    const real t287 = t282 - t286;
+    const real t288 = t280 + t287;
+    d_H6[22] = t288;
+    const real t289 = t278 + t275;
+    const real t290 = R_end[3] * t289;
+    const real t291 = t253 - t256;
+    const real t292 = R_end[0] * t291;
+    const real t293 = t290 + t292;
+    const real t294 = t222 * t28;
+    const real t295 = t4 * t251;
+    const real t296 = t294 + t295;
+    const real t297 = R_end[6] * t296;
+    const real t298 = t293 - t297;
+    d_H6[23] = t298;
+    d_H6[24] = 0.0;
+    d_H6[25] = 0.0;
+    d_H6[26] = 0.0;
+    const real t299 = R_end[7] * t257;
+    const real t300 = R_end[4] * t265;
+    const real t301 = R_end[1] * t269;
+    const real t302 = t300 - t301;
+    const real t303 = t299 + t302;
+    d_H6[27] = t303;
+    const real t304 = R_end[7] * t279;
+    const real t305 = R_end[1] * t281;
+    const real t306 = R_end[4] * t285;
+    const real t307 = t305 - t306;
+    const real t308 = t304 + t307;
+    d_H6[28] = t308;
+    const real t309 = R_end[4] * t289;
+    const real t310 = R_end[1] * t291;
+    const real t311 = t309 + t310;
+    const real t312 = R_end[7] * t296;
+    const real t313 = t311 - t312;
+    d_H6[29] = t313;
+    d_H6[30] = 0.0;
+    d_H6[31] = 0.0;
+    d_H6[32] = 0.0;
+    const real t314 = R_end[8] * t257;
+    const real t315 = R_end[5] * t265;
+    const real t316 = R_end[2] * t269;
+    const real t317 = t315 - t316;
+    const real t318 = t314 + t317;
+    d_H6[33] = t318;
+    const real t319 = R_end[8] * t279;
+    const real t320 = R_end[2] * t281;
+    const real t321 = R_end[5] * t285;
+    const real t322 = t320 - t321;
+    const real t323 = t319 + t322;
+    d_H6[34] = t323;
+    const real t324 = R_end[5] * t289;
+    const real t325 = R_end[2] * t291;
+    const real t326 = t324 + t325;
+    const real t327 = R_end[8] * t296;
+    const real t328 = t326 - t327;
+    d_H6[35] = t328;
+    const real t329 = xd[2] * t192;
+    const real t330 = t62 * t0;
+    const real t331 = Psi[1] * t87;
+    const real t332 = t330 - t331;
+    const real t333 = R_end[0] * t332;
+    const real t334 = t62 * t151;
+    const real t335 = Psi[0] * t87;
+    const real t336 = t334 + t335;
+    const real t337 = R_end[3] * t336;
+    const real t338 = t333 + t337;
+    const real t339 = t4 * t62;
+    const real t340 = 1.0 - t339;
+    const real t341 = R_end[6] * t340;
+    const real t342 = t338 + t341;
+    const real t343 = t342 * d_xd[2];
+    const real t344 = t329 + t343;
+    const real t345 = xd[1] * t172;
+    const real t346 = t62 * t121;
+    const real t347 = Psi[2] * t87;
+    const real t348 = t346 + t347;
+    const real t349 = R_end[0] * t348;
+    const real t350 = t62 * t165;
+    const real t351 = 1.0 - t350;
+    const real t352 = R_end[3] * t351;
+    const real t353 = t349 + t352;
+    const real t354 = t334 - t335;
+    const real t355 = R_end[6] * t354;
+    const real t356 = t353 + t355;
+    const real t357 = t356 * d_xd[1];
+    const real t358 = t345 + t357;
+    const real t359 = xd[0] * t140;
+    const real t360 = t62 * t133;
+    const real t361 = 1.0 - t360;
+    const real t362 = t361 * R_end[0];
+    const real t363 = t346 - t347;
+    const real t364 = t363 * R_end[3];
+    const real t365 = t362 + t364;
+    const real t366 = t331 + t330;
+    const real t367 = t366 * R_end[6];
+    const real t368 = t365 + t367;
+    const real t369 = t368 * d_xd[0];
+    const real t370 = t359 + t369;
+    const real t371 = t358 + t370;
+    const real t372 = t344 + t371;
+    d_v[0] = t372;
+    const real t373 = xd[2] * t197;
+    const real t374 = R_end[1] * t332;
+    const real t375 = R_end[4] * t336;
+    const real t376 = t374 + t375;
+    const real t377 = R_end[7] * t340;
+    const real t378 = t376 + t377;
+    const real t379 = t378 * d_xd[2];
+    const real t380 = t373 + t379;
+    const real t381 = xd[1] * t177;
+    const real t382 = R_end[1] * t348;
+    const real t383 = R_end[4] * t351;
+    const real t384 = t382 + t383;
+    const real t385 = R_end[7] * t354;
+    const real t386 = t384 + t385;
+    const real t387 = t386 * d_xd[1];
+    const real t388 = t381 + t387;
+    const real t389 = xd[0] * t145;
+    const real t390 = t361 * R_end[1];
+    const real t391 = t363 * R_end[4];
+    const real t392 = t390 + t391;
+    const real t393 = t366 * R_end[7];
+    const real t394 = t392 + t393;
+    const real t395 = t394 * d_xd[0];
+    const real t396 = t389 + t395;
+    const real t397 = t388 + t396;
+    const real t398 = t380 + t397;
+    d_v[1] = t398;
+    const real t399 = xd[2] * t202;
+    const real t400 = R_end[2] * t332;
+    const real t401 = R_end[5] * t336;
+    const real t402 = t400 + t401;
+    const real t403 = R_end[8] * t340;
+    const real t404 = t402 + t403;
+    const real t405 = t404 * d_xd[2];
+    const real t406 = t399 + t405;
+    const real t407 = xd[1] * t182;
+    const real t408 = R_end[2] * t348;
+    const real t409 = R_end[5] * t351;
+    const real t410 = t408 + t409;
+    const real t411 = R_end[8] * t354;
+    const real t412 = t410 + t411;
+    const real t413 = t412 * d_xd[1];
+    const real t414 = t407 + t413;
+    const real t415 = xd[0] * t150;
+    const real t416 = t361 * R_end[2];
+    const real t417 = t363 * R_end[5];
+    const real t418 = t416 + t417;
+    const real t419 = t366 * R_end[8];
+    const real t420 = t418 + t419;
+    const real t421 = t420 * d_xd[0];
+    const real t422 = t415 + t421;
+    const real t423 = t414 + t422;
+    const real t424 = t406 + t423;
+    d_v[2] = t424;
+    const real t425 = Psid[2] * t298;
+    const real t426 = t0 * t222;
+    const real t427 = Psi[1] * t62;
+    const real t428 = t426 - t427;
+    const real t429 = R_end[0] * t428;
+    const real t430 = t151 * t222;
+    const real t431 = Psi[0] * t62;
+    const real t432 = t430 + t431;
+    const real t433 = R_end[3] * t432;
+    const real t434 = t429 + t433;
+    const real t435 = t4 * t222;
+    const real t436 = 1.0 - t435;
+    const real t437 = R_end[6] * t436;
+    const real t438 = t434 + t437;
+    const real t439 = t438 * d_Psid[2];
+    const real t440 = t425 + t439;
+    const real t441 = Psid[1] * t288;
+    const real t442 = t121 * t222;
+    const real t443 = Psi[2] * t62;
+    const real t444 = t442 + t443;
+    const real t445 = R_end[0] * t444;
+    const real t446 = t165 * t222;
+    const real t447 = 1.0 - t446;
+    const real t448 = R_end[3] * t447;
+    const real t449 = t445 + t448;
+    const real t450 = t430 - t431;
+    const real t451 = R_end[6] * t450;
+    const real t452 = t449 + t451;
+    const real t453 = t452 * d_Psid[1];
+    const real t454 = t441 + t453;
+    const real t455 = Psid[0] * t272;
+    const real t456 = t133 * t222;
+    const real t457 = 1.0 - t456;
+    const real t458 = R_end[0] * t457;
+    const real t459 = t442 - t443;
+    const real t460 = R_end[3] * t459;
+    const real t461 = t458 + t460;
+    const real t462 = t427 + t426;
+    const real t463 = R_end[6] * t462;
+    const real t464 = t461 + t463;
+    const real t465 = t464 * d_Psid[0];
+    const real t466 = t455 + t465;
+    const real t467 = t454 + t466;
+    const real t468 = t440 + t467;
+    d_w[0] = t468;
+    const real t469 = Psid[2] * t313;
+    const real t470 = R_end[1] * t428;
+    const real t471 = R_end[4] * t432;
+    const real t472 = t470 + t471;
+    const real t473 = R_end[7] * t436;
+    const real t474 = t472 + t473;
+    const real t475 = t474 * d_Psid[2];
+    const real t476 = t469 + t475;
+    const real t477 = Psid[1] * t308;
+    const real t478 = R_end[1] * t444;
+    const real t479 = R_end[4] * t447;
+    const real t480 = t478 + t479;
+    const real t481 = R_end[7] * t450;
+    const real t482 = t480 + t481;
+    const real t483 = t482 * d_Psid[1];
+    const real t484 = t477 + t483;
+    const real t485 = Psid[0] * t303;
+    const real t486 = R_end[1] * t457;
+    const real t487 = R_end[4] * t459;
+    const real t488 = t486 + t487;
+    const real t489 = R_end[7] * t462;
+    const real t490 = t488 + t489;
+    const real t491 = t490 * d_Psid[0];
+    const real t492 = t485 + t491;
+    const real t493 = t484 + t492;
+    const real t494 = t476 + t493;
+    d_w[1] = t494;
+    const real t495 = Psid[2] * t328;
+    const real t496 = R_end[2] * t428;
+    const real t497 = R_end[5] * t432;
+    const real t498 = t496 + t497;
+    const real t499 = R_end[8] * t436;
+    const real t500 = t498 + t499;
+    const real t501 = t500 * d_Psid[2];
+    const real t502 = t495 + t501;
+    const real t503 = Psid[1] * t323;
+    const real t504 = R_end[2] * t444;
+    const real t505 = R_end[5] * t447;
+    const real t506 = t504 + t505;
+    const real t507 = R_end[8] * t450;
+    const real t508 = t506 + t507;
+    const real t509 = t508 * d_Psid[1];
+    const real t510 = t503 + t509;
+    const real t511 = Psid[0] * t318;
+    const real t512 = R_end[2] * t457;
+    const real t513 = R_end[5] * t459;
+    const real t514 = t512 + t513;
+    const real t515 = R_end[8] * t462;
+    const real t516 = t514 + t515;
+    const real t517 = t516 * d_Psid[0];
+    const real t518 = t511 + t517;
+    const real t519 = t510 + t518;
+    const real t520 = t502 + t519;
+    d_w[2] = t520;
+    const real t521 = xdd[2] * t192;
+    const real t522 = t342 * d_xdd[2];
+    const real t523 = t521 + t522;
+    const real t524 = xdd[1] * t172;
+    const real t525 = t356 * d_xdd[1];
+    const real t526 = t524 + t525;
+    const real t527 = xdd[0] * t140;
+    const real t528 = t368 * d_xdd[0];
+    const real t529 = t527 + t528;
+    const real t530 = t526 + t529;
+    const real t531 = t523 + t530;
+    d_c[0] = t531;
+    const real t532 = xdd[2] * t197;
+    const real t533 = t378 * d_xdd[2];
+    const real t534 = t532 + t533;
+    const real t535 = xdd[1] * t177;
+    const real t536 = t386 * d_xdd[1];
+    const real t537 = t535 + t536;
+    const real t538 = xdd[0] * t145;
+    const real t539 = t394 * d_xdd[0];
+    const real t540 = t538 + t539;
+    const real t541 = t537 + t540;
+    const real t542 = t534 + t541;
+    d_c[1] = t542;
+    const real t543 = xdd[2] * t202;
+    const real t544 = t404 * d_xdd[2];
+    const real t545 = t543 + t544;
+    const real t546 = xdd[1] * t182;
+    const real t547 = t412 * d_xdd[1];
+    const real t548 = t546 + t547;
+    const real t549 = xdd[0] * t150;
+    const real t550 = t420 * d_xdd[0];
+    const real t551 = t549 + t550;
+    const real t552 = t548 + t551;
+    const real t553 = t545 + t552;
+    d_c[2] = t553;
+    const real t554 = Psi[2] * Psid[0];
+    const real t555 = Psi[0] * Psid[2];
+    const real t556 = t554 - t555;
+    const real t557 = Psid[0] * t556;
+    const real t558 = Psi[1] * Psid[2];
+    const real t559 = Psi[2] * Psid[1];
+    const real t560 = t558 - t559;
+    const real t561 = Psid[1] * t560;
+    const real t562 = t557 - t561;
+    const real t563 = t562 * t251;
+    const real t564 = t556 * d_Psid[0];
+    const real t565 = Psid[0] * d_Psi[2];
+    const real t566 = Psi[2] * d_Psid[0];
+    const real t567 = t565 + t566;
+    const real t568 = Psid[2] * d_Psi[0];
+    const real t569 = Psi[0] * d_Psid[2];
+    const real t570 = t568 + t569;
+    const real t571 = t567 - t570;
+    const real t572 = Psid[0] * t571;
+    const real t573 = t564 + t572;
+    const real t574 = t560 * d_Psid[1];
+    const real t575 = Psid[2] * d_Psi[1];
+    const real t576 = Psi[1] * d_Psid[2];
+    const real t577 = t575 + t576;
+    const real t578 = Psid[1] * d_Psi[2];
+    const real t579 = Psi[2] * d_Psid[1];
+    const real t580 = t578 + t579;
+    const real t581 = t577 - t580;
+    const real t582 = Psid[1] * t581;
+    const real t583 = t574 + t582;
+    const real t584 = t573 - t583;
+    const real t585 = t222 * t584;
+    const real t586 = t563 + t585;
+    const real t587 = Psi[0] * t556;
+    const real t588 = Psi[1] * t560;
+    const real t589 = t587 - t588;
+    const real t590 = t5 * 3.868170170630684e-22;
+    const real t591 = t590 + (-1.7615646957052136e-19);
+    const real t592 = t5 * t591;
+    const real t593 = t592 + 6.576508197299464e-17;
+    const real t594 = t5 * t593;
+    const real t595 = t594 + (-((real)1 / (real)50812489728000));
+    const real t596 = t5 * t595;
+    const real t597 = t596 + ((real)1 / (real)217945728000);
+    const real t598 = t5 * t597;
+    const real t599 = t598 + (-((real)1 / (real)1245404160));
+    const real t600 = t5 * t599;
+    const real t601 = t600 + ((real)1 / (real)9979200);
+    const real t602 = t5 * t601;
+    const real t603 = t602 + (-((real)1 / (real)120960));
+    const real t604 = t5 * t603;
+    const real t605 = t604 + ((real)1 / (real)2520);
+    const real t606 = t5 * t605;
+    const real t607 = (-((real)1 / (real)120)) + t606;
+    const real t608 = Psid[1] * d_Psi[1];
+    const real t609 = Psi[1] * d_Psid[1];
+    const real t610 = t608 + t609;
+    const real t611 = Psid[0] * d_Psi[0];
+    const real t612 = Psi[0] * d_Psid[0];
+    const real t613 = t611 + t612;
+    const real t614 = t610 + t613;
+    const real t615 = Psid[2] * d_Psi[2];
+    const real t616 = Psi[2] * d_Psid[2];
+    const real t617 = t615 + t616;
+    const real t618 = t614 + t617;
+    const real t619 = 2.0 * t618;
+    const real t620 = t607 * t619;
+    const real t621 = Psi[2] * Psid[2];
+    const real t622 = Psi[0] * Psid[0];
+    const real t623 = Psi[1] * Psid[1];
+    const real t624 = t622 + t623;
+    const real t625 = t621 + t624;
+    const real t626 = t625 * 2.0;
+    const real t627 = t605 * t31;
+    const real t628 = t603 * t31;
+    const real t629 = t601 * t31;
+    const real t630 = t599 * t31;
+    const real t631 = t597 * t31;
+    const real t632 = t595 * t31;
+    const real t633 = t593 * t31;
+    const real t634 = t591 * t31;
+    const real t635 = 3.868170170630684e-22 * t31;
+    const real t636 = t5 * t635;
+    const real t637 = t634 + t636;
+    const real t638 = t5 * t637;
+    const real t639 = t633 + t638;
+    const real t640 = t5 * t639;
+    const real t641 = t632 + t640;
+    const real t642 = t5 * t641;
+    const real t643 = t631 + t642;
+    const real t644 = t5 * t643;
+    const real t645 = t630 + t644;
+    const real t646 = t5 * t645;
+    const real t647 = t629 + t646;
+    const real t648 = t5 * t647;
+    const real t649 = t628 + t648;
+    const real t650 = t5 * t649;
+    const real t651 = t627 + t650;
+    const real t652 = t626 * t651;
+    const real t653 = t620 + t652;
+    const real t654 = t589 * t653;
+    const real t655 = t626 * t607;
+    const real t656 = t556 * d_Psi[0];
+    const real t657 = Psi[0] * t571;
+    const real t658 = t656 + t657;
+    const real t659 = t560 * d_Psi[1];
+    const real t660 = Psi[1] * t581;
+    const real t661 = t659 + t660;
+    const real t662 = t658 - t661;
+    const real t663 = t655 * t662;
+    const real t664 = t654 + t663;
+    const real t665 = t586 + t664;
+    const real t666 = t436 * d_Psidd[2];
+    const real t667 = Psidd[2] * t296;
+    const real t668 = t666 - t667;
+    const real t669 = t665 + t668;
+    const real t670 = t5 * 8.896791392450573e-21;
+    const real t671 = t670 + (-3.6992858609809485e-18);
+    const real t672 = t5 * t671;
+    const real t673 = t672 + ((real)1 / (real)800296713216000);
+    const real t674 = t5 * t673;
+    const real t675 = t674 + (-((real)1 / (real)2988969984000));
+    const real t676 = t5 * t675;
+    const real t677 = t676 + ((real)1 / (real)14529715200);
+    const real t678 = t5 * t677;
+    const real t679 = t678 + (-((real)1 / (real)95800320));
+    const real t680 = t5 * t679;
+    const real t681 = t680 + ((real)1 / (real)907200);
+    const real t682 = t5 * t681;
+    const real t683 = t682 + (-((real)1 / (real)13440));
+    const real t684 = t5 * t683;
+    const real t685 = t684 + ((real)1 / (real)360);
+    const real t686 = t5 * t685;
+    const real t687 = (-((real)1 / (real)24)) + t686;
+    const real t688 = t626 * t687;
+    const real t689 = Psid[1] * d_Psi[0];
+    const real t690 = Psi[0] * d_Psid[1];
+    const real t691 = t689 + t690;
+    const real t692 = Psid[0] * d_Psi[1];
+    const real t693 = Psi[1] * d_Psid[0];
+    const real t694 = t692 + t693;
+    const real t695 = t691 - t694;
+    const real t696 = t688 * t695;
+    const real t697 = Psi[0] * Psid[1];
+    const real t698 = Psi[1] * Psid[0];
+    const real t699 = t697 - t698;
+    const real t700 = t687 * t619;
+    const real t701 = t685 * t31;
+    const real t702 = t683 * t31;
+    const real t703 = t681 * t31;
+    const real t704 = t679 * t31;
+    const real t705 = t677 * t31;
+    const real t706 = t675 * t31;
+    const real t707 = t673 * t31;
+    const real t708 = t671 * t31;
+    const real t709 = 8.896791392450573e-21 * t31;
+    const real t710 = t5 * t709;
+    const real t711 = t708 + t710;
+    const real t712 = t5 * t711;
+    const real t713 = t707 + t712;
+    const real t714 = t5 * t713;
+    const real t715 = t706 + t714;
+    const real t716 = t5 * t715;
+    const real t717 = t705 + t716;
+    const real t718 = t5 * t717;
+    const real t719 = t704 + t718;
+    const real t720 = t5 * t719;
+    const real t721 = t703 + t720;
+    const real t722 = t5 * t721;
+    const real t723 = t702 + t722;
+    const real t724 = t5 * t723;
+    const real t725 = t701 + t724;
+    const real t726 = t626 * t725;
+    const real t727 = t700 + t726;
+    const real t728 = t699 * t727;
+    const real t729 = t696 + t728;
+    const real t730 = t669 - t729;
+    const real t731 = Psidd[1] * t279;
+    const real t732 = t450 * d_Psidd[1];
+    const real t733 = t731 + t732;
+    const real t734 = t730 + t733;
+    const real t735 = Psidd[0] * t257;
+    const real t736 = t462 * d_Psidd[0];
+    const real t737 = t735 + t736;
+    const real t738 = t734 + t737;
+    const real t739 = R_end[6] * t738;
+    const real t740 = Psid[2] * t560;
+    const real t741 = Psid[0] * t699;
+    const real t742 = t740 - t741;
+    const real t743 = t742 * t251;
+    const real t744 = t560 * d_Psid[2];
+    const real t745 = Psid[2] * t581;
+    const real t746 = t744 + t745;
+    const real t747 = t699 * d_Psid[0];
+    const real t748 = Psid[0] * t695;
+    const real t749 = t747 + t748;
+    const real t750 = t746 - t749;
+    const real t751 = t222 * t750;
+    const real t752 = t743 + t751;
+    const real t753 = Psi[2] * t560;
+    const real t754 = Psi[0] * t699;
+    const real t755 = t753 - t754;
+    const real t756 = t755 * t653;
+    const real t757 = t560 * d_Psi[2];
+    const real t758 = Psi[2] * t581;
+    const real t759 = t757 + t758;
+    const real t760 = t699 * d_Psi[0];
+    const real t761 = Psi[0] * t695;
+    const real t762 = t760 + t761;
+    const real t763 = t759 - t762;
+    const real t764 = t655 * t763;
+    const real t765 = t756 + t764;
+    const real t766 = t752 + t765;
+    const real t767 = t447 * d_Psidd[1];
+    const real t768 = Psidd[1] * t285;
+    const real t769 = t767 - t768;
+    const real t770 = t766 + t769;
+    const real t771 = t688 * t571;
+    const real t772 = t556 * t727;
+    const real t773 = t771 + t772;
+    const real t774 = t770 - t773;
+    const real t775 = Psidd[2] * t289;
+    const real t776 = t432 * d_Psidd[2];
+    const real t777 = t775 + t776;
+    const real t778 = t774 + t777;
+    const real t779 = Psidd[0] * t265;
+    const real t780 = t459 * d_Psidd[0];
+    const real t781 = t779 + t780;
+    const real t782 = t778 + t781;
+    const real t783 = R_end[3] * t782;
+    const real t784 = Psid[1] * t699;
+    const real t785 = Psid[2] * t556;
+    const real t786 = t784 - t785;
+    const real t787 = t786 * t251;
+    const real t788 = t699 * d_Psid[1];
+    const real t789 = Psid[1] * t695;
+    const real t790 = t788 + t789;
+    const real t791 = t556 * d_Psid[2];
+    const real t792 = Psid[2] * t571;
+    const real t793 = t791 + t792;
+    const real t794 = t790 - t793;
+    const real t795 = t222 * t794;
+    const real t796 = t787 + t795;
+    const real t797 = Psi[1] * t699;
+    const real t798 = Psi[2] * t556;
+    const real t799 = t797 - t798;
+    const real t800 = t799 * t653;
+    const real t801 = t699 * d_Psi[1];
+    const real t802 = Psi[1] * t695;
+    const real t803 = t801 + t802;
+    const real t804 = t556 * d_Psi[2];
+    const real t805 = Psi[2] * t571;
+    const real t806 = t804 + t805;
+    const real t807 = t803 - t806;
+    const real t808 = t655 * t807;
+    const real t809 = t800 + t808;
+    const real t810 = t796 + t809;
+    const real t811 = t457 * d_Psidd[0];
+    const real t812 = Psidd[0] * t269;
+    const real t813 = t811 - t812;
+    const real t814 = t810 + t813;
+    const real t815 = t560 * t727;
+    const real t816 = t688 * t581;
+    const real t817 = t815 + t816;
+    const real t818 = t814 - t817;
+    const real t819 = Psidd[1] * t281;
+    const real t820 = t444 * d_Psidd[1];
+    const real t821 = t819 + t820;
+    const real t822 = t818 + t821;
+    const real t823 = Psidd[2] * t291;
+    const real t824 = t428 * d_Psidd[2];
+    const real t825 = t823 + t824;
+    const real t826 = t822 + t825;
+    const real t827 = R_end[0] * t826;
+    const real t828 = t783 + t827;
+    const real t829 = t739 + t828;
+    d_c[3] = t829;
+    const real t830 = R_end[7] * t738;
+    const real t831 = R_end[4] * t782;
+    const real t832 = R_end[1] * t826;
+    const real t833 = t831 + t832;
+    const real t834 = t830 + t833;
+    d_c[4] = t834;
+    const real t835 = R_end[8] * t738;
+    const real t836 = R_end[5] * t782;
+    const real t837 = R_end[2] * t826;
+    const real t838 = t836 + t837;
+    const real t839 = t835 + t838;
+    d_c[5] = t839;
+    return 0;
+}
+
+static int mstmm_sweep_modal_outward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_modal_outward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
+}
+
+static const mstmm_port mstmm_sweep_modal_outward_slope_inputs[] = {
+    {"R_end", 9, "", 0, 0},
+    {"x", 3, "m", 0, 0},
+    {"Psi", 3, "rad", 0, 0},
+    {"xd", 3, "m/s", 0, 0},
+    {"Psid", 3, "rad/s", 0, 0},
+    {"xdd", 3, "m/s2", 0, 0},
+    {"Psidd", 3, "rad/s2", 0, 0},
+    {"d_x", 3, "m", 0, 0},
+    {"d_Psi", 3, "rad", 0, 0},
+    {"d_xd", 3, "m/s", 0, 0},
+    {"d_Psid", 3, "rad/s", 0, 0},
+    {"d_xdd", 3, "m/s2", 0, 0},
+    {"d_Psidd", 3, "rad/s2", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_outward_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H6", 36, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+};
+
+/* inward and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  R_end[3][3] rotation, end axes to section axes
+ * in  x[3] (m) section point from o, frame axes
+ * in  Psi[3] (rad) rotation vector of the section, frame axes
+ * in  xd[3] (m/s) rate of x
+ * in  Psid[3] (rad/s) rate of Psi
+ * in  xdd[3] (m/s2) second rate of x at etadd = 0
+ * in  Psidd[3] (rad/s2) second rate of Psi at etadd = 0
+ * in  d_x[3] (m) derivative of x
+ * in  d_Psi[3] (rad) derivative of Psi
+ * in  d_xd[3] (m/s) derivative of xd
+ * in  d_Psid[3] (rad/s) derivative of Psid
+ * in  d_xdd[3] (m/s2) derivative of xdd
+ * in  d_Psidd[3] (rad/s2) derivative of Psidd
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H6[6][6] derivative of H6
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ */
+int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
+    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
+    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
+    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
+    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
+    real *restrict d_c)
+{
+    (void)xdd;
+    const real t0 = Psi[2] * Psi[0];
+    const real t1 = Psi[2] * Psi[2];
+    const real t2 = Psi[0] * Psi[0];
+    const real t3 = Psi[1] * Psi[1];
+    const real t4 = t2 + t3;
+    const real t5 = t1 + t4;
+    const real t6 = t5 * 8.896791392450574e-22;
+    const real t7 = t6 + (-4.110317623312165e-19);
+    const real t8 = t5 * t7;
+    const real t9 = t8 + ((real)1 / (real)6402373705728000);
+    const real t10 = t5 * t9;
+    const real t11 = t10 + (-((real)1 / (real)20922789888000));
+    const real t12 = t5 * t11;
+    const real t13 = t12 + ((real)1 / (real)87178291200);
+    const real t14 = t5 * t13;
+    const real t15 = t14 + (-((real)1 / (real)479001600));
+    const real t16 = t5 * t15;
+    const real t17 = t16 + ((real)1 / (real)3628800);
+    const real t18 = t5 * t17;
+    const real t19 = t18 + (-((real)1 / (real)40320));
+    const real t20 = t5 * t19;
+    const real t21 = t20 + ((real)1 / (real)720);
+    const real t22 = t5 * t21;
+    const real t23 = t22 + (-((real)1 / (real)24));
+    const real t24 = Psi[1] * d_Psi[1];
+    const real t25 = t24 + t24;
+    const real t26 = Psi[0] * d_Psi[0];
+    const real t27 = t26 + t26;
+    const real t28 = t25 + t27;
+    const real t29 = Psi[2] * d_Psi[2];
+    const real t30 = t29 + t29;
+    const real t31 = t28 + t30;
+    const real t32 = t23 * t31;
+    const real t33 = t21 * t31;
+    const real t34 = t19 * t31;
+    const real t35 = t17 * t31;
+    const real t36 = t15 * t31;
+    const real t37 = t13 * t31;
+    const real t38 = t11 * t31;
+    const real t39 = t9 * t31;
+    const real t40 = t7 * t31;
+    const real t41 = 8.896791392450574e-22 * t31;
+    const real t42 = t5 * t41;
+    const real t43 = t40 + t42;
+    const real t44 = t5 * t43;
+    const real t45 = t39 + t44;
+    const real t46 = t5 * t45;
+    const real t47 = t38 + t46;
+    const real t48 = t5 * t47;
+    const real t49 = t37 + t48;
+    const real t50 = t5 * t49;
+    const real t51 = t36 + t50;
+    const real t52 = t5 * t51;
+    const real t53 = t35 + t52;
+    const real t54 = t5 * t53;
+    const real t55 = t34 + t54;
+    const real t56 = t5 * t55;
+    const real t57 = t33 + t56;
+    const real t58 = t5 * t57;
+    const real t59 = t32 + t58;
+    const real t60 = t0 * t59;
+    const real t61 = t5 * t23;
+    const real t62 = t61 + 0.5;
+    const real t63 = Psi[0] * d_Psi[2];
+    const real t64 = Psi[2] * d_Psi[0];
+    const real t65 = t63 + t64;
+    const real t66 = t62 * t65;
+    const real t67 = t60 + t66;
+    const real t68 = t5 * 1.9572941063391263e-20;
+    const real t69 = t68 + (-8.22063524662433e-18);
+    const real t70 = t5 * t69;
+    const real t71 = t70 + ((real)1 / (real)355687428096000);
+    const real t72 = t5 * t71;
+    const real t73 = t72 + (-((real)1 / (real)1307674368000));
+    const real t74 = t5 * t73;
+    const real t75 = t74 + ((real)1 / (real)6227020800);
+    const real t76 = t5 * t75;
+    const real t77 = t76 + (-((real)1 / (real)39916800));
+    const real t78 = t5 * t77;
+    const real t79 = t78 + ((real)1 / (real)362880);
+    const real t80 = t5 * t79;
+    const real t81 = t80 + (-((real)1 / (real)5040));
+    const real t82 = t5 * t81;
+    const real t83 = t82 + ((real)1 / (real)120);
+    const real t84 = t5 * t83;
+    const real t85 = t84 + (-((real)1 / (real)6));
+    const real t86 = t5 * t85;
+    const real t87 = 1.0 + t86;
+    const real t88 = t87 * d_Psi[1];
+    const real t89 = t85 * t31;
+    const real t90 = t83 * t31;
+    const real t91 = t81 * t31;
+    const real t92 = t79 * t31;
+    const real t93 = t77 * t31;
+    const real t94 = t75 * t31;
+    const real t95 = t73 * t31;
+    const real t96 = t71 * t31;
+    const real t97 = t69 * t31;
+    const real t98 = 1.9572941063391263e-20 * t31;
+    const real t99 = t5 * t98;
+    const real t100 = t97 + t99;
+    const real t101 = t5 * t100;
+    const real t102 = t96 + t101;
+    const real t103 = t5 * t102;
+    const real t104 = t95 + t103;
+    const real t105 = t5 * t104;
+    const real t106 = t94 + t105;
+    const real t107 = t5 * t106;
+    const real t108 = t93 + t107;
+    const real t109 = t5 * t108;
+    const real t110 = t92 + t109;
+    const real t111 = t5 * t110;
+    const real t112 = t91 + t111;
+    const real t113 = t5 * t112;
+    const real t114 = t90 + t113;
+    const real t115 = t5 * t114;
+    const real t116 = t89 + t115;
+    const real t117 = Psi[1] * t116;
+    const real t118 = t88 + t117;
+    const real t119 = t67 + t118;
+    const real t120 = R_end[6] * t119;
+    const real t121 = Psi[0] * Psi[1];
+    const real t122 = t121 * t59;
+    const real t123 = Psi[1] * d_Psi[0];
+    const real t124 = Psi[0] * d_Psi[1];
+    const real t125 = t123 + t124;
+    const real t126 = t62 * t125;
+    const real t127 = t122 + t126;
+    const real t128 = t87 * d_Psi[2];
+    const real t129 = Psi[2] * t116;
+    const real t130 = t128 + t129;
+    const real t131 = t127 - t130;
+    const real t132 = R_end[3] * t131;
+    const real t133 = t1 + t3;
+    const real t134 = t133 * t59;
+    const real t135 = t25 + t30;
+    const real t136 = t62 * t135;
+    const real t137 = t134 + t136;
+    const real t138 = R_end[0] * t137;
+    const real t139 = t132 - t138;
+    const real t140 = t120 + t139;
+    d_R[0] = t140;
+    const real t141 = Psi[2] * Psi[1];
+    const real t142 = t141 * t59;
+    const real t143 = Psi[1] * d_Psi[2];
+    const real t144 = Psi[2] * d_Psi[1];
+    const real t145 = t143 + t144;
+    const real t146 = t62 * t145;
+    const real t147 = t142 + t146;
+    const real t148 = t87 * d_Psi[0];
+    const real t149 = Psi[0] * t116;
+    const real t150 = t148 + t149;
+    const real t151 = t147 - t150;
+    const real t152 = R_end[6] * t151;
+    const real t153 = t130 + t127;
+    const real t154 = R_end[0] * t153;
+    const real t155 = t1 + t2;
+    const real t156 = t155 * t59;
+    const real t157 = t27 + t30;
+    const real t158 = t62 * t157;
+    const real t159 = t156 + t158;
+    const real t160 = R_end[3] * t159;
+    const real t161 = t154 - t160;
+    const real t162 = t152 + t161;
+    d_R[1] = t162;
+    const real t163 = t150 + t147;
+    const real t164 = R_end[3] * t163;
+    const real t165 = t67 - t118;
+    const real t166 = R_end[0] * t165;
+    const real t167 = t164 + t166;
+    const real t168 = t62 * t28;
+    const real t169 = t4 * t59;
+    const real t170 = t168 + t169;
+    const real t171 = R_end[6] * t170;
+    const real t172 = t167 - t171;
+    d_R[2] = t172;
+    const real t173 = R_end[7] * t119;
+    const real t174 = R_end[4] * t131;
+    const real t175 = R_end[1] * t137;
+    const real t176 = t174 - t175;
+    const real t177 = t173 + t176;
+    d_R[3] = t177;
+    const real t178 = R_end[7] * t151;
+    const real t179 = R_end[1] * t153;
+    const real t180 = R_end[4] * t159;
+    const real t181 = t179 - t180;
+    const real t182 = t178 + t181;
+    d_R[4] = t182;
+    const real t183 = R_end[4] * t163;
+    const real t184 = R_end[1] * t165;
+    const real t185 = t183 + t184;
+    const real t186 = R_end[7] * t170;
+    const real t187 = t185 - t186;
+    d_R[5] = t187;
+    const real t188 = R_end[8] * t119;
+    const real t189 = R_end[5] * t131;
+    const real t190 = R_end[2] * t137;
+    const real t191 = t189 - t190;
+    const real t192 = t188 + t191;
+    d_R[6] = t192;
+    const real t193 = R_end[8] * t151;
+    const real t194 = R_end[2] * t153;
+    const real t195 = R_end[5] * t159;
+    const real t196 = t194 - t195;
+    const real t197 = t193 + t196;
+    d_R[7] = t197;
+    const real t198 = R_end[5] * t163;
+    const real t199 = R_end[2] * t165;
+    const real t200 = t198 + t199;
+    const real t201 = R_end[8] * t170;
+    const real t202 = t200 - t201;
+    d_R[8] = t202;
+    const real t203 = x[2] * t172;
+    const real t204 = t62 * t0;
+    const real t205 = Psi[1] * t87;
+    const real t206 = t204 - t205;
+    const real t207 = R_end[0] * t206;
+    const real t208 = t62 * t141;
+    const real t209 = Psi[0] * t87;
+    const real t210 = t208 + t209;
+    const real t211 = R_end[3] * t210;
+    const real t212 = t207 + t211;
+    const real t213 = t4 * t62;
+    const real t214 = 1.0 - t213;
+    const real t215 = R_end[6] * t214;
+    const real t216 = t212 + t215;
+    const real t217 = t216 * d_x[2];
+    const real t218 = t203 + t217;
+    const real t219 = x[1] * t162;
+    const real t220 = t62 * t121;
+    const real t221 = Psi[2] * t87;
+    const real t222 = t220 + t221;
+    const real t223 = R_end[0] * t222;
+    const real t224 = t62 * t155;
+    const real t225 = 1.0 - t224;
+    const real t226 = R_end[3] * t225;
+    const real t227 = t223 + t226;
+    const real t228 = t208 - t209;
+    const real t229 = R_end[6] * t228;
+    const real t230 = t227 + t229;
+    const real t231 = t230 * d_x[1];
+    const real t232 = t219 + t231;
+    const real t233 = x[0] * t140;
+    const real t234 = t62 * t133;
+    const real t235 = 1.0 - t234;
+    const real t236 = t235 * R_end[0];
+    const real t237 = t220 - t221;
+    const real t238 = t237 * R_end[3];
+    const real t239 = t236 + t238;
+    const real t240 = t205 + t204;
+    const real t241 = t240 * R_end[6];
+    const real t242 = t239 + t241;
+    const real t243 = t242 * d_x[0];
+    const real t244 = t233 + t243;
+    const real t245 = t232 + t244;
+    const real t246 = t218 + t245;
+    const real t247 = -t246;
+    d_d[0] = t247;
+    const real t248 = x[2] * t187;
+    const real t249 = t206 * R_end[1];
+    const real t250 = t210 * R_end[4];
+    const real t251 = t249 + t250;
+    const real t252 = t214 * R_end[7];
+    const real t253 = t251 + t252;
+    const real t254 = t253 * d_x[2];
+    const real t255 = t248 + t254;
+    const real t256 = x[1] * t182;
+    const real t257 = t222 * R_end[1];
+    const real t258 = t225 * R_end[4];
+    const real t259 = t257 + t258;
+    const real t260 = t228 * R_end[7];
+    const real t261 = t259 + t260;
+    const real t262 = t261 * d_x[1];
+    const real t263 = t256 + t262;
+    const real t264 = x[0] * t177;
+    const real t265 = t235 * R_end[1];
+    const real t266 = t237 * R_end[4];
+    const real t267 = t265 + t266;
+    const real t268 = t240 * R_end[7];
+    const real t269 = t267 + t268;
+    const real t270 = t269 * d_x[0];
+    const real t271 = t264 + t270;
+    const real t272 = t263 + t271;
+    const real t273 = t255 + t272;
+    const real t274 = -t273;
+    d_d[1] = t274;
+    const real t275 = x[2] * t202;
+    const real t276 = t206 * R_end[2];
+    const real t277 = t210 * R_end[5];
+    const real t278 = t276 + t277;
+    const real t279 = t214 * R_end[8];
+    const real t280 = t278 + t279;
+    const real t281 = t280 * d_x[2];
+    const real t282 = t275 + t281;
+    const real t283 = x[1] * t197;
+    const real t284 = t222 * R_end[2];
+    const real t285 = t225 * R_end[5];
+    const real t286 = t284 + t285;
+    const real t287 = t228 * R_end[8];
+    const real t288 = t286 + t287;
+    const real t289 = t288 * d_x[1];
+    const real t290 = t283 + t289;
+    const real t291 = x[0] * t192;
+    const real t292 = t235 * R_end[2];
+    const real t293 = t237 * R_end[5];
+    const real t294 = t292 + t293;
+    const real t295 = t240 * R_end[8];
+    const real t296 = t294 + t295;
+    const real t297 = t296 * d_x[0];
+    const real t298 = t291 + t297;
+    const real t299 = t290 + t298;
+    const real t300 = t282 + t299;
+    const real t301 = -t300;
+    d_d[2] = t301;
+    d_H6[0] = 0.0;
+    d_H6[1] = 0.0;
+    d_H6[2] = 0.0;
+    const real t302 = Psi[2] * t62;
+    const real t303 = t5 * 3.868170170630684e-23;
+    const real t304 = t303 + (-1.9572941063391263e-20);
+    const real t305 = t5 * t304;
+    const real t306 = t305 + 8.22063524662433e-18;
+    const real t307 = t5 * t306;
+    const real t308 = t307 + (-((real)1 / (real)355687428096000));
+    const real t309 = t5 * t308;
+    const real t310 = t309 + ((real)1 / (real)1307674368000);
+    const real t311 = t5 * t310;
+    const real t312 = t311 + (-((real)1 / (real)6227020800));
+    const real t313 = t5 * t312;
+    const real t314 = t313 + ((real)1 / (real)39916800);
+    const real t315 = t5 * t314;
+    const real t316 = t315 + (-((real)1 / (real)362880));
+    const real t317 = t5 * t316;
+    const real t318 = t317 + ((real)1 / (real)5040);
+    const real t319 = t5 * t318;
+    const real t320 = t319 + (-((real)1 / (real)120));
+    const real t321 = t5 * t320;
+    const real t322 = t321 + ((real)1 / (real)6);
+    const real t323 = t121 * t322;
+    const real t324 = t302 + t323;
+    const real t325 = t324 * d_x[2];
+    const real t326 = t322 * t125;
+    const real t327 = t320 * t31;
+    const real t328 = t318 * t31;
+    const real t329 = t316 * t31;
+    const real t330 = t314 * t31;
+    const real t331 = t312 * t31;
+    const real t332 = t310 * t31;
+    const real t333 = t308 * t31;
+    const real t334 = t306 * t31;
+    const real t335 = t304 * t31;
+    const real t336 = 3.868170170630684e-23 * t31;
+    const real t337 = t5 * t336;
+    const real t338 = t335 + t337;
+    const real t339 = t5 * t338;
+    const real t340 = t334 + t339;
+    const real t341 = t5 * t340;
+    const real t342 = t333 + t341;
+    const real t343 = t5 * t342;
+    const real t344 = t332 + t343;
+    const real t345 = t5 * t344;
+    const real t346 = t331 + t345;
+    const real t347 = t5 * t346;
+    const real t348 = t330 + t347;
+    const real t349 = t5 * t348;
+    const real t350 = t329 + t349;
+    const real t351 = t5 * t350;
+    const real t352 = t328 + t351;
+    const real t353 = t5 * t352;
+    const real t354 = t327 + t353;
+    const real t355 = t121 * t354;
+    const real t356 = t326 + t355;
+    const real t357 = t62 * d_Psi[2];
+    const real t358 = Psi[2] * t59;
+    const real t359 = t357 + t358;
+    const real t360 = t356 + t359;
+    const real t361 = x[2] * t360;
+    const real t362 = t325 + t361;
+    const real t363 = t0 * t322;
+    const real t364 = Psi[1] * t62;
+    const real t365 = t363 - t364;
+    const real t366 = t365 * d_x[1];
+    const real t367 = t322 * t65;
+    const real t368 = t0 * t354;
+    const real t369 = t367 + t368;
+    const real t370 = t62 * d_Psi[1];
+    const real t371 = Psi[1] * t59;
+    const real t372 = t370 + t371;
+    const real t373 = t369 - t372;
+    const real t374 = x[1] * t373;
+    const real t375 = t366 + t374;
+    const real t376 = t362 - t375;
+    d_H6[3] = t376;
+    const real t377 = t155 * t322;
+    const real t378 = 1.0 - t377;
+    const real t379 = t378 * d_x[2];
+    const real t380 = t322 * t157;
+    const real t381 = t155 * t354;
+    const real t382 = t380 + t381;
+    const real t383 = x[2] * t382;
+    const real t384 = t379 - t383;
+    const real t385 = Psi[0] * t62;
+    const real t386 = t141 * t322;
+    const real t387 = t385 + t386;
+    const real t388 = t387 * d_x[1];
+    const real t389 = t322 * t145;
+    const real t390 = t141 * t354;
+    const real t391 = t389 + t390;
+    const real t392 = t62 * d_Psi[0];
+    const real t393 = Psi[0] * t59;
+    const real t394 = t392 + t393;
+    const real t395 = t391 + t394;
+    const real t396 = x[1] * t395;
+    const real t397 = t388 + t396;
+    const real t398 = t384 - t397;
+    d_H6[4] = t398;
+    const real t399 = t386 - t385;
+    const real t400 = t399 * d_x[2];
+    const real t401 = t391 - t394;
+    const real t402 = x[2] * t401;
+    const real t403 = t400 + t402;
+    const real t404 = t4 * t322;
+    const real t405 = 1.0 - t404;
+    const real t406 = t405 * d_x[1];
+    const real t407 = t322 * t28;
+    const real t408 = t4 * t354;
+    const real t409 = t407 + t408;
+    const real t410 = x[1] * t409;
+    const real t411 = t406 - t410;
+    const real t412 = t403 - t411;
+    d_H6[5] = t412;
+    d_H6[6] = 0.0;
+    d_H6[7] = 0.0;
+    d_H6[8] = 0.0;
+    const real t413 = t365 * d_x[0];
+    const real t414 = x[0] * t373;
+    const real t415 = t413 + t414;
+    const real t416 = t133 * t322;
+    const real t417 = 1.0 - t416;
+    const real t418 = t417 * d_x[2];
+    const real t419 = t322 * t135;
+    const real t420 = t133 * t354;
+    const real t421 = t419 + t420;
+    const real t422 = x[2] * t421;
+    const real t423 = t418 - t422;
+    const real t424 = t415 - t423;
+    d_H6[9] = t424;
+    const real t425 = t387 * d_x[0];
+    const real t426 = x[0] * t395;
+    const real t427 = t425 + t426;
+    const real t428 = t323 - t302;
+    const real t429 = t428 * d_x[2];
+    const real t430 = t356 - t359;
+    const real t431 = x[2] * t430;
+    const real t432 = t429 + t431;
+    const real t433 = t427 - t432;
+    d_H6[10] = t433;
+    const real t434 = t405 * d_x[0];
+    const real t435 = x[0] * t409;
+    const real t436 = t434 - t435;
+    const real t437 = t363 + t364;
+    const real t438 = t437 * d_x[2];
+    const real t439 = t372 + t369;
+    const real t440 = x[2] * t439;
+    const real t441 = t438 + t440;
+    const real t442 = t436 - t441;
+    d_H6[11] = t442;
+    d_H6[12] = 0.0;
+    d_H6[13] = 0.0;
+    d_H6[14] = 0.0;
+    const real t443 = t417 * d_x[1];
+    const real t444 = x[1] * t421;
+    const real t445 = t443 - t444;
+    const real t446 = t324 * d_x[0];
+    const real t447 = x[0] * t360;
+    const real t448 = t446 + t447;
+    const real t449 = t445 - t448;
+    d_H6[15] = t449;
+    const real t450 = t428 * d_x[1];
+    const real t451 = x[1] * t430;
+    const real t452 = t450 + t451;
+    const real t453 = t378 * d_x[0];
+    const real t454 = x[0] * t382;
+    const real t455 = t453 - t454;
+    const real t456 = t452 - t455;
+    d_H6[16] = t456;
+    const real t457 = t437 * d_x[1];
+    const real t458 = x[1] * t439;
+    const real t459 = t457 + t458;
+    const real t460 = t399 * d_x[0];
+    const real t461 = x[0] * t401;
+    const real t462 = t460 + t461;
+    const real t463 = t459 - t462;
+    d_H6[17] = t463;
+    d_H6[18] = 0.0;
+    d_H6[19] = 0.0;
+    d_H6[20] = 0.0;
+    d_H6[21] = t421;
+    const real t464 = -t430;
+    d_H6[22] = t464;
+    const real t465 = -t439;
+    d_H6[23] = t465;
+    d_H6[24] = 0.0;
+    d_H6[25] = 0.0;
+    d_H6[26] = 0.0;
+    const real t466 = -t360;
+    d_H6[27] = t466;
+    d_H6[28] = t382;
+    const real t467 = -t401;
+    d_H6[29] = t467;
+    d_H6[30] = 0.0;
+    d_H6[31] = 0.0;
+    d_H6[32] = 0.0;
+    const real t468 = -t373;
+    d_H6[33] = t468;
+    const real t469 = -t395;
+    d_H6[34] = t469;
+    d_H6[35] = t409;
+    const real t470 = Psid[2] * t412;
+    const real t471 = x[2] * t399;
+    const real t472 = x[1] * t405;
+    const real t473 = t471 - t472;
+    const real t474 = t473 * d_Psid[2];
+    const real t475 = t470 + t474;
+    const real t476 = Psid[1] * t398;
+    const real t477 = x[2] * t378;
+    const real t478 = x[1] * t387;
+    const real t479 = t477 - t478;
+    const real t480 = t479 * d_Psid[1];
+    const real t481 = t476 + t480;
+    const real t482 = Psid[0] * t376;
+    const real t483 = x[2] * t324;
+    const real t484 = x[1] * t365;
+    const real t485 = t483 - t484;
+    const real t486 = t485 * d_Psid[0];
+    const real t487 = t482 + t486;
+    const real t488 = t487 - d_xd[0];
+    const real t489 = t481 + t488;
+    const real t490 = t475 + t489;
+    d_v[0] = t490;
+    const real t491 = Psid[2] * t442;
+    const real t492 = x[0] * t405;
+    const real t493 = x[2] * t437;
+    const real t494 = t492 - t493;
+    const real t495 = t494 * d_Psid[2];
+    const real t496 = t491 + t495;
+    const real t497 = Psid[1] * t433;
+    const real t498 = x[0] * t387;
+    const real t499 = x[2] * t428;
+    const real t500 = t498 - t499;
+    const real t501 = t500 * d_Psid[1];
+    const real t502 = t497 + t501;
+    const real t503 = Psid[0] * t424;
+    const real t504 = x[0] * t365;
+    const real t505 = x[2] * t417;
+    const real t506 = t504 - t505;
+    const real t507 = t506 * d_Psid[0];
+    const real t508 = t503 + t507;
+    const real t509 = t508 - d_xd[1];
+    const real t510 = t502 + t509;
+    const real t511 = t496 + t510;
+    d_v[1] = t511;
+    const real t512 = Psid[2] * t463;
+    const real t513 = x[1] * t437;
+    const real t514 = x[0] * t399;
+    const real t515 = t513 - t514;
+    const real t516 = t515 * d_Psid[2];
+    const real t517 = t512 + t516;
+    const real t518 = Psid[1] * t456;
+    const real t519 = x[1] * t428;
+    const real t520 = x[0] * t378;
+    const real t521 = t519 - t520;
+    const real t522 = t521 * d_Psid[1];
+    const real t523 = t518 + t522;
+    const real t524 = Psid[0] * t449;
+    const real t525 = x[1] * t417;
+    const real t526 = x[0] * t324;
+    const real t527 = t525 - t526;
+    const real t528 = t527 * d_Psid[0];
+    const real t529 = t524 + t528;
+    const real t530 = t529 - d_xd[2];
+    const real t531 = t523 + t530;
+    const real t532 = t517 + t531;
+    d_v[2] = t532;
+    const real t533 = Psid[0] * t421;
+    const real t534 = (-1.0) + t416;
+    const real t535 = t534 * d_Psid[0];
+    const real t536 = t533 + t535;
+    const real t537 = Psid[1] * t430;
+    const real t538 = t428 * d_Psid[1];
+    const real t539 = t537 + t538;
+    const real t540 = t536 - t539;
+    const real t541 = Psid[2] * t439;
+    const real t542 = t437 * d_Psid[2];
+    const real t543 = t541 + t542;
+    const real t544 = t540 - t543;
+    d_w[0] = t544;
+    const real t545 = Psid[1] * t382;
+    const real t546 = (-1.0) + t377;
+    const real t547 = t546 * d_Psid[1];
+    const real t548 = t545 + t547;
+    const real t549 = Psid[0] * t360;
+    const real t550 = t324 * d_Psid[0];
+    const real t551 = t549 + t550;
+    const real t552 = t548 - t551;
+    const real t553 = Psid[2] * t401;
+    const real t554 = t399 * d_Psid[2];
+    const real t555 = t553 + t554;
+    const real t556 = t552 - t555;
+    d_w[1] = t556;
+    const real t557 = Psid[2] * t409;
+    const real t558 = (-1.0) + t404;
+    const real t559 = t558 * d_Psid[2];
+    const real t560 = t557 + t559;
+    const real t561 = Psid[1] * t395;
+    const real t562 = t387 * d_Psid[1];
+    const real t563 = t561 + t562;
+    const real t564 = Psid[0] * t373;
+    const real t565 = t365 * d_Psid[0];
+    const real t566 = t564 + t565;
+    const real t567 = t563 + t566;
+    const real t568 = t560 - t567;
+    d_w[2] = t568;
+    const real t569 = t558 * Psid[2];
+    const real t570 = t365 * Psid[0];
+    const real t571 = t387 * Psid[1];
+    const real t572 = t570 + t571;
+    const real t573 = t569 - t572;
+    const real t574 = t573 * d_xd[1];
+    const real t575 = xd[1] * t568;
+    const real t576 = t574 + t575;
+    const real t577 = 2.0 * t576;
+    const real t578 = t546 * Psid[1];
+    const real t579 = t324 * Psid[0];
+    const real t580 = t578 - t579;
+    const real t581 = t399 * Psid[2];
+    const real t582 = t580 - t581;
+    const real t583 = x[0] * t582;
+    const real t584 = t534 * Psid[0];
+    const real t585 = t428 * Psid[1];
+    const real t586 = t584 - t585;
+    const real t587 = t437 * Psid[2];
+    const real t588 = t586 - t587;
+    const real t589 = x[1] * t588;
+    const real t590 = t583 - t589;
+    const real t591 = t590 * t556;
+    const real t592 = t582 * d_x[0];
+    const real t593 = x[0] * t556;
+    const real t594 = t592 + t593;
+    const real t595 = t588 * d_x[1];
+    const real t596 = x[1] * t544;
+    const real t597 = t595 + t596;
+    const real t598 = t594 - t597;
+    const real t599 = t582 * t598;
+    const real t600 = t591 + t599;
+    const real t601 = x[2] * t588;
+    const real t602 = x[0] * t573;
+    const real t603 = t601 - t602;
+    const real t604 = t603 * t568;
+    const real t605 = t588 * d_x[2];
+    const real t606 = x[2] * t544;
+    const real t607 = t605 + t606;
+    const real t608 = t573 * d_x[0];
+    const real t609 = x[0] * t568;
+    const real t610 = t608 + t609;
+    const real t611 = t607 - t610;
+    const real t612 = t573 * t611;
+    const real t613 = t604 + t612;
+    const real t614 = t600 - t613;
+    const real t615 = t582 * d_xd[2];
+    const real t616 = xd[2] * t556;
+    const real t617 = t615 + t616;
+    const real t618 = 2.0 * t617;
+    const real t619 = t614 - t618;
+    const real t620 = t577 + t619;
+    const real t621 = t324 * Psidd[0];
+    const real t622 = t399 * Psidd[2];
+    const real t623 = t5 * 8.896791392450573e-21;
+    const real t624 = t623 + (-3.6992858609809485e-18);
+    const real t625 = t5 * t624;
+    const real t626 = t625 + ((real)1 / (real)800296713216000);
+    const real t627 = t5 * t626;
+    const real t628 = t627 + (-((real)1 / (real)2988969984000));
+    const real t629 = t5 * t628;
+    const real t630 = t629 + ((real)1 / (real)14529715200);
+    const real t631 = t5 * t630;
+    const real t632 = t631 + (-((real)1 / (real)95800320));
+    const real t633 = t5 * t632;
+    const real t634 = t633 + ((real)1 / (real)907200);
+    const real t635 = t5 * t634;
+    const real t636 = t635 + (-((real)1 / (real)13440));
+    const real t637 = t5 * t636;
+    const real t638 = t637 + ((real)1 / (real)360);
+    const real t639 = t5 * t638;
+    const real t640 = (-((real)1 / (real)24)) + t639;
+    const real t641 = Psi[2] * Psid[2];
+    const real t642 = Psi[0] * Psid[0];
+    const real t643 = Psi[1] * Psid[1];
+    const real t644 = t642 + t643;
+    const real t645 = t641 + t644;
+    const real t646 = t645 * 2.0;
+    const real t647 = t640 * t646;
+    const real t648 = Psi[2] * Psid[0];
+    const real t649 = Psi[0] * Psid[2];
+    const real t650 = t648 - t649;
+    const real t651 = t647 * t650;
+    const real t652 = t378 * Psidd[1];
+    const real t653 = t5 * 3.868170170630684e-22;
+    const real t654 = t653 + (-1.7615646957052136e-19);
+    const real t655 = t5 * t654;
+    const real t656 = t655 + 6.576508197299464e-17;
+    const real t657 = t5 * t656;
+    const real t658 = t657 + (-((real)1 / (real)50812489728000));
+    const real t659 = t5 * t658;
+    const real t660 = t659 + ((real)1 / (real)217945728000);
+    const real t661 = t5 * t660;
+    const real t662 = t661 + (-((real)1 / (real)1245404160));
+    const real t663 = t5 * t662;
+    const real t664 = t663 + ((real)1 / (real)9979200);
+    const real t665 = t5 * t664;
+    const real t666 = t665 + (-((real)1 / (real)120960));
+    const real t667 = t5 * t666;
+    const real t668 = t667 + ((real)1 / (real)2520);
+    const real t669 = t5 * t668;
+    const real t670 = (-((real)1 / (real)120)) + t669;
+    const real t671 = t646 * t670;
+    const real t672 = Psi[1] * Psid[2];
+    const real t673 = Psi[2] * Psid[1];
+    const real t674 = t672 - t673;
+    const real t675 = Psi[2] * t674;
+    const real t676 = Psi[0] * Psid[1];
+    const real t677 = Psi[1] * Psid[0];
+    const real t678 = t676 - t677;
+    const real t679 = Psi[0] * t678;
+    const real t680 = t675 - t679;
+    const real t681 = t671 * t680;
+    const real t682 = Psid[2] * t674;
+    const real t683 = Psid[0] * t678;
+    const real t684 = t682 - t683;
+    const real t685 = t322 * t684;
+    const real t686 = t681 + t685;
+    const real t687 = t652 + t686;
+    const real t688 = t651 + t687;
+    const real t689 = t622 + t688;
+    const real t690 = t621 + t689;
+    const real t691 = t690 * d_x[2];
+    const real t692 = t684 * t354;
+    const real t693 = t674 * d_Psid[2];
+    const real t694 = Psid[2] * d_Psi[1];
+    const real t695 = Psi[1] * d_Psid[2];
+    const real t696 = t694 + t695;
+    const real t697 = Psid[1] * d_Psi[2];
+    const real t698 = Psi[2] * d_Psid[1];
+    const real t699 = t697 + t698;
+    const real t700 = t696 - t699;
+    const real t701 = Psid[2] * t700;
+    const real t702 = t693 + t701;
+    const real t703 = t678 * d_Psid[0];
+    const real t704 = Psid[1] * d_Psi[0];
+    const real t705 = Psi[0] * d_Psid[1];
+    const real t706 = t704 + t705;
+    const real t707 = Psid[0] * d_Psi[1];
+    const real t708 = Psi[1] * d_Psid[0];
+    const real t709 = t707 + t708;
+    const real t710 = t706 - t709;
+    const real t711 = Psid[0] * t710;
+    const real t712 = t703 + t711;
+    const real t713 = t702 - t712;
+    const real t714 = t322 * t713;
+    const real t715 = t692 + t714;
+    const real t716 = Psid[1] * d_Psi[1];
+    const real t717 = Psi[1] * d_Psid[1];
+    const real t718 = t716 + t717;
+    const real t719 = Psid[0] * d_Psi[0];
+    const real t720 = Psi[0] * d_Psid[0];
+    const real t721 = t719 + t720;
+    const real t722 = t718 + t721;
+    const real t723 = Psid[2] * d_Psi[2];
+    const real t724 = Psi[2] * d_Psid[2];
+    const real t725 = t723 + t724;
+    const real t726 = t722 + t725;
+    const real t727 = 2.0 * t726;
+    const real t728 = t670 * t727;
+    const real t729 = t668 * t31;
+    const real t730 = t666 * t31;
+    const real t731 = t664 * t31;
+    const real t732 = t662 * t31;
+    const real t733 = t660 * t31;
+    const real t734 = t658 * t31;
+    const real t735 = t656 * t31;
+    const real t736 = t654 * t31;
+    const real t737 = 3.868170170630684e-22 * t31;
+    const real t738 = t5 * t737;
+    const real t739 = t736 + t738;
+    const real t740 = t5 * t739;
+    const real t741 = t735 + t740;
+    const real t742 = t5 * t741;
+    const real t743 = t734 + t742;
+    const real t744 = t5 * t743;
+    const real t745 = t733 + t744;
+    const real t746 = t5 * t745;
+    const real t747 = t732 + t746;
+    const real t748 = t5 * t747;
+    const real t749 = t731 + t748;
+    const real t750 = t5 * t749;
+    const real t751 = t730 + t750;
+    const real t752 = t5 * t751;
+    const real t753 = t729 + t752;
+    const real t754 = t646 * t753;
+    const real t755 = t728 + t754;
+    const real t756 = t680 * t755;
+    const real t757 = t674 * d_Psi[2];
+    const real t758 = Psi[2] * t700;
+    const real t759 = t757 + t758;
+    const real t760 = t678 * d_Psi[0];
+    const real t761 = Psi[0] * t710;
+    const real t762 = t760 + t761;
+    const real t763 = t759 - t762;
+    const real t764 = t671 * t763;
+    const real t765 = t756 + t764;
+    const real t766 = t715 + t765;
+    const real t767 = t378 * d_Psidd[1];
+    const real t768 = Psidd[1] * t382;
+    const real t769 = t767 - t768;
+    const real t770 = t766 + t769;
+    const real t771 = t638 * t31;
+    const real t772 = t636 * t31;
+    const real t773 = t634 * t31;
+    const real t774 = t632 * t31;
+    const real t775 = t630 * t31;
+    const real t776 = t628 * t31;
+    const real t777 = t626 * t31;
+    const real t778 = t624 * t31;
+    const real t779 = 8.896791392450573e-21 * t31;
+    const real t780 = t5 * t779;
+    const real t781 = t778 + t780;
+    const real t782 = t5 * t781;
+    const real t783 = t777 + t782;
+    const real t784 = t5 * t783;
+    const real t785 = t776 + t784;
+    const real t786 = t5 * t785;
+    const real t787 = t775 + t786;
+    const real t788 = t5 * t787;
+    const real t789 = t774 + t788;
+    const real t790 = t5 * t789;
+    const real t791 = t773 + t790;
+    const real t792 = t5 * t791;
+    const real t793 = t772 + t792;
+    const real t794 = t5 * t793;
+    const real t795 = t771 + t794;
+    const real t796 = t646 * t795;
+    const real t797 = t640 * t727;
+    const real t798 = t796 + t797;
+    const real t799 = t650 * t798;
+    const real t800 = Psid[0] * d_Psi[2];
+    const real t801 = Psi[2] * d_Psid[0];
+    const real t802 = t800 + t801;
+    const real t803 = Psid[2] * d_Psi[0];
+    const real t804 = Psi[0] * d_Psid[2];
+    const real t805 = t803 + t804;
+    const real t806 = t802 - t805;
+    const real t807 = t647 * t806;
+    const real t808 = t799 + t807;
+    const real t809 = t770 + t808;
+    const real t810 = Psidd[2] * t401;
+    const real t811 = t399 * d_Psidd[2];
+    const real t812 = t810 + t811;
+    const real t813 = t809 + t812;
+    const real t814 = Psidd[0] * t360;
+    const real t815 = t324 * d_Psidd[0];
+    const real t816 = t814 + t815;
+    const real t817 = t813 + t816;
+    const real t818 = x[2] * t817;
+    const real t819 = t691 + t818;
+    const real t820 = t620 + t819;
+    const real t821 = t365 * Psidd[0];
+    const real t822 = t387 * Psidd[1];
+    const real t823 = t647 * t678;
+    const real t824 = t405 * Psidd[2];
+    const real t825 = Psi[0] * t650;
+    const real t826 = Psi[1] * t674;
+    const real t827 = t825 - t826;
+    const real t828 = t671 * t827;
+    const real t829 = Psid[0] * t650;
+    const real t830 = Psid[1] * t674;
+    const real t831 = t829 - t830;
+    const real t832 = t322 * t831;
+    const real t833 = t828 + t832;
+    const real t834 = t824 + t833;
+    const real t835 = t823 + t834;
+    const real t836 = t822 + t835;
+    const real t837 = t821 + t836;
+    const real t838 = t837 * d_x[1];
+    const real t839 = t831 * t354;
+    const real t840 = t650 * d_Psid[0];
+    const real t841 = Psid[0] * t806;
+    const real t842 = t840 + t841;
+    const real t843 = t674 * d_Psid[1];
+    const real t844 = Psid[1] * t700;
+    const real t845 = t843 + t844;
+    const real t846 = t842 - t845;
+    const real t847 = t322 * t846;
+    const real t848 = t839 + t847;
+    const real t849 = t827 * t755;
+    const real t850 = t650 * d_Psi[0];
+    const real t851 = Psi[0] * t806;
+    const real t852 = t850 + t851;
+    const real t853 = t674 * d_Psi[1];
+    const real t854 = Psi[1] * t700;
+    const real t855 = t853 + t854;
+    const real t856 = t852 - t855;
+    const real t857 = t671 * t856;
+    const real t858 = t849 + t857;
+    const real t859 = t848 + t858;
+    const real t860 = t405 * d_Psidd[2];
+    const real t861 = Psidd[2] * t409;
+    const real t862 = t860 - t861;
+    const real t863 = t859 + t862;
+    const real t864 = t678 * t798;
+    const real t865 = t647 * t710;
+    const real t866 = t864 + t865;
+    const real t867 = t863 + t866;
+    const real t868 = Psidd[1] * t395;
+    const real t869 = t387 * d_Psidd[1];
+    const real t870 = t868 + t869;
+    const real t871 = t867 + t870;
+    const real t872 = Psidd[0] * t373;
+    const real t873 = t365 * d_Psidd[0];
+    const real t874 = t872 + t873;
+    const real t875 = t871 + t874;
+    const real t876 = x[1] * t875;
+    const real t877 = t838 + t876;
+    const real t878 = t820 - t877;
+    const real t879 = t878 - d_xdd[0];
+    d_c[0] = t879;
+    const real t880 = t588 * d_xd[2];
+    const real t881 = xd[2] * t544;
+    const real t882 = t880 + t881;
+    const real t883 = 2.0 * t882;
+    const real t884 = x[1] * t573;
+    const real t885 = x[2] * t582;
+    const real t886 = t884 - t885;
+    const real t887 = t886 * t568;
+    const real t888 = t573 * d_x[1];
+    const real t889 = x[1] * t568;
+    const real t890 = t888 + t889;
+    const real t891 = t582 * d_x[2];
+    const real t892 = x[2] * t556;
+    const real t893 = t891 + t892;
+    const real t894 = t890 - t893;
+    const real t895 = t573 * t894;
+    const real t896 = t887 + t895;
+    const real t897 = t590 * t544;
+    const real t898 = t588 * t598;
+    const real t899 = t897 + t898;
+    const real t900 = t896 - t899;
+    const real t901 = t883 + t900;
+    const real t902 = t573 * d_xd[0];
+    const real t903 = xd[0] * t568;
+    const real t904 = t902 + t903;
+    const real t905 = 2.0 * t904;
+    const real t906 = t901 - t905;
+    const real t907 = t437 * Psidd[2];
+    const real t908 = t428 * Psidd[1];
+    const real t909 = t647 * t674;
+    const real t910 = t417 * Psidd[0];
+    const real t911 = Psi[1] * t678;
+    const real t912 = Psi[2] * t650;
+    const real t913 = t911 - t912;
+    const real t914 = t671 * t913;
+    const real t915 = Psid[1] * t678;
+    const real t916 = Psid[2] * t650;
+    const real t917 = t915 - t916;
+    const real t918 = t322 * t917;
+    const real t919 = t914 + t918;
+    const real t920 = t910 + t919;
+    const real t921 = t909 + t920;
+    const real t922 = t908 + t921;
+    const real t923 = t907 + t922;
+    const real t924 = t923 * d_x[2];
+    const real t925 = t917 * t354;
+    const real t926 = t678 * d_Psid[1];
+    const real t927 = Psid[1] * t710;
+    const real t928 = t926 + t927;
+    const real t929 = t650 * d_Psid[2];
+    const real t930 = Psid[2] * t806;
+    const real t931 = t929 + t930;
+    const real t932 = t928 - t931;
+    const real t933 = t322 * t932;
+    const real t934 = t925 + t933;
+    const real t935 = t913 * t755;
+    const real t936 = t678 * d_Psi[1];
+    const real t937 = Psi[1] * t710;
+    const real t938 = t936 + t937;
+    const real t939 = t650 * d_Psi[2];
+    const real t940 = Psi[2] * t806;
+    const real t941 = t939 + t940;
+    const real t942 = t938 - t941;
+    const real t943 = t671 * t942;
+    const real t944 = t935 + t943;
+    const real t945 = t934 + t944;
+    const real t946 = t417 * d_Psidd[0];
+    const real t947 = Psidd[0] * t421;
+    const real t948 = t946 - t947;
+    const real t949 = t945 + t948;
+    const real t950 = t674 * t798;
+    const real t951 = t647 * t700;
+    const real t952 = t950 + t951;
+    const real t953 = t949 + t952;
+    const real t954 = Psidd[1] * t430;
+    const real t955 = t428 * d_Psidd[1];
+    const real t956 = t954 + t955;
+    const real t957 = t953 + t956;
+    const real t958 = Psidd[2] * t439;
+    const real t959 = t437 * d_Psidd[2];
+    const real t960 = t958 + t959;
+    const real t961 = t957 + t960;
+    const real t962 = x[2] * t961;
+    const real t963 = t924 + t962;
+    const real t964 = t906 - t963;
+    const real t965 = t837 * d_x[0];
+    const real t966 = x[0] * t875;
+    const real t967 = t965 + t966;
+    const real t968 = t964 + t967;
+    const real t969 = t968 - d_xdd[1];
+    d_c[1] = t969;
+    const real t970 = t582 * d_xd[0];
+    const real t971 = xd[0] * t556;
+    const real t972 = t970 + t971;
+    const real t973 = 2.0 * t972;
+    const real t974 = t603 * t544;
+    const real t975 = t588 * t611;
+    const real t976 = t974 + t975;
+    const real t977 = t886 * t556;
+    const real t978 = t582 * t894;
+    const real t979 = t977 + t978;
+    const real t980 = t976 - t979;
+    const real t981 = t588 * d_xd[1];
+    const real t982 = xd[1] * t544;
+    const real t983 = t981 + t982;
+    const real t984 = 2.0 * t983;
+    const real t985 = t980 - t984;
+    const real t986 = t973 + t985;
+    const real t987 = t923 * d_x[1];
+    const real t988 = x[1] * t961;
+    const real t989 = t987 + t988;
+    const real t990 = t986 + t989;
+    const real t991 = t690 * d_x[0];
+    const real t992 = x[0] * t817;
+    const real t993 = t991 + t992;
+    const real t994 = t990 - t993;
+    const real t995 = t994 - d_xdd[2];
+    d_c[2] = t995;
+    const real t996 = -t961;
+    d_c[3] = t996;
+    const real t997 = -t817;
+    d_c[4] = t997;
+    const real t998 = -t875;
+    d_c[5] = t998;
+    return 0;
+}
+
+static int mstmm_sweep_modal_inward_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_modal_inward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
+}
+
+static const mstmm_port mstmm_sweep_modal_inward_slope_inputs[] = {
+    {"R_end", 9, "", 0, 0},
+    {"x", 3, "m", 0, 0},
+    {"Psi", 3, "rad", 0, 0},
+    {"xd", 3, "m/s", 0, 0},
+    {"Psid", 3, "rad/s", 0, 0},
+    {"xdd", 3, "m/s2", 0, 0},
+    {"Psidd", 3, "rad/s2", 0, 0},
+    {"d_x", 3, "m", 0, 0},
+    {"d_Psi", 3, "rad", 0, 0},
+    {"d_xd", 3, "m/s", 0, 0},
+    {"d_Psid", 3, "rad/s", 0, 0},
+    {"d_xdd", 3, "m/s2", 0, 0},
+    {"d_Psidd", 3, "rad/s2", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_inward_slope_outputs[] = {
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_H6", 36, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"d_w", 3, "rad/s", 0, 0},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+};
+
+/* subspace and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  H6[6][6] subspace by [xd; Psid], rows v then w, outboard axes
+ * in  Phi[6][n] rates of point and rotation vector per modal speed
+ * in  d_H6[6][6] derivative of H6
+ * in  d_Phi[6][n] derivative of Phi
+ * out d_H[6][n] derivative of H
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_subspace_slope_sized(int n, const real *restrict H6, const real *restrict Phi,
+    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = Phi[5 * n + k] * d_H6[5];
+        const real t1 = H6[5] * d_Phi[5 * n + k];
+        const real t2 = t0 + t1;
+        const real t3 = Phi[4 * n + k] * d_H6[4];
+        const real t4 = H6[4] * d_Phi[4 * n + k];
+        const real t5 = t3 + t4;
+        const real t6 = Phi[3 * n + k] * d_H6[3];
+        const real t7 = H6[3] * d_Phi[3 * n + k];
+        const real t8 = t6 + t7;
+        const real t9 = Phi[2 * n + k] * d_H6[2];
+        const real t10 = H6[2] * d_Phi[2 * n + k];
+        const real t11 = t9 + t10;
+        const real t12 = Phi[n + k] * d_H6[1];
+        const real t13 = H6[1] * d_Phi[n + k];
+        const real t14 = t12 + t13;
+        const real t15 = Phi[k] * d_H6[0];
+        const real t16 = H6[0] * d_Phi[k];
+        const real t17 = t15 + t16;
+        const real t18 = t14 + t17;
+        const real t19 = t11 + t18;
+        const real t20 = t8 + t19;
+        const real t21 = t5 + t20;
+        const real t22 = t2 + t21;
+        d_H[k] = t22;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t23 = H6[11] * d_Phi[5 * n + k];
+        const real t24 = Phi[5 * n + k] * d_H6[11];
+        const real t25 = t23 + t24;
+        const real t26 = H6[10] * d_Phi[4 * n + k];
+        const real t27 = Phi[4 * n + k] * d_H6[10];
+        const real t28 = t26 + t27;
+        const real t29 = H6[9] * d_Phi[3 * n + k];
+        const real t30 = Phi[3 * n + k] * d_H6[9];
+        const real t31 = t29 + t30;
+        const real t32 = H6[8] * d_Phi[2 * n + k];
+        const real t33 = Phi[2 * n + k] * d_H6[8];
+        const real t34 = t32 + t33;
+        const real t35 = H6[7] * d_Phi[n + k];
+        const real t36 = Phi[n + k] * d_H6[7];
+        const real t37 = t35 + t36;
+        const real t38 = H6[6] * d_Phi[k];
+        const real t39 = Phi[k] * d_H6[6];
+        const real t40 = t38 + t39;
+        const real t41 = t37 + t40;
+        const real t42 = t34 + t41;
+        const real t43 = t31 + t42;
+        const real t44 = t28 + t43;
+        const real t45 = t25 + t44;
+        d_H[n + k] = t45;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t46 = H6[17] * d_Phi[5 * n + k];
+        const real t47 = Phi[5 * n + k] * d_H6[17];
+        const real t48 = t46 + t47;
+        const real t49 = H6[16] * d_Phi[4 * n + k];
+        const real t50 = Phi[4 * n + k] * d_H6[16];
+        const real t51 = t49 + t50;
+        const real t52 = H6[15] * d_Phi[3 * n + k];
+        const real t53 = Phi[3 * n + k] * d_H6[15];
+        const real t54 = t52 + t53;
+        const real t55 = H6[14] * d_Phi[2 * n + k];
+        const real t56 = Phi[2 * n + k] * d_H6[14];
+        const real t57 = t55 + t56;
+        const real t58 = H6[13] * d_Phi[n + k];
+        const real t59 = Phi[n + k] * d_H6[13];
+        const real t60 = t58 + t59;
+        const real t61 = H6[12] * d_Phi[k];
+        const real t62 = Phi[k] * d_H6[12];
+        const real t63 = t61 + t62;
+        const real t64 = t60 + t63;
+        const real t65 = t57 + t64;
+        const real t66 = t54 + t65;
+        const real t67 = t51 + t66;
+        const real t68 = t48 + t67;
+        d_H[2 * n + k] = t68;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t69 = H6[23] * d_Phi[5 * n + k];
+        const real t70 = Phi[5 * n + k] * d_H6[23];
+        const real t71 = t69 + t70;
+        const real t72 = H6[22] * d_Phi[4 * n + k];
+        const real t73 = Phi[4 * n + k] * d_H6[22];
+        const real t74 = t72 + t73;
+        const real t75 = H6[21] * d_Phi[3 * n + k];
+        const real t76 = Phi[3 * n + k] * d_H6[21];
+        const real t77 = t75 + t76;
+        const real t78 = H6[20] * d_Phi[2 * n + k];
+        const real t79 = Phi[2 * n + k] * d_H6[20];
+        const real t80 = t78 + t79;
+        const real t81 = H6[19] * d_Phi[n + k];
+        const real t82 = Phi[n + k] * d_H6[19];
+        const real t83 = t81 + t82;
+        const real t84 = H6[18] * d_Phi[k];
+        const real t85 = Phi[k] * d_H6[18];
+        const real t86 = t84 + t85;
+        const real t87 = t83 + t86;
+        const real t88 = t80 + t87;
+        const real t89 = t77 + t88;
+        const real t90 = t74 + t89;
+        const real t91 = t71 + t90;
+        d_H[3 * n + k] = t91;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t92 = H6[29] * d_Phi[5 * n + k];
+        const real t93 = Phi[5 * n + k] * d_H6[29];
+        const real t94 = t92 + t93;
+        const real t95 = H6[28] * d_Phi[4 * n + k];
+        const real t96 = Phi[4 * n + k] * d_H6[28];
+        const real t97 = t95 + t96;
+        const real t98 = H6[27] * d_Phi[3 * n + k];
+        const real t99 = Phi[3 * n + k] * d_H6[27];
+        const real t100 = t98 + t99;
+        const real t101 = H6[26] * d_Phi[2 * n + k];
+        const real t102 = Phi[2 * n + k] * d_H6[26];
+        const real t103 = t101 + t102;
+        const real t104 = H6[25] * d_Phi[n + k];
+        const real t105 = Phi[n + k] * d_H6[25];
+        const real t106 = t104 + t105;
+        const real t107 = H6[24] * d_Phi[k];
+        const real t108 = Phi[k] * d_H6[24];
+        const real t109 = t107 + t108;
+        const real t110 = t106 + t109;
+        const real t111 = t103 + t110;
+        const real t112 = t100 + t111;
+        const real t113 = t97 + t112;
+        const real t114 = t94 + t113;
+        d_H[4 * n + k] = t114;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t115 = H6[35] * d_Phi[5 * n + k];
+        const real t116 = Phi[5 * n + k] * d_H6[35];
+        const real t117 = t115 + t116;
+        const real t118 = H6[34] * d_Phi[4 * n + k];
+        const real t119 = Phi[4 * n + k] * d_H6[34];
+        const real t120 = t118 + t119;
+        const real t121 = H6[33] * d_Phi[3 * n + k];
+        const real t122 = Phi[3 * n + k] * d_H6[33];
+        const real t123 = t121 + t122;
+        const real t124 = H6[32] * d_Phi[2 * n + k];
+        const real t125 = Phi[2 * n + k] * d_H6[32];
+        const real t126 = t124 + t125;
+        const real t127 = H6[31] * d_Phi[n + k];
+        const real t128 = Phi[n + k] * d_H6[31];
+        const real t129 = t127 + t128;
+        const real t130 = H6[30] * d_Phi[k];
+        const real t131 = Phi[k] * d_H6[30];
+        const real t132 = t130 + t131;
+        const real t133 = t129 + t132;
+        const real t134 = t126 + t133;
+        const real t135 = t123 + t134;
+        const real t136 = t120 + t135;
+        const real t137 = t117 + t136;
+        d_H[5 * n + k] = t137;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
+    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_subspace_slope_sized(1, H6, Phi, d_H6, d_Phi, d_H);
+    case 2: return mstmm_sweep_modal_subspace_slope_sized(2, H6, Phi, d_H6, d_Phi, d_H);
+    case 3: return mstmm_sweep_modal_subspace_slope_sized(3, H6, Phi, d_H6, d_Phi, d_H);
+    case 4: return mstmm_sweep_modal_subspace_slope_sized(4, H6, Phi, d_H6, d_Phi, d_H);
+    default: return mstmm_sweep_modal_subspace_slope_sized(n, H6, Phi, d_H6, d_Phi, d_H);
+    }
+}
+
+static int mstmm_sweep_modal_subspace_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_subspace_slope(n, in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_subspace_slope_inputs[] = {
+    {"H6", 36, "", 0, 0},
+    {"Phi", 6, "", 0, 1},
+    {"d_H6", 36, "", 0, 0},
+    {"d_Phi", 6, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_subspace_slope_outputs[] = {
+    {"d_H", 6, "", 0, 1},
+};
+
+/* imposed and its derivative along a direction
+ * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
+ * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
+ * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
+ * in  H[6][n] motion subspace of the modes
+ * in  s[n] prescribed modal accelerations
+ * in  c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
+ * in  d_H[6][n] derivative of H
+ * in  d_s[n] derivative of s
+ * in  d_c[6] (m/s2, rad/s2) derivative of c
+ * out d_c_s[6] derivative of c_s
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_imposed_slope_sized(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
+    const real *restrict d_c, real *restrict d_c_s)
+{
+    (void)c;
+    real t3 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = s[k] * d_H[k];
+        const real t1 = H[k] * d_s[k];
+        const real t2 = t0 + t1;
+        t3 += t2;
+    }
+    const real t4 = d_c[0] + t3;
+    d_c_s[0] = t4;
+    real t8 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t5 = H[n + k] * d_s[k];
+        const real t6 = s[k] * d_H[n + k];
+        const real t7 = t5 + t6;
+        t8 += t7;
+    }
+    const real t9 = d_c[1] + t8;
+    d_c_s[1] = t9;
+    real t13 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t10 = H[2 * n + k] * d_s[k];
+        const real t11 = s[k] * d_H[2 * n + k];
+        const real t12 = t10 + t11;
+        t13 += t12;
+    }
+    const real t14 = d_c[2] + t13;
+    d_c_s[2] = t14;
+    real t18 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t15 = H[3 * n + k] * d_s[k];
+        const real t16 = s[k] * d_H[3 * n + k];
+        const real t17 = t15 + t16;
+        t18 += t17;
+    }
+    const real t19 = d_c[3] + t18;
+    d_c_s[3] = t19;
+    real t23 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t20 = H[4 * n + k] * d_s[k];
+        const real t21 = s[k] * d_H[4 * n + k];
+        const real t22 = t20 + t21;
+        t23 += t22;
+    }
+    const real t24 = d_c[4] + t23;
+    d_c_s[4] = t24;
+    real t28 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t25 = H[5 * n + k] * d_s[k];
+        const real t26 = s[k] * d_H[5 * n + k];
+        const real t27 = t25 + t26;
+        t28 += t27;
+    }
+    const real t29 = d_c[5] + t28;
+    d_c_s[5] = t29;
+    return 0;
+}
+
+int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
+    const real *restrict d_c, real *restrict d_c_s)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_imposed_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 2: return mstmm_sweep_modal_imposed_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 3: return mstmm_sweep_modal_imposed_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 4: return mstmm_sweep_modal_imposed_slope_sized(4, H, s, c, d_H, d_s, d_c, d_c_s);
+    default: return mstmm_sweep_modal_imposed_slope_sized(n, H, s, c, d_H, d_s, d_c, d_c_s);
+    }
+}
+
+static int mstmm_sweep_modal_imposed_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_imposed_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_imposed_slope_inputs[] = {
+    {"H", 6, "", 0, 1},
+    {"s", 1, "", 0, 1},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"d_H", 6, "", 0, 1},
+    {"d_s", 1, "", 0, 1},
+    {"d_c", 6, "m/s2, rad/s2", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_imposed_slope_outputs[] = {
+    {"d_c_s", 6, "", 0, 0},
+};
+
+/* prescribed and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
+ * in  S_ff[n][n] rows and columns of the modes
+ * in  s[n] prescribed modal accelerations
+ * in  d_S_rf[6][n] derivative of S_rf
+ * in  d_s[n] derivative of s
+ * out d_e[6] (N, N*m) derivative of e, added to what is there
+ * out d_e_f[n] derivative of e_f, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_prescribed_slope_sized(int n, const real *restrict S_rf,
+    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
+    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f)
+{
+    real t3 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = s[k] * d_S_rf[k];
+        const real t1 = S_rf[k] * d_s[k];
+        const real t2 = t0 + t1;
+        t3 += t2;
+    }
+    d_e[0] += t3;
+    real t7 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t4 = S_rf[n + k] * d_s[k];
+        const real t5 = s[k] * d_S_rf[n + k];
+        const real t6 = t4 + t5;
+        t7 += t6;
+    }
+    d_e[1] += t7;
+    real t11 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t8 = S_rf[2 * n + k] * d_s[k];
+        const real t9 = s[k] * d_S_rf[2 * n + k];
+        const real t10 = t8 + t9;
+        t11 += t10;
+    }
+    d_e[2] += t11;
+    real t15 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t12 = S_rf[3 * n + k] * d_s[k];
+        const real t13 = s[k] * d_S_rf[3 * n + k];
+        const real t14 = t12 + t13;
+        t15 += t14;
+    }
+    d_e[3] += t15;
+    real t19 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t16 = S_rf[4 * n + k] * d_s[k];
+        const real t17 = s[k] * d_S_rf[4 * n + k];
+        const real t18 = t16 + t17;
+        t19 += t18;
+    }
+    d_e[4] += t19;
+    real t23 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t20 = S_rf[5 * n + k] * d_s[k];
+        const real t21 = s[k] * d_S_rf[5 * n + k];
+        const real t22 = t20 + t21;
+        t23 += t22;
+    }
+    d_e[5] += t23;
+    for (int k = 0; k < n; ++k) {
+        real t25 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t24 = S_ff[n * k + l] * d_s[l];
+            t25 += t24;
+        }
+        d_e_f[k] += t25;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
+    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
+    real *restrict d_e, real *restrict d_e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_prescribed_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 2: return mstmm_sweep_modal_prescribed_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 3: return mstmm_sweep_modal_prescribed_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 4: return mstmm_sweep_modal_prescribed_slope_sized(4, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    default: return mstmm_sweep_modal_prescribed_slope_sized(n, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    }
+}
+
+static int mstmm_sweep_modal_prescribed_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_prescribed_slope(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_modal_prescribed_slope_inputs[] = {
+    {"S_rf", 6, "", 0, 1},
+    {"S_ff", 1, "", 0, 2},
+    {"s", 1, "", 0, 1},
+    {"d_S_rf", 6, "", 0, 1},
+    {"d_s", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_prescribed_slope_outputs[] = {
+    {"d_e", 6, "N, N*m", 1, 0},
+    {"d_e_f", 1, "", 1, 1},
+};
+
+/* modal_effort and its derivative along a direction
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[n] load that the modes need
+ * in  d_H[6][n] derivative of H
+ * in  d_e[6] (N, N*m) derivative of e
+ * in  d_e_f[n] derivative of e_f
+ * out d_tau[n] derivative of tau
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_modal_effort_slope_sized(int n, const real *restrict H,
+    const real *restrict e, const real *restrict e_f, const real *restrict d_H,
+    const real *restrict d_e, const real *restrict d_e_f, real *restrict d_tau)
+{
+    (void)e_f;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = H[5 * n + k] * d_e[5];
+        const real t1 = e[5] * d_H[5 * n + k];
+        const real t2 = t0 + t1;
+        const real t3 = H[4 * n + k] * d_e[4];
+        const real t4 = e[4] * d_H[4 * n + k];
+        const real t5 = t3 + t4;
+        const real t6 = H[3 * n + k] * d_e[3];
+        const real t7 = e[3] * d_H[3 * n + k];
+        const real t8 = t6 + t7;
+        const real t9 = H[2 * n + k] * d_e[2];
+        const real t10 = e[2] * d_H[2 * n + k];
+        const real t11 = t9 + t10;
+        const real t12 = H[n + k] * d_e[1];
+        const real t13 = e[1] * d_H[n + k];
+        const real t14 = t12 + t13;
+        const real t15 = H[k] * d_e[0];
+        const real t16 = e[0] * d_H[k];
+        const real t17 = t15 + t16;
+        const real t18 = t14 + t17;
+        const real t19 = t11 + t18;
+        const real t20 = t8 + t19;
+        const real t21 = t5 + t20;
+        const real t22 = t2 + t21;
+        const real t23 = d_e_f[k] + t22;
+        d_tau[k] = t23;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
+    const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
+    const real *restrict d_e_f, real *restrict d_tau)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_modal_effort_slope_sized(1, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+    case 2: return mstmm_sweep_modal_modal_effort_slope_sized(2, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+    case 3: return mstmm_sweep_modal_modal_effort_slope_sized(3, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+    case 4: return mstmm_sweep_modal_modal_effort_slope_sized(4, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+    default: return mstmm_sweep_modal_modal_effort_slope_sized(n, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+    }
+}
+
+static int mstmm_sweep_modal_modal_effort_slope_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_modal_effort_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_modal_effort_slope_inputs[] = {
+    {"H", 6, "", 0, 1},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 1, "", 0, 1},
+    {"d_H", 6, "", 0, 1},
+    {"d_e", 6, "N, N*m", 0, 0},
+    {"d_e_f", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_modal_effort_slope_outputs[] = {
+    {"d_tau", 1, "", 0, 1},
+};
+
 static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     {
         .name = "residual",
@@ -4306,13 +9253,121 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_guards = 1,
         .guards = mstmm_sweep_modal_answer_guards,
     },
+    {
+        .name = "residual_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_residual_slope,
+        .call = mstmm_sweep_modal_residual_slope_call,
+        .n_inputs = 27,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_modal_residual_slope_inputs,
+        .outputs = mstmm_sweep_modal_residual_slope_outputs,
+        .ir_hash = "0c131d9b7a68d974fee8da2362df36dde24ba35a867555da137c3a3a62d193d2",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "momentum_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_momentum_slope,
+        .call = mstmm_sweep_modal_momentum_slope_call,
+        .n_inputs = 28,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_modal_momentum_slope_inputs,
+        .outputs = mstmm_sweep_modal_momentum_slope_outputs,
+        .ir_hash = "88b0476e6adfd34d6ff7ef40c27fceabc9fddfe162ee90e879a7207f7abf7204",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "section_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_section_slope,
+        .call = mstmm_sweep_modal_section_slope_call,
+        .n_inputs = 14,
+        .n_outputs = 7,
+        .inputs = mstmm_sweep_modal_section_slope_inputs,
+        .outputs = mstmm_sweep_modal_section_slope_outputs,
+        .ir_hash = "b96dc0fb3b278f8d3cf4185c057d86f11a366278dd2b256ffb72eb9340814b9a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "outward_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_outward_slope,
+        .call = mstmm_sweep_modal_outward_slope_call,
+        .n_inputs = 13,
+        .n_outputs = 6,
+        .inputs = mstmm_sweep_modal_outward_slope_inputs,
+        .outputs = mstmm_sweep_modal_outward_slope_outputs,
+        .ir_hash = "8f2901cba4deb908cb02f43d0e393418a063d71cbbf8aaea1c3d09be7d0c692a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "inward_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_inward_slope,
+        .call = mstmm_sweep_modal_inward_slope_call,
+        .n_inputs = 13,
+        .n_outputs = 6,
+        .inputs = mstmm_sweep_modal_inward_slope_inputs,
+        .outputs = mstmm_sweep_modal_inward_slope_outputs,
+        .ir_hash = "719b175eb317ac6e96e5f9442483c18ab677f5d01b2d29cbce08a0f0e8a41e85",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "subspace_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_subspace_slope,
+        .call = mstmm_sweep_modal_subspace_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_subspace_slope_inputs,
+        .outputs = mstmm_sweep_modal_subspace_slope_outputs,
+        .ir_hash = "8afb6bfe44eb412068dd7c892a58366c762508478adf3d49dfafdda8a3c72e94",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "imposed_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_imposed_slope,
+        .call = mstmm_sweep_modal_imposed_slope_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_imposed_slope_inputs,
+        .outputs = mstmm_sweep_modal_imposed_slope_outputs,
+        .ir_hash = "0b90c2871b8d4e57472f89b76b5e6545d7f43b46ec984ccc0d199f8953e51533",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "prescribed_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_prescribed_slope,
+        .call = mstmm_sweep_modal_prescribed_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_modal_prescribed_slope_inputs,
+        .outputs = mstmm_sweep_modal_prescribed_slope_outputs,
+        .ir_hash = "025ed27d331ff962e8bf77018936dbf7f0bd9f14df1ffdd2930fbc39fee0e673",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "modal_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_modal_effort_slope,
+        .call = mstmm_sweep_modal_modal_effort_slope_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_modal_effort_slope_inputs,
+        .outputs = mstmm_sweep_modal_modal_effort_slope_outputs,
+        .ir_hash = "1ec13afb5579181c10dc2b2fee815b4483de6d07af94038b2af2f82794edc2b7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "b91c9660aa47badf34525676f1f18db7e3dd890d71bfe4aca8a488b39efee333",
+    .hash = "2f0e8a187e2edb314d3e611abbbf75dae45fcc05a7abc6169dde88be68c3d132",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4322,6 +9377,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 17,
+    .n_kernels = 26,
     .kernels = mstmm_sweep_modal_kernels,
 };

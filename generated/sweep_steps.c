@@ -3,6 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "aim.h"
 #include "hinge.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
@@ -87,8 +88,30 @@ mstmm_generic_answer_kernel *const mstmm_generic_answer_table[] = {
     mstmm_sweep_generic6_answer,
 };
 
-int64_t mstmm_modal_numbers(int n) { return (int64_t)34 * n + 2 * (int64_t)n * n; }
+mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[] = {
+    mstmm_sweep_generic0_forward_slope,
+    mstmm_sweep_generic1_forward_slope,
+    mstmm_sweep_generic2_forward_slope,
+    mstmm_sweep_generic3_forward_slope,
+    mstmm_sweep_generic4_forward_slope,
+    mstmm_sweep_generic5_forward_slope,
+    mstmm_sweep_generic6_forward_slope,
+};
+
+mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[] = {
+    mstmm_sweep_generic0_effort_slope,
+    mstmm_sweep_generic1_effort_slope,
+    mstmm_sweep_generic2_effort_slope,
+    mstmm_sweep_generic3_effort_slope,
+    mstmm_sweep_generic4_effort_slope,
+    mstmm_sweep_generic5_effort_slope,
+    mstmm_sweep_generic6_effort_slope,
+};
+
+int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
+int64_t mstmm_bend_numbers(int n) { return (int64_t)62 * n + 4 * (int64_t)n * n; }
+int64_t mstmm_port_numbers(int n) { return (int64_t)21 * n + 1 * (int64_t)n * n; }
 
 /* Accelerations that are given: all, or none so far. */
 static int mstmm_at_prescribed(mstmm_state *state, int index)
@@ -116,7 +139,7 @@ static int mstmm_at_drives(mstmm_state *state, int index)
     if (!mstmm_imposed(body, state->memory)) return 0;
     (mstmm_filled_q(state) + body->q + drive->coordinate)[0] = (mstmm_drive_values(state) + 3 * index)[0];
     (mstmm_filled_u(state) + body->u + drive->speed)[0] = (mstmm_drive_values(state) + 3 * index + 1)[0];
-    if (!state->given) {
+    if ((!state->given || state->residual)) {
         real *block = state->workspace + body->block;
         (block + MSTMM_BLOCK_FIXED + drive->speed)[0] = (mstmm_drive_values(state) + 3 * index + 2)[0];
     }
@@ -396,7 +419,7 @@ static int mstmm_at_drag(mstmm_state *state, int index)
         .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
         .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
-        .S = S, .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A(n), .h = h,
+        .S = S, .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A_DRAG(n), .h = h,
         .h_f = modes + MSTMM_MODES_RIGHT(n), .T = T);
     for (int j = 0; j < 6; j++)
         (block + MSTMM_BLOCK_E)[j] += h[j];
@@ -953,6 +976,1037 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
     return 0;
 }
 
+/* Derivatives: accelerations that are given: all, or none so far. */
+static int mstmm_at_prescribed_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    if (state->given) {
+        const int nu = body->nu;
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < nu; j++)
+            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = (state->slope->given + body->u)[j];
+    } else {
+        const int nu = body->nu;
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < nu; j++)
+            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = 0;
+    }
+    return 0;
+}
+
+/* Derivatives: driven coordinates, speeds and accelerations filled in. */
+static int mstmm_at_drives_slope(mstmm_state *state, int index)
+{
+    const mstmm_drive *drive = &state->model->drives[index];
+    const mstmm_body *body = &state->model->bodies[drive->body];
+    if (!mstmm_imposed(body, state->memory)) return 0;
+    (mstmm_filled_q(state->slope) + body->q + drive->coordinate)[0] = (mstmm_drive_values(state->slope) + 3 * index)[0];
+    (mstmm_filled_u(state->slope) + body->u + drive->speed)[0] = (mstmm_drive_values(state->slope) + 3 * index + 1)[0];
+    if ((!state->given || state->residual)) {
+        real *d_block = state->slope->workspace + body->block;
+        (d_block + MSTMM_BLOCK_FIXED + drive->speed)[0] = (mstmm_drive_values(state->slope) + 3 * index + 2)[0];
+    }
+    return 0;
+}
+
+/* Derivatives: relative motion across a section of a flexible body. */
+static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
+{
+    real d_c[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    const mstmm_modal *modal = mstmm_modal_of(body);
+    const int n = mstmm_modes_of(modal);
+    const mstmm_section *section = body->section;
+    real *laid = section ? state->workspace + section->place : NULL;
+    real *d_laid = section ? state->slope->workspace + section->place : NULL;
+    mstmm_modal_section_slope(
+        .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
+        .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
+        .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
+        .eta = state->q + modal->q, .etad = state->u + modal->u,
+        .Phi = laid + MSTMM_SECTION_PHI(n), .d_eta = state->slope->q + modal->q,
+        .d_etad = state->slope->u + modal->u, .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
+        .d_x = d_laid + MSTMM_SECTION_X(n), .d_Psi = d_laid + MSTMM_SECTION_PSI(n),
+        .d_xd = d_laid + MSTMM_SECTION_XD(n), .d_Psid = d_laid + MSTMM_SECTION_PSID(n),
+        .d_xdd = d_laid + MSTMM_SECTION_XDD(n), .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
+    if (body->section && !body->section->inward) {
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_modal_outward_slope(
+            .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
+            .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
+            .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
+            .Psidd = laid + MSTMM_SECTION_PSIDD(n), .d_x = d_laid + MSTMM_SECTION_X(n),
+            .d_Psi = d_laid + MSTMM_SECTION_PSI(n), .d_xd = d_laid + MSTMM_SECTION_XD(n),
+            .d_Psid = d_laid + MSTMM_SECTION_PSID(n), .d_xdd = d_laid + MSTMM_SECTION_XDD(n),
+            .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n), .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .d_H6 = d_laid + MSTMM_SECTION_H6(n),
+            .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+            .d_c = d_block + MSTMM_BLOCK_HINGE_C);
+    } else {
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_modal_inward_slope(
+            .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
+            .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
+            .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
+            .Psidd = laid + MSTMM_SECTION_PSIDD(n), .d_x = d_laid + MSTMM_SECTION_X(n),
+            .d_Psi = d_laid + MSTMM_SECTION_PSI(n), .d_xd = d_laid + MSTMM_SECTION_XD(n),
+            .d_Psid = d_laid + MSTMM_SECTION_PSID(n), .d_xdd = d_laid + MSTMM_SECTION_XDD(n),
+            .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n), .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .d_H6 = d_laid + MSTMM_SECTION_H6(n),
+            .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+            .d_c = d_block + MSTMM_BLOCK_HINGE_C);
+    }
+    mstmm_modal_subspace_slope(
+        .n = modal->n, .H6 = laid + MSTMM_SECTION_H6(n), .Phi = laid + MSTMM_SECTION_PHI(n),
+        .d_H6 = d_laid + MSTMM_SECTION_H6(n), .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
+        .d_H = d_laid + MSTMM_SECTION_H(n));
+    if (state->given) {
+        real *block = state->workspace + body->block;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_modal_imposed_slope(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .s = state->given + modal->u,
+            .c = block + MSTMM_BLOCK_HINGE_C, .d_H = d_laid + MSTMM_SECTION_H(n),
+            .d_s = state->slope->given + modal->u, .d_c = d_block + MSTMM_BLOCK_HINGE_C,
+            .d_c_s = d_c);
+        memcpy(d_block + MSTMM_BLOCK_HINGE_C, d_c, 6 * sizeof(real));
+    }
+    return 0;
+}
+
+/* Derivatives: relative motion across the hinge. */
+static int mstmm_at_hinge_motion_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    mstmm_hinge_slope_of(state, body,
+        .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+        .d_q = state->slope->q + body->q, .d_u = state->slope->u + body->u,
+        .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+        .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+        .d_w = d_block + MSTMM_BLOCK_HINGE_W, .d_c = d_block + MSTMM_BLOCK_HINGE_C,
+        .d_qdot = state->slope->qdot + body->q);
+    return 0;
+}
+
+/* Derivatives: s, e and the modal rows of a flexible body at its bias motion. */
+static int mstmm_at_modal_own_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const mstmm_modal *modal = mstmm_modal_of(body);
+    const int n = mstmm_modes_of(modal);
+    real *modes = modal ? state->workspace + modal->place : NULL;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+    mstmm_modal_residual_slope(
+        .n = modal->n, .p = modal->moments.rigid, .C = modal->moments.c, .P = modal->moments.p,
+        .B = modal->moments.b, .Z_xx = modal->moments.z[0], .Z_xy = modal->moments.z[1],
+        .Z_xz = modal->moments.z[2], .Z_yy = modal->moments.z[3], .Z_yz = modal->moments.z[4],
+        .Z_zz = modal->moments.z[5], .Y_x = modal->moments.y[0], .Y_y = modal->moments.y[1],
+        .Y_z = modal->moments.y[2], .G_x = modal->moments.g[0], .G_y = modal->moments.g[1],
+        .G_z = modal->moments.g[2], .M = modal->moments.m, .K = modal->stiffness,
+        .D = modal->damping, .eta = state->q + modal->q, .etad = state->u + modal->u,
+        .motion = block + MSTMM_BLOCK_MOTION, .S_rf = modes + MSTMM_MODES_S_RF(n),
+        .A = modes + MSTMM_MODES_A(n), .d_eta = state->slope->q + modal->q,
+        .d_etad = state->slope->u + modal->u, .d_motion = d_block + MSTMM_BLOCK_MOTION,
+        .d_S_rf = d_modes + MSTMM_MODES_S_RF(n), .d_A = d_modes + MSTMM_MODES_A(n),
+        .d_e = d_block + MSTMM_BLOCK_E, .d_e_f = d_modes + MSTMM_MODES_E_F(n));
+    for (int j = 0; j < n; j++)
+        (state->slope->qdot + modal->q)[j] = (state->slope->u + modal->u)[j];
+    if (state->given) {
+        mstmm_modal_prescribed_slope(
+            .n = modal->n, .S_rf = modes + MSTMM_MODES_S_RF(n),
+            .S_ff = modes + MSTMM_MODES_S_FF(n), .s = state->given + modal->u,
+            .d_S_rf = d_modes + MSTMM_MODES_S_RF(n), .d_s = state->slope->given + modal->u,
+            .d_e = d_block + MSTMM_BLOCK_E, .d_e_f = d_modes + MSTMM_MODES_E_F(n));
+    }
+    return 0;
+}
+
+/* Derivatives: hinge motion, bias motion, own inertia and own load of a body. */
+static int mstmm_at_forward_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (body->section) {
+        code = mstmm_at_section_motion_slope(state, index);
+        if (code) return code;
+    } else {
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+    }
+    mstmm_generic_forward_slope(nu,
+        .Rt = body->connection, .ro = body->connection + 9, .R = block + MSTMM_BLOCK_HINGE_R,
+        .d = block + MSTMM_BLOCK_HINGE_D, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
+        .c = block + MSTMM_BLOCK_HINGE_C, .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+        .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+        .d_d = d_block + MSTMM_BLOCK_HINGE_D, .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+        .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+        .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+        .d_motion_I = d_parent + MSTMM_BLOCK_MOTION, .d_Rc = d_block + MSTMM_BLOCK_R,
+        .d_r = d_block + MSTMM_BLOCK_SHIFT, .d_motion = d_block + MSTMM_BLOCK_MOTION);
+    if (body->modal) {
+        code = mstmm_at_modal_own_slope(state, index);
+        if (code) return code;
+    } else {
+        mstmm_body_bias_load_slope(body->bias_load_slope,
+            .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
+            .d_motion = d_block + MSTMM_BLOCK_MOTION, .d_e = d_block + MSTMM_BLOCK_E);
+    }
+    return 0;
+}
+
+/* Derivatives: efforts of the caller where the sweep reads them. */
+static int mstmm_at_efforts_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    if (state->efforts) {
+        const int nu = body->nu;
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < nu; j++)
+            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->slope->efforts + body->u)[j];
+    } else {
+        const int nu = body->nu;
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < nu; j++)
+            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = 0;
+    }
+    return 0;
+}
+
+/* Derivatives: laws on hinge coordinates, added to the efforts. */
+static int mstmm_at_laws_slope(mstmm_state *state, int index)
+{
+    real effort[6];
+    real tau[1];
+    real V[1];
+    real P[1];
+    real d_effort[6];
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *d_block = state->slope->workspace + body->block;
+    for (int j = 0; j < law->n; j++)
+        effort[j] = mstmm_value_at(state, law->effort[j]);
+    for (int j = 0; j < law->n; j++)
+        d_effort[j] = mstmm_value_at(state->slope, law->effort[j]);
+    if (law->kind == 0) {
+        mstmm_law_coordinate(law->evaluate,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort, .tau = tau, .V = V, .P = P);
+        mstmm_law_coordinate_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    } else {
+        mstmm_law_quaternion_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .twist_ref = state->memory + law->twist,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    }
+    for (int j = 0; j < law->n; j++)
+        (d_block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += d_tau[j];
+    return 0;
+}
+
+/* Derivatives: axes, position and velocity of P of a body, inertial axes. */
+static int mstmm_at_poses_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    if (mstmm_idle(state, body)) return 0;
+    mstmm_frames_pose_slope(
+        .A_I = parent + MSTMM_BLOCK_A, .x_I = parent + MSTMM_BLOCK_X,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .d_A_I = d_parent + MSTMM_BLOCK_A, .d_x_I = d_parent + MSTMM_BLOCK_X,
+        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+        .d_A = d_block + MSTMM_BLOCK_A, .d_x = d_block + MSTMM_BLOCK_X);
+    mstmm_frames_velocity_slope(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .v_I = parent + MSTMM_BLOCK_V, .w_I = parent + MSTMM_BLOCK_MOTION,
+        .v_rel = block + MSTMM_BLOCK_HINGE_V, .d_Rc = d_block + MSTMM_BLOCK_R,
+        .d_r = d_block + MSTMM_BLOCK_SHIFT, .d_v_I = d_parent + MSTMM_BLOCK_V,
+        .d_w_I = d_parent + MSTMM_BLOCK_MOTION, .d_v_rel = d_block + MSTMM_BLOCK_HINGE_V,
+        .d_v = d_block + MSTMM_BLOCK_V);
+    return 0;
+}
+
+/* Derivatives: viscous drag of flexible bodies: momentum under the density of the drag. */
+static int mstmm_at_drag_slope(mstmm_state *state, int index)
+{
+    real d_h[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const mstmm_modal *modal = mstmm_modal_of(body);
+    const int n = mstmm_modes_of(modal);
+    real *modes = modal ? state->workspace + modal->place : NULL;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+    if (!(body->modal && body->modal->drag)) return 0;
+    mstmm_modal_momentum_slope(
+        .n = modal->n, .p = modal->drag->rigid, .C = modal->drag->c, .P = modal->drag->p,
+        .B = modal->drag->b, .Z_xx = modal->drag->z[0], .Z_xy = modal->drag->z[1],
+        .Z_xz = modal->drag->z[2], .Z_yy = modal->drag->z[3], .Z_yz = modal->drag->z[4],
+        .Z_zz = modal->drag->z[5], .Y_x = modal->drag->y[0], .Y_y = modal->drag->y[1],
+        .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
+        .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
+        .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
+        .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A_DRAG(n),
+        .h_f = modes + MSTMM_MODES_RIGHT(n), .d_eta = state->slope->q + modal->q,
+        .d_etad = state->slope->u + modal->u, .d_v = d_block + MSTMM_BLOCK_V,
+        .d_w = d_block + MSTMM_BLOCK_MOTION, .d_S_rf = d_modes + MSTMM_MODES_BASED(n),
+        .d_A = d_modes + MSTMM_MODES_A_DRAG(n), .d_h = d_h,
+        .d_h_f = d_modes + MSTMM_MODES_RIGHT(n));
+    for (int j = 0; j < 6; j++)
+        (d_block + MSTMM_BLOCK_E)[j] += d_h[j];
+    for (int j = 0; j < n; j++)
+        (d_modes + MSTMM_MODES_E_F(n))[j] += (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    return 0;
+}
+
+/* Derivatives: force and moment at a point of a body, added to e. */
+static int mstmm_at_loads_slope(mstmm_state *state, int index)
+{
+    real A_F[9];
+    real d_A_F[9];
+    real F[3];
+    real M[3];
+    real d_F[3];
+    real d_M[3];
+    const mstmm_load *load = &state->model->loads[index];
+    real *on = mstmm_block(state->model, state->workspace, load->body);
+    real *axes = mstmm_block(state->model, state->workspace, load->axes);
+    real *d_on = mstmm_block(state->model, state->slope->workspace, load->body);
+    real *d_axes = mstmm_block(state->model, state->slope->workspace, load->axes);
+    mstmm_frames_end_frame(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .A_end = A_F);
+    mstmm_frames_end_frame_slope(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .d_A = d_axes + MSTMM_BLOCK_A,
+        .d_A_end = d_A_F);
+    for (int j = 0; j < 3; j++)
+        F[j] = mstmm_value_at(state, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        d_F[j] = mstmm_value_at(state->slope, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        M[j] = mstmm_value_at(state, load->moment[j]);
+    for (int j = 0; j < 3; j++)
+        d_M[j] = mstmm_value_at(state->slope, load->moment[j]);
+    mstmm_frames_applied_load_slope(
+        .A = on + MSTMM_BLOCK_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
+        .d_A = d_on + MSTMM_BLOCK_A, .d_A_F = d_A_F, .d_F = d_F, .d_M = d_M,
+        .d_e = d_on + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: massless elements between two ends, added to e of both. */
+static int mstmm_at_forces_slope(mstmm_state *state, int index)
+{
+    real x_F[3];
+    real v_F[3];
+    real unused_a_K[3];
+    real d_x_F[3];
+    real d_v_F[3];
+    real w_F[3];
+    real unused_alpha_K[3];
+    real d_w_F[3];
+    real A_F[9];
+    real d_A_F[9];
+    real x_T[3];
+    real v_T[3];
+    real d_x_T[3];
+    real d_v_T[3];
+    real w_T[3];
+    real d_w_T[3];
+    real A_T[9];
+    real d_A_T[9];
+    real length[2];
+    real d_length[2];
+    real effort[1];
+    real F[3];
+    real M[3];
+    real V[1];
+    real P[1];
+    real d_effort[1];
+    real d_F[3];
+    real d_M[3];
+    real F_back[3];
+    real M_back[3];
+    real d_F_back[3];
+    real d_M_back[3];
+    const mstmm_force *force = &state->model->forces[index];
+    real *from = mstmm_block(state->model, state->workspace, force->body_f);
+    real *to = mstmm_block(state->model, state->workspace, force->body_t);
+    real *d_from = mstmm_block(state->model, state->slope->workspace, force->body_f);
+    real *d_to = mstmm_block(state->model, state->slope->workspace, force->body_t);
+    int code;
+    mstmm_frames_point(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
+    mstmm_frames_point_slope(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
+        .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F,
+        .d_v_K = d_v_F);
+    mstmm_frames_turning(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_F, .alpha_K = unused_alpha_K);
+    mstmm_frames_turning_slope(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
+    mstmm_frames_end_frame(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .A_end = A_F);
+    mstmm_frames_end_frame_slope(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+        .d_A_end = d_A_F);
+    mstmm_frames_point(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
+    mstmm_frames_point_slope(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
+        .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
+        .d_v_K = d_v_T);
+    mstmm_frames_turning(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_T, .alpha_K = unused_alpha_K);
+    mstmm_frames_turning_slope(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
+    mstmm_frames_end_frame(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .A_end = A_T);
+    mstmm_frames_end_frame_slope(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+        .d_A_end = d_A_T);
+    effort[0] = 0;
+    d_effort[0] = 0;
+    if (force->effort) {
+        mstmm_frames_length(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .l = length);
+        mstmm_frames_length_slope(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .d_x_F = d_x_F, .d_v_F = d_v_F,
+            .d_x_T = d_x_T, .d_v_T = d_v_T, .d_l = d_length);
+        code = mstmm_given_effort(state, force->effort, length, effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+        code = mstmm_given_effort_slope(state, force->effort_slope, length, d_length, d_effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+    }
+    code = mstmm_force_wrench(force->wrench,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
+        .P = P);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
+    mstmm_force_wrench_slope(force->wrench_slope,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
+        .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
+        .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F, .d_M = d_M);
+    mstmm_frames_opposite(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
+    mstmm_frames_opposite_slope(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
+        .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
+    mstmm_frames_applied_load_slope(
+        .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
+        .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
+        .d_e = d_to + MSTMM_BLOCK_E);
+    mstmm_frames_applied_load_slope(
+        .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
+        .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F_back,
+        .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: efforts beyond the laws' own, and the load on the parent. */
+static int mstmm_at_required_slope(mstmm_state *state, int index)
+{
+    real tau[6];
+    real d_tau[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    if (mstmm_idle(state, body)) return 0;
+    if (body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_modal_modal_effort_slope(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+            .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+            .d_e = d_block + MSTMM_BLOCK_E, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+            .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    }
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (state->slope->required + modal->u)[j] = (d_modes + MSTMM_MODES_E_F(n))[j];
+    }
+    mstmm_generic_effort(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E, .tau = tau);
+    mstmm_generic_effort_slope(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E,
+        .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_f = d_block + MSTMM_BLOCK_E,
+        .d_tau = d_tau);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_frames_driven_effort_slope(
+            .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .d_felt = d_tau + k,
+            .d_udot = state->slope->given + body->u + k,
+            .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
+            .d_tau_d = state->slope->required + body->u + k);
+    }
+    mstmm_frames_transport_slope(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .e = block + MSTMM_BLOCK_E,
+        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+        .d_e = d_block + MSTMM_BLOCK_E, .d_e_I = d_parent + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Loads begun from none. */
+static int mstmm_at_no_loads(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *d_block = state->slope->workspace + body->block;
+    memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+    }
+    return 0;
+}
+
+/* How the coordinates of a hinge follow its speeds within a step. */
+static int mstmm_at_lag(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    const int nq = body->nq;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int code;
+    for (int c = 0; c < nq; c++) {
+        mstmm_aim_coordinate(state, body, c);
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+        memcpy(tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq) + nq * c, state->slope->qdot + body->q, (size_t)(nq) * sizeof(real));
+        memcpy(tangent + MSTMM_TANGENT_UNIT(body->nu, body->nq) + nq * c, state->slope->q + body->q, (size_t)(nq) * sizeof(real));
+    }
+    mstmm_aim_nowhere(state, body);
+    mstmm_tangent_lag(
+        .n = nq, .sq = &state->tangents->sq, .kappa = &state->tangents->kappa,
+        .one = tangent + MSTMM_TANGENT_UNIT(body->nu, body->nq),
+        .g_q = tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq),
+        .A = tangent + MSTMM_TANGENT_RATES(body->nu, body->nq),
+        .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
+        .work = tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq));
+    for (int c = 0; c < nu; c++) {
+        mstmm_aim_rate(state, body, c);
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+        mstmm_tangent_lagged(
+            .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
+            .rate = state->slope->qdot + body->q,
+            .dq = tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * c);
+    }
+    mstmm_aim_nowhere(state, body);
+    return 0;
+}
+
+/* A body's own load by its motion and its modes. */
+static int mstmm_at_tangent_own(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    for (int j = 0; j < nu * nu; j++)
+        (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+    if (!body->straight) {
+        code = mstmm_at_lag(state, index);
+        if (code) return code;
+    }
+    if (!body->modal) {
+        real *block = state->workspace + body->block;
+        mstmm_body_load_by_motion(body->load_by_motion,
+            .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
+            .J = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+    } else {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int c = 0; c < 9; c++) {
+            mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c);
+            code = mstmm_at_modal_own_slope(state, index);
+            if (code) return code;
+            memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+            memcpy(bend + MSTMM_BEND_Z_Z(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1);
+        for (int c = 0; c < n; c++) {
+            mstmm_aim_mode(state, modal, c);
+            code = mstmm_at_modal_own_slope(state, index);
+            if (code) return code;
+            memcpy(bend + MSTMM_BEND_K(n) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+            memcpy(bend + MSTMM_BEND_Z_X(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_no_mode(state, modal);
+    }
+    if (body->modal && !body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        for (int j = 0; j < 9 * n; j++)
+            (bend + MSTMM_BEND_B(n))[j] = 0;
+        for (int j = 0; j < 6 * n; j++)
+            (bend + MSTMM_BEND_G(n))[j] = 0;
+        for (int j = 0; j < n * n; j++)
+            (bend + MSTMM_BEND_W(n))[j] = 0;
+        for (int j = 0; j < 6 * n; j++)
+            (bend + MSTMM_BEND_STILL(n))[j] = 0;
+    }
+    return 0;
+}
+
+/* Slopes of a law along the unknowns of its hinge. */
+static int mstmm_at_law_slopes(mstmm_state *state, int index)
+{
+    real effort[6];
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *tangent = state->tangents->numbers + body->tangent;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    for (int c = 0; c < speeds; c++) {
+        mstmm_aim_unknown(state, body, columns[c]);
+        if (law->kind == 0) {
+            mstmm_law_coordinate_slope(law->evaluate_slope,
+                .p = law->p, .q = state->q + body->q + law->coordinate,
+                .u = state->u + body->u + law->speed, .effort = effort,
+                .d_q = state->slope->q + body->q + law->coordinate,
+                .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+                .d_tau = d_tau);
+        }
+        if (!(law->kind == 0)) {
+            mstmm_law_quaternion_slope(law->evaluate_slope,
+                .p = law->p, .q = state->q + body->q + law->coordinate,
+                .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+                .twist_ref = state->memory + law->twist,
+                .d_q = state->slope->q + body->q + law->coordinate,
+                .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+                .d_tau = d_tau);
+        }
+        for (int j = 0; j < law->n; j++)
+            (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed)[j] += d_tau[j];
+    }
+    mstmm_aim_nowhere(state, body);
+    return 0;
+}
+
+/* Unknowns of a body eliminated, the rest carried to the parent. */
+static int mstmm_at_tangent_condense(mstmm_state *state, int index)
+{
+    real S_c[54];
+    real d_tau[6];
+    real tau[6];
+    real d_required[6];
+    real free[6];
+    real T[54];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    real *tangent = state->tangents->numbers + body->tangent;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (body->modal && body->section) {
+        const int nu = body->nu;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        for (int c = 0; c < n; c++) {
+            mstmm_aim_mode(state, modal, c);
+            code = mstmm_at_section_motion_slope(state, index);
+            if (code) return code;
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+            mstmm_generic_forward_slope(nu,
+                .Rt = body->connection, .ro = body->connection + 9,
+                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
+                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+                .d_motion = d_block + MSTMM_BLOCK_MOTION);
+            memcpy(bend + MSTMM_BEND_B(n) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
+            mstmm_frames_tangent_turned(
+                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
+                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
+                .G = bend + MSTMM_BEND_G(n) + 6 * c);
+            mstmm_modal_modal_effort_slope(
+                .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+                .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+                .d_e = mstmm_zeros, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+                .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+            memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_no_mode(state, modal);
+        code = mstmm_tangent_node_own(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
+            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
+            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
+            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+    }
+    if (body->modal && !body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        code = mstmm_tangent_node_own(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
+            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
+            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
+            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+    }
+    if (body->modal) {
+        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
+    }
+    if (!body->section && speeds) {
+        const int nu = body->nu;
+        real *d_block = state->slope->workspace + body->block;
+        for (int c = 0; c < speeds; c++) {
+            mstmm_aim_unknown(state, body, columns[c]);
+            for (int j = 0; j < nu; j++)
+                (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = (state->slope->given + body->u)[j];
+            code = mstmm_at_hinge_motion_slope(state, index);
+            if (code) return code;
+            memcpy(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c, (size_t)(nu) * sizeof(real));
+            mstmm_generic_forward_slope(nu,
+                .Rt = body->connection, .ro = body->connection + 9,
+                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
+                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+                .d_motion = d_block + MSTMM_BLOCK_MOTION);
+            memcpy(tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
+            mstmm_frames_tangent_turned(
+                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
+                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
+                .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c);
+            mstmm_generic_effort_slope(nu,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_f = mstmm_zeros,
+                .d_tau = d_tau);
+            for (int k = 0; k < body->nu; k++) {
+                mstmm_frames_driven_effort_slope(
+                    .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+                    .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .d_felt = d_tau + k,
+                    .d_udot = state->slope->given + body->u + k,
+                    .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
+                    .d_tau_d = d_required + k);
+            }
+            for (int k = 0; k < speeds; k++)
+                free[k] = d_required[columns[k]];
+            memcpy(tangent + MSTMM_TANGENT_W(body->nu, body->nq) + speeds * c, free, (size_t)(speeds) * sizeof(real));
+        }
+        mstmm_aim_nowhere(state, body);
+        for (int k = 0; k < speeds; k++)
+            for (int row = 0; row < 6; row++)
+                (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+        code = mstmm_tangent_node(
+            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq),
+            .right = tangent + MSTMM_TANGENT_RIGHT(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), .S_c = S_c,
+            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
+    }
+    if (body->section && !body->section->inward) {
+        const int nu = body->nu;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        for (int c = 0; c < n; c++) {
+            mstmm_aim_mode(state, modal, c);
+            code = mstmm_at_section_motion_slope(state, index);
+            if (code) return code;
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+            mstmm_generic_forward_slope(nu,
+                .Rt = body->connection, .ro = body->connection + 9,
+                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
+                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+                .d_motion = d_block + MSTMM_BLOCK_MOTION);
+            memcpy(port + MSTMM_PORT_B(n) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
+            mstmm_frames_tangent_turned(
+                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
+                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
+                .G = port + MSTMM_PORT_G(n) + 6 * c);
+            mstmm_modal_modal_effort_slope(
+                .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+                .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+                .d_e = mstmm_zeros, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+                .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+            memcpy(port + MSTMM_PORT_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_no_mode(state, modal);
+    }
+    mstmm_frames_tangent_carry(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+        .w = block + MSTMM_BLOCK_HINGE_W, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+        .T = T, .S_I = mstmm_tangent_at(state, body->parent));
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_absorb(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
+            .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .T = T,
+            .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
+            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    return 0;
+}
+
+/* A right-hand side as loads of the rows. */
+static int mstmm_at_tangent_column(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+    for (int j = 0; j < nu; j++)
+        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = 0;
+    for (int j = 0; j < nu; j++)
+        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] -= (state->column + body->u)[j];
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] -= (state->column + modal->u)[j];
+    }
+    return 0;
+}
+
+/* Loads of a right-hand side carried to the parent. */
+static int mstmm_at_tangent_carried(mstmm_state *state, int index)
+{
+    real e_c[6];
+    real rows[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (body->modal && body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        code = mstmm_tangent_push(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
+            .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (body->modal && !body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        code = mstmm_tangent_push(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
+            .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (!body->section && speeds) {
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        for (int k = 0; k < speeds; k++)
+            rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
+        code = mstmm_tangent_push(
+            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = rows, .rest = tangent + MSTMM_TANGENT_REST(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .e_c = e_c,
+            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_modal_effort(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    }
+    mstmm_frames_transport(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .e = d_block + MSTMM_BLOCK_E, .e_I = d_parent + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Unknowns that answer a right-hand side. */
+static int mstmm_at_tangent_answered(mstmm_state *state, int index)
+{
+    real z[9];
+    real x[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    if (mstmm_idle(state, body)) return 0;
+    for (int j = 0; j < nu; j++)
+        (state->answer + body->u)[j] = 0;
+    mstmm_frames_tangent_moved(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+        .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
+        .z = d_block + MSTMM_BLOCK_MOTION);
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
+            .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
+        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    if (!body->section && speeds) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        mstmm_tangent_answer(
+            .n = speeds, .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq),
+            .z_c = d_block + MSTMM_BLOCK_MOTION, .x = x, .z = z);
+        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
+                         : 0;
+    }
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_answer(
+            .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
+            .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
+            .x = state->answer + modal->u, .z = z);
+        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    return 0;
+}
+
 /* Mass matrix of the frame, momentum and energy of a flexible body. */
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T)
 {
@@ -971,6 +2025,23 @@ int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
         .S = given_S, .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A(n),
         .h = given_h, .h_f = modes + MSTMM_MODES_RIGHT(n), .T = given_T);
+    return 0;
+}
+
+/* Change of the coordinates of a hinge by that of its speeds. */
+int mstmm_at_lagged(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nq = body->nq;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int code;
+    code = mstmm_at_hinge_motion_slope(state, index);
+    if (code) return code;
+    for (int j = 0; j < nq; j++)
+        (state->slope->qdot + body->q)[j] += (state->tangents->rho + body->q)[j];
+    mstmm_tangent_lagged(
+        .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
+        .rate = state->slope->qdot + body->q, .dq = state->tangents->change + body->q);
     return 0;
 }
 
@@ -1167,6 +2238,184 @@ static int mstmm_pass_column_answered(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
         const int code = mstmm_at_column_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_prescribed_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (run->numbers && state->linked) continue;
+        for (int i = run->first; i < run->first + run->count; i++) {
+            const int code = mstmm_at_prescribed_slope(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+static int mstmm_pass_drives_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_drives; i++) {
+        const int code = mstmm_at_drives_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_forward_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_forward_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_efforts_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int k = 0; k < model->n_runs; k++) {
+        const mstmm_branch *run = &model->runs[k];
+        if (run->numbers && state->linked && !model->n_laws) continue;
+        for (int i = run->first; i < run->first + run->count; i++) {
+            const int code = mstmm_at_efforts_slope(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_laws_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_poses_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_poses_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_drag_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_drag_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_loads_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_loads; i++) {
+        const int code = mstmm_at_loads_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_forces_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_forces; i++) {
+        const int code = mstmm_at_forces_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_required_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_required_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_no_loads(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_no_loads(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_tangent_own(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_tangent_own(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_law_slopes(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_law_slopes(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_tangent_condense(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_tangent_condense(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_tangent_column(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_tangent_column(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_tangent_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_tangent_carried(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_tangent_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_tangent_answered(state, i);
         if (code) return code;
     }
     return 0;
@@ -1387,6 +2636,124 @@ int mstmm_run_solution(mstmm_state *state)
     code = mstmm_pass_column_carried(state);
     if (code) return code;
     code = mstmm_pass_column_answered(state);
+    if (code) return code;
+    return 0;
+}
+
+/* Derivative of the efforts that given accelerations need. */
+int mstmm_run_required_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    code = mstmm_pass_prescribed_slope(state);
+    if (code) return code;
+    if (model->n_drives) {
+        code = mstmm_hook_drive_slopes(state);
+        if (code) return code;
+    }
+    if (model->n_drives) {
+        code = mstmm_pass_drives_slope(state);
+        if (code) return code;
+    }
+    if (model->n_values) {
+        code = mstmm_hook_expression_slopes(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_forward_slope(state);
+    if (code) return code;
+    code = mstmm_pass_efforts_slope(state);
+    if (code) return code;
+    code = mstmm_pass_laws_slope(state);
+    if (code) return code;
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_poses_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product) && model->n_flexible) {
+        code = mstmm_pass_drag_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_loads_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_forces_slope(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_required_slope(state);
+    if (code) return code;
+    return 0;
+}
+
+/* Derivative of what acts on bodies, and of the values of expressions. */
+int mstmm_run_applied_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    code = mstmm_pass_prescribed_slope(state);
+    if (code) return code;
+    if (model->n_drives) {
+        code = mstmm_hook_drive_slopes(state);
+        if (code) return code;
+    }
+    if (model->n_drives) {
+        code = mstmm_pass_drives_slope(state);
+        if (code) return code;
+    }
+    if (model->n_values) {
+        code = mstmm_hook_expression_slopes(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_forward_slope(state);
+    if (code) return code;
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_poses_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_no_loads(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product) && model->n_flexible) {
+        code = mstmm_pass_drag_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_loads_slope(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_forces_slope(state);
+        if (code) return code;
+    }
+    return 0;
+}
+
+/* Tangent of inverse dynamics factored, behind inverse dynamics itself. */
+int mstmm_run_tangent(mstmm_state *state)
+{
+    int code;
+    code = mstmm_pass_tangent_own(state);
+    if (code) return code;
+    code = mstmm_pass_law_slopes(state);
+    if (code) return code;
+    code = mstmm_pass_tangent_condense(state);
+    if (code) return code;
+    return 0;
+}
+
+/* One right-hand side through the factored tangent. */
+int mstmm_run_tangent_solution(mstmm_state *state)
+{
+    int code;
+    code = mstmm_pass_tangent_column(state);
+    if (code) return code;
+    code = mstmm_hook_unit_load(state);
+    if (code) return code;
+    code = mstmm_pass_tangent_carried(state);
+    if (code) return code;
+    code = mstmm_pass_tangent_answered(state);
     if (code) return code;
     return 0;
 }

@@ -10,6 +10,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion);
 int mstmm_at_condense(mstmm_state *state, int index);
 int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta);
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T);
+int mstmm_at_lagged(mstmm_state *state, int index);
 int mstmm_run_given(mstmm_state *state);
 int mstmm_run_accelerations(mstmm_state *state);
 int mstmm_run_inverse_dynamics(mstmm_state *state);
@@ -17,9 +18,15 @@ int mstmm_run_motion(mstmm_state *state);
 int mstmm_run_posed(mstmm_state *state);
 int mstmm_run_factorisation(mstmm_state *state);
 int mstmm_run_solution(mstmm_state *state);
+int mstmm_run_required_slope(mstmm_state *state);
+int mstmm_run_applied_slope(mstmm_state *state);
+int mstmm_run_tangent(mstmm_state *state);
+int mstmm_run_tangent_solution(mstmm_state *state);
 
 /* Pieces of the engine's own. */
+int mstmm_hook_drive_slopes(mstmm_state *state);
 int mstmm_hook_drive_values(mstmm_state *state);
+int mstmm_hook_expression_slopes(mstmm_state *state);
 int mstmm_hook_expression_values(mstmm_state *state);
 int mstmm_hook_links_condense(mstmm_state *state);
 int mstmm_hook_links_forward(mstmm_state *state);
@@ -27,5 +34,6 @@ int mstmm_hook_links_recover(mstmm_state *state);
 int mstmm_hook_product(mstmm_state *state);
 int mstmm_hook_product_before_loads(mstmm_state *state);
 int mstmm_hook_product_compared(mstmm_state *state);
+int mstmm_hook_unit_load(mstmm_state *state);
 
 #endif

@@ -13,7 +13,7 @@ from mstmm.ir import KernelIR
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, screw, sweep
+from ..equations import columns, frames, laws, link, screw, sweep, tangent
 from ..equations import force as force_kernels
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
@@ -33,6 +33,7 @@ FRAME_DERIVATIONS = (
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.driven_effort, frames.speed_power, frames.length, frames.turned,
     frames.classical_body, frames.state_deviation,
+    tangent.tangent_carry, tangent.tangent_moved, tangent.tangent_turned,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
@@ -181,6 +182,19 @@ def modal_kernels() -> tuple[Kernel, ...]:
     )
 
 
+def tangent_kernels() -> tuple[Kernel, ...]:
+    """Elimination of the unknowns of an implicit step: n of a hinge or of a flexible body."""
+    return (
+        Kernel("node", tangent.node(own=False)),
+        Kernel("node_own", tangent.node(own=True)),
+        *(
+            Kernel(make.__name__, make())
+            for make in (tangent.absorb, tangent.push, tangent.answer, tangent.displaced,
+                         tangent.lag, tangent.lagged)
+        ),
+    )  # fmt: skip
+
+
 def beam_kernels() -> tuple[Kernel, ...]:
     """Beams: integrands per length, integrated along the beam when a scene is packed."""
     derivations = beam_fields.KERNELS | beam_second_order.KERNELS
@@ -203,6 +217,7 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "laws"] = law_kernels
     table["sweep", "screw"] = screw_kernels
     table["sweep", "modal"] = modal_kernels
+    table["sweep", "tangent"] = tangent_kernels
     table["sweep", "beam"] = beam_kernels
     for name in links():
         table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]

@@ -27,8 +27,10 @@ from .kernels import (
     links,
     modal_kernels,
     screw_kernels,
+    tangent_kernels,
 )
 from .registry import Element, builtin_elements, builtin_hinges, kind_of
+from .slopes import with_slopes
 
 __all__ = [
     "FRAME_DERIVATIONS",
@@ -43,8 +45,8 @@ __all__ = [
 ]
 
 
-def _lowered(kernels: tuple[Kernel, ...]) -> tuple[KernelIR, ...]:
-    return tuple(kernel.ir() for kernel in kernels)
+def _lowered(kernels: tuple[Kernel, ...], group: str = "") -> tuple[KernelIR, ...]:
+    return with_slopes(group, (kernel.ir() for kernel in kernels))
 
 
 def spec_of(element: Element) -> ElementSpec:
@@ -55,7 +57,7 @@ def spec_of(element: Element) -> ElementSpec:
 def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
     """The element with its kernels, once they are derived."""
     hinge = element if isinstance(element, Hinge) else None
-    lowered = _lowered(kernels)
+    lowered = _lowered(kernels, kind_of(element))
     return ElementSpec(
         kind_of(element),
         element.name,
@@ -93,20 +95,21 @@ def generic_spec(nu: int) -> ElementSpec:
     """The sweep's steps for any hinge with `nu` free speeds."""
     return ElementSpec(
         "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
-        _lowered(generic_kernels(nu)), sweep.SOURCES,
+        _lowered(generic_kernels(nu), "generic"), sweep.SOURCES,
     )  # fmt: skip
 
 
 def shared_specs() -> list[ElementSpec]:
     """What is no element of a scene: frames, laws, generic sweep."""
     plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
-    frames, laws = _lowered(frame_kernels()), _lowered(law_kernels())
+    frames, laws = _lowered(frame_kernels(), "frames"), _lowered(law_kernels(), "laws")
     screws = _lowered(screw_kernels())
     return [
         plain(name="frames", title="poses, points and loads", kernels=frames),
         plain(name="laws", title="laws on hinge coordinates", kernels=laws),
         plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
-        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels())),
+        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels(), "modal")),
+        plain(name="tangent", title="tangent of a step", kernels=_lowered(tangent_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
             plain(

@@ -15,7 +15,7 @@ from itertools import product
 from mstmm.ir import Constant, Guard, KernelIR, Port, Solve
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.replay import Counted
-from mstmm.ir.unrolled import solve_symmetric
+from mstmm.ir.unrolled import solve_by_rows, solve_symmetric
 
 Nodes = list[Node]
 Guarding = Callable[[Node, int], None]
@@ -100,16 +100,22 @@ class _Replay(Counted):
         self._judge(condition, judged)
 
     def solve(self, solve: Solve) -> None:
-        """Elimination as `Solve` has it, which reads the lower half of the matrix."""
+        """Elimination as `Solve` has it."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         width = len(b) // n if n else 0
-        found = solve_symmetric(
-            self.graph,
-            [[a[n * j + i] for j in range(n)] for i in range(n)],
-            [list(b[width * i : width * (i + 1)]) for i in range(n)],
-            lambda condition, i: self.judge(condition, solve),
-            Fraction(str(solve.relative_pivot)),
-        )
+        right = [list(b[width * i : width * (i + 1)]) for i in range(n)]
+        if solve.symmetric:
+            found = solve_symmetric(
+                self.graph,
+                [[a[n * j + i] for j in range(n)] for i in range(n)],
+                right,
+                lambda condition, i: self.judge(condition, solve),
+                Fraction(str(solve.relative_pivot)),
+            )
+        else:
+            found = solve_by_rows(
+                self.graph, [list(a[n * i : n * (i + 1)]) for i in range(n)], right
+            )
         self.results[solve.port][:] = [node for row in found for node in row]
 
 

@@ -136,6 +136,7 @@ class Replay(Slots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "balance": True, "efforts": True, "inverse": False,
+            "driving": True,
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),
             "flexible": any(body.modal for body in s.bodies),
@@ -144,7 +145,7 @@ class Replay(Slots):
 
     def _has(self, trait: str) -> bool:
         """Whether the subject has a trait; see `schedule.words`."""
-        if trait in ("balance", "efforts", "inverse"):
+        if trait in ("balance", "efforts", "inverse", "driving"):
             return self._scene_has(trait)
         if trait == "coordinate":
             return self.at.law is not None and not self.at.law.axes

@@ -82,10 +82,9 @@ class SizedLowering(Lowering):
         return lambda i, j: self.graph.element(stored.name, i, j)
 
     def _solved(self, name: str, output: Quantity | None, solve: Solve) -> None:
-        if output is None or output.accumulate or not solve.symmetric:
+        if output is None or output.accumulate:
             raise NotImplementedError(
-                f"{name}: a run-time sized Solve defines an output that does not accumulate, by a "
-                "symmetric matrix (symmetric=True)"
+                f"{name}: a run-time sized Solve defines an output that does not accumulate"
             )
         arrays = []
         for what, array in (("matrix", solve.matrix), ("right-hand side", solve.right)):
@@ -96,8 +95,10 @@ class SizedLowering(Lowering):
                 )
             arrays.append(str(array.name))
         matrix, right = arrays
-        message = f"a pivot of {matrix} vanishes: a motion of the modes is undetermined"
-        self.graph.solve(name, matrix, right, SINGULAR, message)
+        message = f"a pivot of {matrix} vanishes: a motion is undetermined"
+        if solve.symmetric:
+            message = f"a pivot of {matrix} vanishes: a motion of the modes is undetermined"
+        self.graph.solve(name, matrix, right, SINGULAR, message, solve.symmetric)
         self._remember(port(output))
 
     # --- matrices of fixed shape ----------------------------------------------------------------

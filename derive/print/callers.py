@@ -21,6 +21,7 @@ Specs = Mapping[tuple[str, str], ElementSpec]
 DIRECT = {
     "frames": ("sweep", "frames"),
     "modal": ("sweep", "modal"),
+    "tangent": ("sweep", "tangent"),
     "classical_body": ("classical", "body_spatial"),
     "classical_pin": ("classical", "pin_spatial"),
     "classical_ball": ("classical", "ball"),
@@ -29,10 +30,25 @@ DIRECT = {
 #: Kernels that a record points to: short name -> (element that has the same ports, kernels).  The
 #: names of a law's two kinds are those of the kernels they look like.
 POINTED = {
-    "hinge": (("hinge", "pin"), {k: k for k in ("hinge", "forward", "condense", "recover")}),
-    "body": (("body", "rigid"), {k: k for k in ("inertia", "bias_load", "energy")}),
-    "law": (("sweep", "laws"), {"coordinate": "full", "quaternion": "six"}),
-    "force": (("force", "spring"), {"wrench": "wrench"}),
+    "hinge": (
+        ("hinge", "pin"),
+        {k: k for k in ("hinge", "forward", "condense", "recover", "hinge_slope")},
+    ),
+    "body": (
+        ("body", "rigid"),
+        {
+            k: k
+            for k in ("inertia", "bias_load", "energy", "bias_load_slope", "load_by_motion")
+        },
+    ),
+    "law": (
+        ("sweep", "laws"),
+        {
+            "coordinate": "full", "quaternion": "six",
+            "coordinate_slope": "full_slope", "quaternion_slope": "six_slope",
+        },
+    ),
+    "force": (("force", "spring"), {k: k for k in ("wrench", "wrench_slope")}),
     "link": (
         ("sweep", "link_pin"), {k: k for k in ("angle", "forward", "condense", "recover")},
     ),
@@ -41,6 +57,7 @@ POINTED = {
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
+    "forward_slope", "effort_slope",
 )  # fmt: skip
 
 
@@ -154,7 +171,7 @@ def _caller(callee: Callee) -> str:
         first, called, more = "void (*kernel)(void)", f"(({name}_kernel *)kernel)", ""
     body = f"    return {called}(\n{handed});\n"
     word = first.split()[-1] if callee.by == "speeds" else "kernel"
-    arrays = _arrays(name, callee) if name == "mstmm_hinge_hinge" else ""
+    arrays = _arrays(name, callee) if name.startswith("mstmm_hinge_hinge") else ""
     return (
         f"{struct}{typedef}{more}"
         f"static inline int {name}_by({first}, struct {name} to)\n{{\n{body}}}\n"

@@ -14,7 +14,9 @@ _TRAITS = {
     "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",
     "valued": "model->n_values",
     "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
-    "product": "model->product", "coordinate": "law->kind == 0", "effort": "force->effort",
+    "driving": "(!state->given || state->residual)", "curved": "!body->straight",
+    "moving": "!body->section && speeds", "product": "model->product",
+    "coordinate": "law->kind == 0", "effort": "force->effort",
 }  # fmt: skip
 
 

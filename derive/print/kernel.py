@@ -131,6 +131,7 @@ class KernelText:
         width = columns[0] if columns else 1
         return {
             "kind": "solve",
+            "function": "mstmm_solve_ldl" if solve.symmetric else "mstmm_solve_lu",
             "columns": "n" if isinstance(width, str) else width,
             "matrix": self.names[solve.matrix],
             "right": self.names[solve.right],

@@ -5,14 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ..schedule.slope import SLOPE, D, Sloped
 from ..schedule.steps import (
     Add,
+    Along,
     Call,
     Copy,
     Do,
     EachSpeed,
     Evaluate,
     Gather,
+    Move,
     Pass,
     Pick,
     Spread,
@@ -21,13 +24,40 @@ from ..schedule.steps import (
 )
 from ..schedule.words import SLOTS
 from .callers import MOST_SPEEDS, Callee
+from .conditions import condition, condition_needs
 from .storage import VARIABLES, Place, place, size_of
 
 #: Traits that only code for one scene has.
 NEVER = frozenset({"staged", "link", "turned"})
 #: Kernels' pointers in the records.
-_POINTERS = {"hinge": "body->{}", "body": "body->{}", "law": "law->evaluate",
-             "force": "force->wrench", "link": "at.{}"}  # fmt: skip
+#: Directions: how many, what points the derivatives along number c, variables that both read.
+_ALONG = {
+    "free": ("speeds", "mstmm_aim_unknown(state, body, columns[c])", ("speeds", "columns", "body")),
+    "rates": ("nu", "mstmm_aim_rate(state, body, c)", ("nu", "body")),
+    "coordinates": ("nq", "mstmm_aim_coordinate(state, body, c)", ("nq", "body")),
+    "modes": ("n", "mstmm_aim_mode(state, modal, c)", ("n", "modal")),
+    "motion": (
+        "9", "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c)", ("d_block",),
+    ),
+}  # fmt: skip
+#: What points them nowhere again.
+_RESTS = {
+    **dict.fromkeys(("free", "rates", "coordinates"), "mstmm_aim_nowhere(state, body)"),
+    "modes": "mstmm_aim_no_mode(state, modal)",
+    "motion": "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)",
+}
+#: Sizes of kernels for any size: C expression, variables that it reads.
+_SIZES: dict[str, tuple[str, set[str]]] = {
+    "modes": ("modal->n", {"modal"}),
+    "free": ("speeds", {"speeds", "columns"}),
+    "nq": ("nq", {"nq"}),
+}
+_INTERPRETED = {
+    "mstmm_hinge_hinge(body->hinge,": "mstmm_hinge_of(state, body,",
+    "mstmm_hinge_hinge_slope(body->hinge_slope,": "mstmm_hinge_slope_of(state, body,",
+}
+_POINTERS = {"hinge": "body->{}", "body": "body->{}", "law": "law->evaluate{}",
+             "force": "force->wrench{}", "link": "at.{}"}  # fmt: skip
 
 
 class StepText:
@@ -48,7 +78,7 @@ class StepText:
         if found is not None:
             return found
         name, _, picked = slot.partition("[")
-        if not name.startswith("local.") and name not in SLOTS:
+        if not name.removeprefix(D).startswith("local.") and name.removeprefix(D) not in SLOTS:
             raise ValueError(f"pass {self.name}: there is no slot {name!r} (schedule/words.py)")
         text = f"{word_of(name)} + {picked.rstrip(']')}" if picked else word_of(name)
         return Place(text)
@@ -57,25 +87,24 @@ class StepText:
         """Local arrays, as long as the longest port that they meet."""
         found: dict[str, int] = {}
         for step in whole.steps:
-            if never(step) or isinstance(step, Do):
-                continue
-            for part in inner(step):
+            for part in () if never(step) else _printed_here(step):
                 for slot, size in self._used(part):
-                    name = slot.partition("[")[0]
+                    name, _, entry = slot.partition("[")
                     if slot not in self.given and place(name) is None:
+                        size = MOST_SPEEDS if entry == "k]" else size
                         found[word_of(name)] = max(found.get(word_of(name), 1), size)
         return found
 
     def _used(self, step: Step) -> Iterator[tuple[str, int]]:
         if isinstance(step, Call):
-            callee, ports = self._callee(step), dict(step.ports)
+            callee, ports = self._callee(step), ports_of(step)
+            most = MOST_SPEEDS if ports.get("n") == "free" else 1
             for port in (*callee.kernel.inputs, *callee.kernel.outputs):
-                if port.name in ports:
-                    yield ports[port.name], port.length(1)
-                else:
-                    yield f"local.unused_{port.name}", port.length(1)
+                slot = ports.get(port.name, f"local.unused_{port.name}")
+                yield slot, port.length(most)
         elif isinstance(step, Pick):
             yield step.to, step.rows * MOST_SPEEDS
+            yield step.source, step.rows * MOST_SPEEDS
 
     def _callee(self, step: Call) -> Callee:
         return self.kernels[step.kernel.replace("{nu}", "").replace("{free}", "")]
@@ -85,11 +114,17 @@ class StepText:
         slots: list[str] = []
         more: set[str] = set()
         if isinstance(step, Call):
-            slots = [slot for _, slot in step.ports]
+            callee, ports = self._callee(step), ports_of(step)
+            slots = [ports[port] for port in callee.fields if port in ports]
             more = self._call_needs(step)
         elif isinstance(step, (Copy, Add)):
             slots = [step.to, *([step.source] if step.source else [])]
             more = {word for slot in slots for word in size_words(slot)}
+        elif isinstance(step, Move):
+            slots, more = [step.to, step.source], {step.count} & VARIABLES.keys()
+        elif isinstance(step, Along):
+            parts = [self.needs(part) | condition_needs(part.when) for part in step.steps]
+            return set(_ALONG[step.of][2]).union(*parts)
         elif isinstance(step, Pick):
             slots, more = [step.to, step.source], {"nu", "speeds", "columns"}
         elif isinstance(step, Spread):
@@ -105,7 +140,9 @@ class StepText:
 
     def _call_needs(self, step: Call) -> set[str]:
         element = step.kernel.partition(".")[0]
-        found = {"modal"} if self._callee(step).kernel.size_symbol else set()
+        found: set[str] = set()
+        if self._callee(step).kernel.size_symbol:
+            found |= _SIZES[dict(step.ports).get("n", "modes")][1]
         found |= {"nu"} if element == "generic{nu}" else set()
         found |= {"speeds", "columns"} if element == "generic{free}" else set()
         found |= {"hinge": {"body"}, "body": {"body"}, "law": {"law"}, "force": {"force"}}.get(
@@ -124,6 +161,11 @@ class StepText:
                     f"{indent}if (code) return code;"]  # fmt: skip
         if isinstance(step, (Copy, Add)):
             return self._moved(step, indent)
+        if isinstance(step, Move):
+            to, source = self._place(step.to).text, self._place(step.source).text
+            return [f"{indent}memcpy({to}, {source}, (size_t)({step.count}) * sizeof(real));"]
+        if isinstance(step, Along):
+            return self._along(step, indent)
         if isinstance(step, Pick):
             return self._picked(step, indent)
         if isinstance(step, Spread):
@@ -131,19 +173,24 @@ class StepText:
         if isinstance(step, Gather):
             to, places = self._place(step.to).text, self._place(step.places).text
             count = size_of(step.places)
-            value = f"mstmm_value_at(state, {_entry(places)})"
+            whose = "state->slope" if step.to.startswith(D) else "state"
+            value = f"mstmm_value_at({whose}, {_entry(places)})"
             return [f"{indent}for (int j = 0; j < {count}; j++)",
                     f"{indent}    {_entry(to)} = {value};"]  # fmt: skip
         if isinstance(step, Evaluate):
             words = [self._place(slot).text for slot in (*dict(step.given).values(), step.to)]
             call = f"mstmm_given_effort(state, force->effort, {', '.join(words)})"
+            if step.to.startswith(D):
+                words[1:1] = [self._place(D + slot).text for slot in dict(step.given).values()]
+                call = f"mstmm_given_effort_slope(state, force->effort_slope, {', '.join(words)})"
             return [f"{indent}code = {call};", *self._failed("expression", indent)]
         assert isinstance(step, EachSpeed)
         return self._each_speed(step, indent)
 
     def _call(self, step: Call, indent: str) -> list[str]:
-        callee, ports = self._callee(step), dict(step.ports)
-        words = [".n = modal->n"] if callee.kernel.size_symbol else []
+        callee, ports = self._callee(step), ports_of(step)
+        size = _SIZES[ports.pop("n", "modes")][0]
+        words = [f".n = {size}"] if callee.kernel.size_symbol else []
         outputs = {port.name for port in callee.kernel.outputs}
         for port, name in callee.fields.items():
             slot = ports.get(port, f"local.unused_{port}")
@@ -151,12 +198,12 @@ class StepText:
                 raise ValueError(f"{step.kernel}: no slot for the port {port!r}")
             words.append(f".{name} = {self._place(slot).text}")
         unknown = ports.keys() - callee.fields.keys()
-        if unknown:
+        if unknown and not isinstance(step, Sloped):
             raise ValueError(f"{step.kernel} has no port {', '.join(sorted(unknown))}")
         first = self._first(step, callee)
         call = f"{first}{_filled(words, indent)}"
-        if step.kernel == "hinge.hinge":
-            call = call.replace("mstmm_hinge_hinge(body->hinge,", "mstmm_hinge_of(state, body,")
+        if element_of(step) == "hinge" and first.startswith("mstmm_hinge_hinge"):
+            call = call.replace(first, _INTERPRETED[first])
         if not step.fails:
             return [f"{indent}{call};"]
         return [f"{indent}code = {call};", *self._failed(step.fails, indent)]
@@ -167,7 +214,9 @@ class StepText:
         if callee.by == "name":
             return f"{name}("
         if callee.by == "pointer":
-            return f"{name}({_POINTERS[element].format(kernel)},"
+            suffix = SLOPE if isinstance(step, Sloped) else ""
+            word = suffix if element in ("law", "force") else kernel
+            return f"{name}({_POINTERS[element].format(word)},"
         count = {"generic{nu}": "nu", "generic{free}": "speeds"}.get(element, element[7:])
         return f"{name}({count},"
 
@@ -201,7 +250,7 @@ class StepText:
 
     def _moved_size(self, step: Copy | Add) -> str:
         for slot in (step.to, step.source):
-            if slot and not slot.startswith("local."):
+            if slot and not slot.removeprefix(D).startswith("local."):
                 return size_of(slot)
         return str(self.locals[word_of(step.to)])
 
@@ -224,6 +273,17 @@ class StepText:
             f"{indent}                 : {imposed};",
         ]
 
+    def _along(self, step: Along, indent: str) -> list[str]:
+        count, aim, _ = _ALONG[step.of]
+        lines = [f"{indent}for (int c = 0; c < {count}; c++) {{", f"{indent}    {aim};"]
+        for part in step.steps:
+            if part.when:
+                inside = self.lines(part, indent + "        ")
+                lines += [f"{indent}    if ({condition(part.when)}) {{", *inside, f"{indent}    }}"]
+            else:
+                lines += self.lines(part, indent + "    ")
+        return [*lines, f"{indent}}}", f"{indent}{_RESTS[step.of]};"]
+
     def _each_speed(self, step: EachSpeed, indent: str) -> list[str]:
         only = [f"{indent}    if (!body->imposed_mask[k]) continue;"] if step.imposed else []
         lines = [line for part in step.steps for line in self.lines(part, indent + "    ")]
@@ -239,9 +299,18 @@ def _entry(text: str, place: str = "j") -> str:
 
 def size_words(slot: str) -> set[str]:
     """Variables that the length of a slot is told by."""
-    if slot.startswith("local.") or "[" in slot:
+    if slot.removeprefix(D).startswith("local.") or "[" in slot:
         return set()
     return {word for word in size_of(slot).split(" * ") if word in VARIABLES}
+
+
+def _printed_here(step: Step) -> Iterator[Step]:
+    """The step and those inside it that are no call of another function."""
+    if isinstance(step, (EachSpeed, Along)):
+        for part in step.steps:
+            yield from _printed_here(part)
+    elif not isinstance(step, Do):
+        yield from inner(step)
 
 
 def never(step: Step) -> bool:
@@ -251,8 +320,24 @@ def never(step: Step) -> bool:
 
 def word_of(slot: str) -> str:
     """C name of a slot that is local or handed over."""
+    if slot.startswith(D):
+        return f"d_{word_of(slot.removeprefix(D))}"
     owner, _, name = slot.partition(".")
     return name if owner == "local" else f"{owner}_{name}"
+
+
+def ports_of(step: Call) -> dict[str, str]:
+    """port -> slot; a differentiated kernel has ports of derivatives besides."""
+    ports = dict(step.ports)
+    if isinstance(step, Sloped):
+        ports |= {f"d_{port}": D + slot for port, slot in ports.items()}
+        ports |= {f"d_{port}": "zero" for port in step.still}
+    return ports
+
+
+def element_of(step: Call) -> str:
+    """Whose kernel a call is."""
+    return step.kernel.partition(".")[0]
 
 
 def _filled(words: list[str], indent: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from ..schedule.slope import D
 from ..schedule.words import ROLES, SLOTS
 
 #: Numbers of a body's block in the workspace, in their order: slot -> name in C.
@@ -23,8 +24,8 @@ PER_SPEED = {
 #: Numbers of a flexible body in the workspace: slot -> (per mode, per pair of modes).
 MODES = {
     "modes.S_rf": (6, 0), "modes.based": (6, 0), "modes.A": (6, 0), "modes.right": (7, 0),
-    "modes.gain": (7, 0), "modes.S_ff": (0, 1), "modes.work": (0, 1), "modes.e_f": (1, 0),
-    "modes.etadd": (1, 0),
+    "modes.gain": (7, 0), "modes.A_drag": (6, 0), "modes.S_ff": (0, 1),
+    "modes.work": (0, 1), "modes.e_f": (1, 0), "modes.etadd": (1, 0),
 }  # fmt: skip
 #: Numbers of a section in the workspace: slot -> (per mode, others).
 SECTION = {
@@ -32,6 +33,25 @@ SECTION = {
     "section.x": (0, 3), "section.Psi": (0, 3), "section.xd": (0, 3), "section.Psid": (0, 3),
     "section.xdd": (0, 3), "section.Psidd": (0, 3),
 }  # fmt: skip
+#: Numbers of the tangent by body: slot -> so many, and so many times nu, nu nu, nq nq, nq nu.
+TANGENT = {
+    "tangent.S": (54, 0, 0, 0, 0), "tangent.B": (0, 9, 0, 0, 0), "tangent.G": (0, 6, 0, 0, 0),
+    "tangent.W": (0, 0, 1, 0, 0), "tangent.laws": (0, 0, 1, 0, 0), "tangent.H": (0, 6, 0, 0, 0),
+    "tangent.V": (0, 6, 0, 0, 0), "tangent.D": (0, 0, 1, 0, 0), "tangent.right": (0, 9, 0, 0, 0),
+    "tangent.gain": (0, 9, 0, 0, 0), "tangent.work": (0, 0, 1, 0, 0),
+    "tangent.rest": (0, 1, 0, 0, 0), "tangent.y": (0, 1, 0, 0, 0),
+    "tangent.along": (0, 0, 0, 0, 1), "tangent.turns": (0, 0, 0, 1, 0),
+    "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),
+    "tangent.lag": (0, 0, 0, 1, 0), "tangent.lag_work": (0, 0, 0, 1, 0),
+}  # fmt: skip
+#: Numbers of the tangent by flexible body, and by section: slot -> (per mode, per pair of modes).
+BEND = {
+    "bend.B": (9, 0), "bend.G": (6, 0), "bend.W": (0, 1), "bend.still": (6, 0), "bend.K": (6, 0),
+    "bend.Z_z": (9, 0), "bend.Z_x": (0, 1), "bend.V": (6, 0), "bend.D": (0, 1),
+    "bend.right": (9, 0), "bend.gain": (9, 0), "bend.work": (0, 1), "bend.rest": (1, 0),
+    "bend.y": (1, 0),
+}  # fmt: skip
+PORT = {"port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0)}
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {"hinge.F": "hinge.H", "modes.felt": "modes.right"}
 
@@ -76,6 +96,11 @@ _PLACES = {
     "load.moment": "load->moment", "force.p": "force->p",
     "force.offset_F": "force->offset_f", "force.offset_T": "force->offset_t",
     "force.axes_F": "force->axes_f", "force.axes_T": "force->axes_t",
+    "law.slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed",
+    "inboard.S": "mstmm_tangent_at(state, body->parent)",
+    "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
+    "body.rho": "state->tangents->rho + body->q",
+    "body.change": "state->tangents->change + body->q",
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
     "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
     "zero": "mstmm_zeros", "none": "mstmm_zeros",
@@ -105,14 +130,42 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
              ("force",)),
     "to": ("real *to = mstmm_block(state->model, state->workspace, force->body_t);", ("force",)),
     "nu": ("const int nu = body->nu;", ("body",)),
+    "nq": ("const int nq = body->nq;", ("body",)),
+    "tangent": ("real *tangent = state->tangents->numbers + body->tangent;", ("body",)),
     "modal": ("const mstmm_modal *modal = mstmm_modal_of(body);", ("body",)),
     "n": ("const int n = mstmm_modes_of(modal);", ("modal",)),
     "modes": ("real *modes = modal ? state->workspace + modal->place : NULL;", ("modal",)),
     "section": ("const mstmm_section *section = body->section;", ("body",)),
     "laid": ("real *laid = section ? state->workspace + section->place : NULL;", ("section",)),
+    "bend": ("real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;", ("modal",)),
+    "port": ("real *port = section ? state->tangents->numbers + section->tangent : NULL;",
+             ("section",)),
     "columns": ("int columns[6];", ()),
     "speeds": ("const int speeds = mstmm_free_speeds(state, body, columns);",
                ("body", "columns")),
+}  # fmt: skip
+#: Variables that have a counterpart in the second workspace, where derivatives lie.
+_DOUBLED = ("block", "parent", "on", "axes", "from", "to", "modes", "laid")
+
+
+def _derivative(text: str) -> str:
+    """A C expression of a number, of its derivative; "" where nothing moves the number."""
+    moving = re.compile(
+        r"(?<![\w>.])(state)(?!->(?:memory|model))|(?<![\w>.])(" + "|".join(_DOUBLED) + r")\b"
+    )
+    if not moving.search(text):
+        return ""
+    return moving.sub(lambda m: "state->slope" if m[1] else f"d_{m[2]}", text)
+
+
+VARIABLES |= {
+    f"d_{name}": (
+        VARIABLES[name][0].replace(f"*{name} ", f"*d_{name} ").replace(
+            "state->workspace", "state->slope->workspace"
+        ),
+        VARIABLES[name][1],
+    )
+    for name in _DOUBLED
 }  # fmt: skip
 #: Which body the subject of a pass is about.
 BODY_OF = {"body": "index", "law": "law->body", "drive": "drive->body"}
@@ -128,12 +181,22 @@ class Place:
 
 def place(slot: str) -> Place | None:
     """Where a slot lies; None for one that is local to a function."""
+    if slot.startswith(D):
+        return _place_of_derivative(slot.removeprefix(D))
     name, _, picked = slot.partition("[")
     slot = SHARED.get(name, name)
     found = _PLACES.get(slot) or _stored(slot)
     if found is None:
         return None
     text = f"{found} + {picked.rstrip(']')}" if picked else found
+    return Place(text, {word for word in VARIABLES if reads(text, word)})
+
+
+def _place_of_derivative(slot: str) -> Place | None:
+    value = place(slot)
+    if value is None:
+        return None
+    text = _derivative(value.text) or "mstmm_zeros"
     return Place(text, {word for word in VARIABLES if reads(text, word)})
 
 
@@ -146,9 +209,11 @@ def _stored(slot: str) -> str | None:
         return f"block + MSTMM_BLOCK_{BLOCK[slot]}"
     if slot in PER_SPEED:
         return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{PER_SPEED[slot][0]})"
-    for layout, start in ((MODES, "modes"), (SECTION, "laid")):
+    for layout, start in ((MODES, "modes"), (SECTION, "laid"), (BEND, "bend"), (PORT, "port")):
         if slot in layout:
             return f"{start} + {_macro(slot)}(n)"
+    if slot in TANGENT:
+        return f"tangent + {_macro(slot)}(body->nu, body->nq)"
     return None
 
 
@@ -176,6 +241,24 @@ def _offsets(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
     return lines
 
 
+_PAIRS = " * (size_t)(n) * (n)"
+
+
+def _tangent_offsets() -> list[str]:
+    lines, counts = [], [0] * 5
+
+    def macro(name: str) -> str:
+        words = zip(counts, ("1", "(nu)", "(nu) * (nu)", "(nq) * (nq)", "(nq) * (nu)"), strict=True)
+        return (
+            f"#define {name}(nu, nq) ({' + '.join(f'{n} * {word}' for n, word in words if n) or 0})"
+        )
+
+    for slot, sizes in TANGENT.items():
+        lines.append(macro(_macro(slot)))
+        counts = [a + b for a, b in zip(counts, sizes, strict=True)]
+    return [*lines, macro("MSTMM_TANGENT_NUMBERS")]
+
+
 def reads(text: str, word: str) -> bool:
     """Whether a C expression names a variable (no member of a record)."""
     return re.search(rf"(?<![\w>.]){word}\b", text) is not None
@@ -183,7 +266,7 @@ def reads(text: str, word: str) -> bool:
 
 def size_of(slot: str) -> str:
     """C expression of the length of a slot that is copied or added to."""
-    name, _, picked = slot.partition("[")
+    name, _, picked = slot.removeprefix(D).partition("[")
     if picked:
         return "1"
     if name.startswith("law."):
@@ -215,6 +298,8 @@ def layout_header() -> str:
         + "\n".join([*_per_mode(MODES), *_per_mode(SECTION)])
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
-        + "\n".join([*_offsets(MODES, " * (size_t)(n) * (n)"), *_offsets(SECTION, "")])
+        + "\n".join([*_offsets(MODES, _PAIRS), *_offsets(SECTION, "")])
+        + "\n/* What the tangent keeps of a body, of a flexible one, of a section. */\n"
+        + "\n".join([*_tangent_offsets(), *_offsets(BEND, _PAIRS), *_offsets(PORT, _PAIRS)])
         + "\n\n#endif\n"
     )

@@ -101,7 +101,7 @@ DRAG = Pass(
     "drag", "body", "Viscous drag of flexible bodies: momentum under the density of the drag.",
     (
         call("modal.momentum", **_DRAG, **_STATE, v="body.v", w="body.w", S="local.S",
-             S_rf="modes.based", A="modes.A", h="local.h", h_f="modes.felt", T="local.T"),
+             S_rf="modes.based", A="modes.A_drag", h="local.h", h_f="modes.felt", T="local.T"),
         Add(to="body.e", source="local.h"),
         Add(to="modes.e_f", source="modes.felt"),
         Add(to="sums.power", source="local.T", times=-2, when="balance"),

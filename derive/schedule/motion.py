@@ -28,7 +28,7 @@ DRIVES = Pass(
     (
         Copy(to="drive.q", source="drive.value"),
         Copy(to="drive.u", source="drive.rate"),
-        Copy(to="drive.s", source="drive.acceleration", when="!inverse"),
+        Copy(to="drive.s", source="drive.acceleration", when="driving"),
     ),
     skip="!imposed",
 )  # fmt: skip

@@ -101,6 +101,28 @@ class EachSpeed(Step):
 
 
 @dataclass(frozen=True)
+class Move(Step):
+    """count numbers of `source` to `to`; "[width * c]" is the row of a direction (`Along`)."""
+
+    to: str = ""
+    source: str = ""
+    count: str = ""
+
+
+@dataclass(frozen=True)
+class Along(Step):
+    """Steps for every direction of a body, or of the body that a law is about; the derivatives that
+    they read have been pointed along it: direction number c of
+
+    `of`: "free", the unknowns of a hinge; "rates", its speeds alone; "coordinates", its coordinates
+    alone; "modes", the unknowns of a flexible body; "motion", the nine numbers of a motion.
+    """
+
+    of: str = ""
+    steps: tuple[Step, ...] = ()
+
+
+@dataclass(frozen=True)
 class ByScrew(Step):
     """Steps chosen by what is known of a rotation and a position when code is made for a scene.
 
@@ -195,7 +217,7 @@ def inner(step: Step) -> Iterator[Step]:
     """The step and every step inside it."""
     yield step
     parts: tuple[Step, ...] = ()
-    if isinstance(step, EachSpeed):
+    if isinstance(step, (EachSpeed, Along)):
         parts = step.steps
     elif isinstance(step, ByScrew):
         parts = (*step.about_x, *step.about_z, *step.turning, *step.otherwise)

@@ -95,6 +95,7 @@ D | n n | damping
 S_rf | 6 n | frame rows, modal columns
 based | 6 n | the same seen from the section that is held
 A | 6 n | acceleration of second order by modal rates
+A_drag | 6 n | the same under the density of the drag
 S_ff | n n | modal rows and columns
 e_f | n | force part of the modal rows
 right | 7 n | right-hand sides of the modal elimination
@@ -168,6 +169,49 @@ sums.potential | 1 | potential of springs, laws and strain
 given.S | 21 | mass matrix asked for
 given.h | 6 | momentum asked for
 given.T | 1 | energy asked for
+tangent.S | 54 | change of the load at P by that of the motion, a row an entry of the motion
+tangent.B | 9 nu | change of motion along the free speeds, a row a speed
+tangent.G | 6 nu | change of the load that is carried, a row a speed
+tangent.W | nu nu | change of the rows by load and laws, a row a speed
+tangent.laws | nu nu | change of the laws' efforts, a row a speed
+tangent.H | 6 nu | columns of H of the free speeds
+tangent.V | 6 nu | load by the unknowns
+tangent.D | nu nu | rows by the unknowns
+tangent.right | 9 nu | rows by the motion
+tangent.gain | 9 nu | D^-1 times them
+tangent.work | nu nu | factors of D
+tangent.rest | nu | what is left of the rows
+tangent.y | nu | D^-1 times it
+tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
+tangent.turns | nq nq | slopes of the rates by the coordinates, a row a coordinate
+tangent.unit | nq nq | unit matrix
+tangent.rates | nq nq | sq 1 - kappa times the slopes of the rates
+tangent.lag | nq nq | its inverse
+tangent.lag_work | nq nq | its factors
+bend.B | 9 n | change of motion along the modes, a row a mode
+bend.G | 6 n | change of the load that is carried
+bend.W | n n | change of the rows by it
+bend.still | 6 n | no subspace: a frame that is held by a hinge
+bend.K | 6 n | own load along the modes
+bend.Z_z | 9 n | own rows by the motion, a row an entry
+bend.Z_x | n n | own rows by the modes, a row a mode
+bend.V | 6 n | load by the unknowns
+bend.D | n n | rows by the unknowns
+bend.right | 9 n | rows by the motion
+bend.gain | 9 n | D^-1 times them
+bend.work | n n | factors of D
+bend.rest | n | what is left of the rows
+bend.y | n | D^-1 times it
+port.B | 9 n | as bend.B, of an end that follows the modes
+port.G | 6 n | as bend.G
+port.W | n n | as bend.W
+port.K | 6 n | S B of what hangs on the end
+law.slopes | nu | change of the law's efforts along the speed at hand
+inboard.S | 54 | tangent.S of the parent
+step.q | 1 | inverse time by which coordinates follow speeds
+step.kappa | 1 | whether the rates' own slopes count
+body.rho | nq | what the rates lack
+body.change | nq | change of the coordinates
 """
 
 
@@ -211,6 +255,9 @@ TRAITS: dict[str, str] = {
     "efforts": "the caller adds efforts",
     "balance": "power and potential are wanted",
     "inverse": "accelerations are given",
+    "driving": "drives give accelerations: none are given, or a residual is asked for",
+    "moving": "a hinge, some speed of which is not imposed",
+    "curved": "the rates of the coordinates are not the speeds",
     "linked": "runs of links are swept as such",
     "laws": "there are laws",
     "driven": "there are drives",

@@ -24,3 +24,5 @@ class Failed(IntEnum):
     """A section of a flexible body turns too far."""
     MODES = 8
     """The modal mass matrix of a flexible body is not positive definite."""
+    TANGENT = 9
+    """The tangent of a step leaves a motion undetermined."""

@@ -31,9 +31,11 @@ class Graph(Terms):
         elif condition.value == 0:
             raise ValueError(f"this can never be computed: {message}")
 
-    def solve(self, output: str, matrix: str, right: str, code: int, message: str) -> None:
+    def solve(
+        self, output: str, matrix: str, right: str, code: int, message: str, symmetric: bool = True
+    ) -> None:
         """Run-time sized solve between readable arrays; the result is the named output."""
-        self._requests.append(Solve(output, matrix, right, code, message))
+        self._requests.append(Solve(output, matrix, right, code, message, symmetric=symmetric))
 
     def store(self, port: Port, value: object) -> None:
         """Write an output now (kernels with run-time size), so that it can be read afterwards.

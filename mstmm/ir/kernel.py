@@ -129,12 +129,13 @@ def _statement_to_data(statement: Statement) -> Any:
     if isinstance(statement, Guard):
         condition = _operand_to_list(statement.condition)
         return {"guard": condition, "code": statement.code, "message": statement.message}
-    return {
+    data = {
         "solve": [statement.port, statement.matrix, statement.right],
         "code": statement.code,
         "message": statement.message,
         "relative_pivot": statement.relative_pivot,
     }
+    return data if statement.symmetric else data | {"symmetric": False}
 
 
 def _inner_from_data(data: Any) -> Inner:
@@ -156,7 +157,10 @@ def _statement_from_data(data: Any) -> Statement:
     if "guard" in data:
         return Guard(_operand_from_list(data["guard"]), data["code"], data["message"])
     port, matrix, right = data["solve"]
-    return Solve(port, matrix, right, data["code"], data["message"], data["relative_pivot"])
+    return Solve(
+        port, matrix, right, data["code"], data["message"], data["relative_pivot"],
+        data.get("symmetric", True),
+    )  # fmt: skip
 
 
 def to_json(kernel: KernelIR) -> str:

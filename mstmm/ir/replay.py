@@ -264,7 +264,38 @@ class _Numbers(Counted):
             raise GuardFailure(self.kernel.name, judged.code, judged.message)
 
     def solve(self, solve: Solve) -> None:
-        """LDL^T without pivoting, in the order of the generated C."""
+        """In the order of the generated C."""
+        how = self._by_diagonal if solve.symmetric else self._by_rows
+        self.results[solve.port][:] = how(solve)
+
+    def _by_rows(self, solve: Solve) -> list[Any]:
+        """LU with row exchange; right-hand sides are eliminated alongside."""
+        n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
+        m = len(b) // n if n else 0
+        limit = self.arithmetic.number(solve.relative_pivot)
+        divide, less = self.operations["div"], self.operations["lt"]
+        rows = [[*a[n * i : n * i + n], *b[m * i : m * i + m]] for i in range(n)]
+        sizes = [sum((abs(a[n * k + i]) for k in range(n)), self.zero) for i in range(n)]
+        for i in range(n):
+            best = i
+            for k in range(i + 1, n):
+                if self.arithmetic.true(less(abs(rows[best][i]), abs(rows[k][i]))):
+                    best = k
+            rows[i], rows[best] = rows[best], rows[i]
+            self.judge(less(limit * sizes[i], abs(rows[i][i])), solve)
+            for k in range(i + 1, n):
+                factor = divide(rows[k][i], rows[i][i])
+                for j in range(i + 1, n + m):
+                    rows[k][j] = rows[k][j] - factor * rows[i][j]
+        for i in reversed(range(n)):
+            for j in range(n, n + m):
+                for k in range(i + 1, n):
+                    rows[i][j] = rows[i][j] - rows[i][k] * rows[k][j]
+                rows[i][j] = divide(rows[i][j], rows[i][i])
+        return [x for row in rows for x in row[n:]]
+
+    def _by_diagonal(self, solve: Solve) -> list[Any]:
+        """LDL^T without pivoting."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         limit = self.arithmetic.number(solve.relative_pivot)
         work = [self.zero] * (n * n)
@@ -286,7 +317,7 @@ class _Numbers(Counted):
                 x[i * m + column] = divide(x[i * m + column], work[i * n + i])
                 for k in range(i + 1, n):
                     x[i * m + column] = x[i * m + column] - work[k * n + i] * x[k * m + column]
-        self.results[solve.port][:] = x
+        return x
 
 
 def _flat(values: Values) -> list[Any]:

@@ -129,10 +129,13 @@ class Guard:
 
 @dataclass(frozen=True)
 class Solve:
-    """output = A^-1 B for a symmetric positive definite run-time sized A (n x n), B (n,) or (n, m).
+    """output = A^-1 B for a run-time sized A (n x n), B (n,) or (n, m).
 
-    LDL^T without pivoting; a pivot below `relative_pivot` times its own diagonal entry leaves with
-    `code`.  Fixed sizes are unrolled when the kernel is lowered and never reach this statement.
+    Of a symmetric positive definite A the lower half is read: LDL^T without pivoting; a pivot below
+    `relative_pivot` times its own diagonal entry leaves with `code`.  Otherwise LU with row
+    exchange; there it is a pivot below `relative_pivot` times the magnitude of its column in A (the
+    sum of the entries').  Fixed sizes are unrolled when the kernel is lowered and never reach this
+    statement.
     """
 
     port: str
@@ -141,6 +144,7 @@ class Solve:
     code: int
     message: str
     relative_pivot: float = 1e-13
+    symmetric: bool = True
 
 
 Statement = Assign | Sum | Store | Guard | Solve

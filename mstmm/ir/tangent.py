@@ -76,13 +76,22 @@ def tangent(
     `values` False the outputs themselves are left out, with `guards` False the guards (for callers
     that run `kernel` as well), and what only they need.
 
-    A run-time sized `solve` x = A^-1 b is differentiated as A^-1 db, by a second solve.
+    A run-time sized `solve` x = A^-1 b is differentiated as A^-1 db, by a second solve.  An output
+    that the kernel reads again is an input where its value is left out: behind those of `kernel`.
 
-    Raises ValueError for names that the kernel does not have, for a kernel that reads what it has
-    stored itself (differentiate it at a fixed size), and where A itself depends on `ports`: the
-    right side db - dA x is then no array that a `solve` can read.
+    Raises ValueError for names that the kernel does not have, for a `solve` of what the kernel has
+    stored itself, and where A depends on `ports`: the right side db - dA x is then no array that a
+    `solve` can read.
     """
     return _Tangent(kernel, set(ports), outputs, values, guards).run()
+
+
+def jacobian(kernel: KernelIR, port: str, output: str) -> KernelIR:
+    """The kernel that computes J = (d output / d port)^T: a row an entry of `port`.
+
+    For kernels of fixed size whose `port` and `output` are vectors.
+    """
+    return _Jacobian(kernel, {port}, [output], values=False, guards=False).run()
 
 
 Index = tuple[int | str, ...]
@@ -112,15 +121,17 @@ class _Tangent(Replay):
         self.wanted = [port for port in kernel.outputs if port.name in wanted]
         self.kept = [p for p in kernel.outputs if values or p.name in solved]
         self.stores: dict[str, list[tuple[Index, Node]]] = {}
+        self.read_again: dict[str, Port] = {}
         self.still: list[Port] = []
 
     def run(self) -> KernelIR:
         super().run()
-        contents = {
-            port.name: _nested(port.shape, dict(self.stores[port.name]))
-            for port in self.kept
-            if port.name in self.stores
-        }
+        contents: dict[str, object] = {}
+        for port in self.kept:
+            if port.name in self.stores:
+                self._put(contents, port, dict(self.stores[port.name]), port.name)
+        again = [port for name, port in self.read_again.items() if port not in self.wanted]
+        self.wanted = [p for p in self.kernel.outputs if p in self.wanted or p in again]
         stored = [(p, *entry) for p in self.wanted for entry in self.stores.get(p.name, [])]
         slopes = derivatives([node for _, _, node in stored], self._seeds())
         for port in self.wanted:
@@ -129,11 +140,12 @@ class _Tangent(Replay):
             if port in self.still:
                 entries = dict.fromkeys(_places(port.shape), self.graph.constant(0))
             if entries:
-                contents[PREFIX + port.name] = _nested(port.shape, entries)
+                self._put(contents, _slope(port), entries, port.name)
         kernel = self.kernel
+        known = [port for port in self.read_again.values() if port not in self.kept]
         return self.graph.kernel(
             f"{kernel.name}_tangent",
-            (*kernel.inputs, *map(_slope, self.directions)),
+            (*kernel.inputs, *known, *map(_slope, self.directions)),
             (*self.kept, *map(_slope, self.wanted)),
             contents,
             kernel.size_symbol,
@@ -141,11 +153,23 @@ class _Tangent(Replay):
             kernel.sources,
         )
 
+    def _put(
+        self, contents: dict[str, object], port: Port, entries: Mapping[Index, Node], name: str
+    ) -> None:
+        """Stored at the kernel's end, or at once where the kernel reads the output again."""
+        nested = _nested(port.shape, entries)
+        if name in self.read_again:
+            self.graph.store(port, nested)
+        else:
+            contents[port.name] = nested
+
     def constant(self, constant: Constant) -> Node:
         return self.graph.number(constant)
 
     def entry(self, element: Element) -> Node:
-        self._refuse_stored(element.port)
+        if element.port in self.stores:
+            port = next(port for port in self.kernel.outputs if port.name == element.port)
+            self.read_again[port.name] = port
         return self.graph.element(element.port, *element.index)
 
     def total(self, statement: Sum) -> Node:
@@ -162,8 +186,8 @@ class _Tangent(Replay):
     def _refuse_stored(self, name: str) -> None:
         if name in self.stores:
             raise ValueError(
-                f"{self.kernel.name}: it reads {name!r}, which it has stored; differentiate the "
-                "kernel at a fixed size"
+                f"{self.kernel.name}: it solves with {name!r}, which it has stored; differentiate "
+                "the kernel at a fixed size"
             )
 
     def solve(self, solve: Solve) -> None:
@@ -175,11 +199,12 @@ class _Tangent(Replay):
                 f"{self.kernel.name}: the matrix {solve.matrix!r} of a run-time sized solve "
                 "depends on what is differentiated; differentiate the kernel at a fixed size"
             )
-        self.graph.solve(solve.port, solve.matrix, solve.right, solve.code, solve.message)
+        how = solve.code, solve.message, solve.symmetric
+        self.graph.solve(solve.port, solve.matrix, solve.right, *how)
         port = next(port for port in self.wanted if port.name == solve.port)
         if solve.right in self.moving:
             output, right = PREFIX + solve.port, PREFIX + solve.right
-            self.graph.solve(output, solve.matrix, right, solve.code, solve.message)
+            self.graph.solve(output, solve.matrix, right, *how)
             self.moving[port.name] = port
         else:
             self.still.append(port)
@@ -189,9 +214,28 @@ class _Tangent(Replay):
         element = self.graph.element
         return {
             element(port.name, *index): element(PREFIX + port.name, *index)
-            for port in self.moving.values()
+            for port in (*self.moving.values(), *self.read_again.values())
             for index in _readings(port.shape)
         }
+
+
+class _Jacobian(_Tangent):
+    """The derivatives along every entry of one port, side by side."""
+
+    def run(self) -> KernelIR:
+        Replay.run(self)
+        (port,), (output,) = self.directions, self.wanted
+        stored = self.stores[output.name]
+        rows = []
+        for index in _readings(port.shape):
+            seed = {self.graph.element(port.name, *index): self.graph.constant(1)}
+            rows.append(derivatives([node for _, node in stored], seed))
+        kernel = self.kernel
+        out = Port("J", (len(rows), len(stored)), "", f"{output.name} by {port.name}, transposed")
+        return self.graph.kernel(
+            f"{kernel.name}_jacobian", kernel.inputs, (out,), {"J": rows}, None,
+            f"{kernel.name} by {port.name}", kernel.sources,
+        )  # fmt: skip
 
 
 def _slope(port: Port) -> Port:

@@ -201,6 +201,14 @@ class Calls:
                 f'flexible body "{name}" {at}: its modal mass matrix is not positive definite; '
                 'use fewer shapes, frame = "chord" or "mean", or quadrature = true'
             )
+        if reason == Failed.TANGENT:
+            name = self.hinge_name(element) if element >= 0 else ""
+            what = f'hinge "{name}"' if name else "the springs and loads across the tree"
+            return (
+                f"{what} {at}: the equations of an implicit step leave a motion undetermined: no "
+                "inertia, stiffness or damping holds it, or a negative stiffness cancels them; "
+                "take a shorter step, or give the motion inertia (law.inertia) or a spring"
+            )
         if reason == Failed.PRODUCT_PIVOT:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '

@@ -30,6 +30,7 @@ class Element:
     guards: dict[str, dict[int, str]]
     descriptor: Any
     tape: Tape | None = None  # hinge kernel of an element without a library
+    slope_tape: Tape | None = None  # and its derivative
     declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
     hash: str = ""  # of its definition
     owner: Any = None  # keeps the library or the arrays of the descriptor alive

@@ -237,6 +237,7 @@ def _from_library(stored: ElementSpec, library: Path) -> Element:
 def _interpreted(stored: ElementSpec) -> Element:
     ffi, _ = prebuilt.module()
     kernel = next(k for k in stored.kernels if k.name == "hinge")
+    slope = [k for k in stored.kernels if k.name == "hinge_slope"]
     names = {
         "q": stored.coordinates, "u": stored.speeds, "p": stored.parameters,
     }  # fmt: skip
@@ -255,7 +256,8 @@ def _interpreted(stored: ElementSpec) -> Element:
     return Element(
         stored.kind, stored.name, arrays["nq"], arrays["nu"],
         tuple(p.name for p in stored.parameters), {}, {}, descriptor,
-        tape=compile_tape(kernel), declared=stored.parameters, owner=kept,
+        tape=compile_tape(kernel), slope_tape=compile_tape(slope[0]) if slope else None,
+        declared=stored.parameters, owner=kept,
     )  # fmt: skip
 
 

@@ -130,6 +130,22 @@ class _Axes(Replay):
             self.results[store.port][place] = value
 
     def solve(self, solve: Solve) -> None:
+        if solve.symmetric:
+            self._by_diagonal(solve)
+        else:
+            self._by_rows(solve)
+
+    def _by_rows(self, solve: Solve) -> None:
+        """LU with row exchange, point by point in LAPACK; pivots are judged by what it leaves."""
+        a, b = self.arrays[solve.matrix], self.arrays[solve.right]
+        alone = len(self.ports[solve.port].shape) == 1
+        try:
+            found = np.linalg.solve(a, b[..., None] if alone else b)
+        except np.linalg.LinAlgError:
+            raise NumericalFailure(f"{self.kernel.name}: {solve.message}") from None
+        self.results[solve.port][...] = found[..., 0] if alone else found
+
+    def _by_diagonal(self, solve: Solve) -> None:
         """L D L^T without pivoting, from the lower half of the matrix, for all points at once."""
         a = self.arrays[solve.matrix]
         a = np.tril(a) + np.swapaxes(np.tril(a, -1), -1, -2)

@@ -10,6 +10,7 @@ from ..breaks.acting import acting
 from ..breaks.times import TimeMap, time_map
 from .frames import Frames
 from .records.model import Written
+from .records.slopes import LOCK, Slopes, write_slopes
 from .switches import Watched, watched
 from .system import System
 
@@ -36,6 +37,7 @@ class Packed(Frames):
     product: Any = None
     warnings: list[str] = field(default_factory=list)
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
+    _slopes: Slopes | None = None
 
     def time_map(self, start: float, end: float) -> TimeMap:
         """Where the steps of a run from `start` to `end` (s) end, and how long they may be."""
@@ -45,6 +47,13 @@ class Packed(Frames):
                 self._time_maps.clear()
             self._time_maps[span] = time_map(acting(self.scene), start, end)
         return self._time_maps[span]
+
+    def slopes(self) -> Slopes:
+        """Derivatives of the scene's expressions, in the records from now on."""
+        with LOCK:
+            if self._slopes is None:
+                self._slopes = write_slopes(self.system, self.model, self.ffi)
+            return self._slopes
 
     @cached_property
     def watched(self) -> Watched:

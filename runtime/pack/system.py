@@ -69,6 +69,7 @@ class SectionNumbers:
 class BodyNumbers:
     """A body with its inboard hinge, but for its place in the tree.
 
+    `straight` says that the rates of the hinge's coordinates are its speeds.
     `connection` is Rt (9) and ro (3), `link` the same as screws about x and z where it can be one
     (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
     `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
@@ -80,6 +81,7 @@ class BodyNumbers:
     body: Key
     nq: int
     nu: int
+    straight: bool
     connection: Numbers
     link: Numbers
     height: float

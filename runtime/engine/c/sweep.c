@@ -27,6 +27,15 @@ int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body,
     return mstmm_tape_run(body->tape, inputs, mstmm_slots(state), outputs);
 }
 
+int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
+                                  struct mstmm_hinge_hinge_slope to)
+{
+    const real *inputs[MSTMM_HINGE_HINGE_SLOPE_INPUTS];
+    real *outputs[MSTMM_HINGE_HINGE_SLOPE_OUTPUTS];
+    mstmm_hinge_hinge_slope_arrays(to, inputs, outputs);
+    return mstmm_tape_run(body->slope_tape, inputs, mstmm_slots(state), outputs);
+}
+
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length, real *value)
 {
     const real *inputs[] = {&state->t, state->q, state->u, length};

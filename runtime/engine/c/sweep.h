@@ -25,14 +25,16 @@ typedef struct {
     const mstmm_moments *drag; /* NULL: none */
     const real *stiffness, *damping;
     int64_t place; /* of its numbers in the workspace, see mstmm_modal_numbers */
+    int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_modal;
 
 /* A section of a flexible body, and which way it is passed. */
 typedef struct {
-    const mstmm_modal *modal;
+    mstmm_modal *modal;
     int inward; /* 1: from the section that is held to the floating frame; 0: outward, to an end */
     const real *point, *phi, *theta, *drawn[3], *turned[3], *end; /* g and h of second order */
     int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
+    int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_section;
 
 /* One body with its inboard hinge, in depth-first order. */
@@ -50,11 +52,15 @@ typedef struct {
     const real *hinge_p, *body_p;
     const real *rotor;       /* reflected inertia per speed */
     const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
-    const mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
-    const mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
+    const mstmm_tape *slope_tape; /* and its derivative */
+    int straight;     /* the rates of the coordinates are the speeds */
+    int64_t tangent;  /* of its numbers in those of the tangent */
+    mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
+    mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
     int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
+    void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
     void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
 } mstmm_body;
 
@@ -78,7 +84,7 @@ typedef struct {
     int twist;             /* place in memory, or -1 */
     const real *p, *axes;
     const int *effort; /* per speed: place among the expression values, -1 for none */
-    void (*evaluate)(void);
+    void (*evaluate)(void), (*evaluate_slope)(void);
 } mstmm_law;
 
 /* Force and moment at a point of a body. */
@@ -95,8 +101,9 @@ typedef struct {
     int body_f, body_t;
     real axes_f[9], axes_t[9], offset_f[3], offset_t[3];
     const mstmm_tape *effort; /* t, q, u, [length, its rate] -> given effort; NULL for none */
+    const mstmm_tape *effort_slope; /* t, q, u, [length, its rate], their derivatives -> its own */
     const real *p;
-    void (*wrench)(void);
+    void (*wrench)(void), (*wrench_slope)(void);
 } mstmm_force;
 
 /* A coordinate that a drive prescribes: values number 3k, 3k+1, 3k+2 of the drive tape. */
@@ -123,7 +130,7 @@ typedef struct {
     int n_bodies, nq, nu, n_memory;
     int n_flexible; /* bodies with modes */
     const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
-    const mstmm_body *bodies;
+    mstmm_body *bodies;
     int n_runs;
     const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
     real gravity[3];
@@ -132,12 +139,14 @@ typedef struct {
     const mstmm_tape *drive_tape; /* t -> value, rate, acceleration of each drive */
     int n_values;
     const mstmm_tape *value_tape; /* t, q, u -> efforts and load components */
+    const mstmm_tape *drive_slopes; /* t, d_t -> derivatives of the drives' values */
+    const mstmm_tape *value_slopes; /* t, q, u, d_t, d_q, d_u -> derivatives of the values */
     int n_laws;
     const mstmm_law *laws;
     int n_loads;
     const mstmm_load *loads;
     int n_forces;
-    const mstmm_force *forces;
+    mstmm_force *forces;
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
     int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */
@@ -195,6 +204,15 @@ static inline real *mstmm_of_speeds(real *block, int nu, int which)
     return block + MSTMM_BLOCK_FIXED + which * nu;
 }
 
+/* What the tangent of a step keeps. */
+typedef struct mstmm_tangents {
+    real *numbers;        /* see mstmm_tangent_lay */
+    real s, sq, kappa;    /* da = s du, dq = (sq - kappa g_q)^-1 N du */
+    const real *rho;      /* nq: what the rates lack */
+    real *change;         /* nq: change of the coordinates */
+    real *unit;           /* a load that is one in a right-hand side; NULL: none */
+} mstmm_tangents;
+
 /* What a sweep is at. */
 typedef struct mstmm_state {
     const mstmm_model *model;
@@ -209,6 +227,9 @@ typedef struct mstmm_state {
     int linked;       /* runs with numbers are swept as links */
     int observed;     /* idle ends are swept too */
     int hinges_known; /* hinges have their motion already */
+    int residual;     /* drives give accelerations though others are given */
+    struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */
+    mstmm_tangents *tangents;
 } mstmm_state;
 
 /* Behind the blocks: q and u with driven coordinates, values of expressions and drives, slots of
@@ -288,6 +309,9 @@ static inline real mstmm_value_at(const mstmm_state *state, int place)
 
 /* Given effort of a force element, by the distance of its ends and its rate. */
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length, real *value);
+/* Its derivative along the direction at hand. */
+int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *slope, const real *length,
+                             const real *d_length, real *d_value);
 
 static const real mstmm_zeros[42] = {0};
 static const real mstmm_identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

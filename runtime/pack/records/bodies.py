@@ -16,8 +16,10 @@ from ..system import BodyNumbers, Numbers, System
 from .memory import Memory
 from .modal import ModalRecords
 
-_HINGE = ("hinge", "forward", "condense", "recover")
+_HINGE = ("hinge", "forward", "condense", "recover", "hinge_slope")
 _BODY = ("inertia", "bias_load", "energy")
+#: Kernels that elements of earlier versions do not have.
+_BODY_SLOPES = ("bias_load_slope", "load_by_motion")
 
 
 class BodyRecords:
@@ -63,6 +65,7 @@ class BodyRecords:
     def _fill(self, record: Any, body: BodyNumbers, place: int) -> None:
         """Numbers, and the kernels that read them."""
         record.nq, record.nu, record.held[2] = body.nq, body.nu, -body.height
+        record.straight = int(body.straight)
         record.release, record.idle = body.release, int(body.idle)
         record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
         self._numbers(record, body)
@@ -95,10 +98,14 @@ class BodyRecords:
             setattr(record, name, hinge.functions.get(name, self.memory.ffi.NULL))
         for name in _BODY:
             setattr(record, name, rigid[name])
+        for name in _BODY_SLOPES:
+            setattr(record, name, rigid.get(name, self.memory.ffi.NULL))
         if hinge.tape is not None:
             if body.hinge not in self._tapes:
-                self._tapes[body.hinge] = self.memory.tape(hinge.tape)
-            record.tape = self._tapes[body.hinge]
+                slope, none = hinge.slope_tape, self.memory.ffi.NULL
+                tapes = self.memory.tape(hinge.tape), slope and self.memory.tape(slope)
+                self._tapes[body.hinge] = tapes[0], tapes[1] or none
+            record.tape, record.slope_tape = self._tapes[body.hinge]
         unknown = not hinge.functions.get("condense")
         generic = unknown or body.section is not None or any(body.imposed) or any(body.rotor)
         record.generic = int(generic)

@@ -54,6 +54,7 @@ class LawRecords:
     def _fill(self, record: Any, law: LawNumbers) -> None:
         """What the laws of a pattern share."""
         record.kind, record.evaluate = int(law.turn >= 0), self.functions[law.kernel]
+        record.evaluate_slope = self.functions[f"{law.kernel}_slope"]
         record.coordinate, record.speed, record.n = law.coordinate, law.speed, law.n
         record.p, record.axes = self.memory.reals(law.p), self.memory.ffi.NULL
         if law.axes:

@@ -79,6 +79,8 @@ def _force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory)
         setattr(record, f"body_{letter}", body)
         setattr(record, f"axes_{letter}", list(axes))
         setattr(record, f"offset_{letter}", list(offset))
-    record.wrench = elements[force.element].functions["wrench"]
+    functions = elements[force.element].functions
+    record.wrench = functions["wrench"]
+    record.wrench_slope = functions.get("wrench_slope", memory.ffi.NULL)
     record.p = memory.reals(force.p)
     record.effort = memory.expression(force.effort)

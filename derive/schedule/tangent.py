@@ -1,0 +1,374 @@
+"""The tangent of inverse dynamics: its derivative along one direction, and all of it factored.
+
+`DIRECTIONAL` is inverse dynamics differentiated along a direction.  The other sweeps eliminate the
+unknowns of an implicit step (derive/equations/tangent.py): along each unknown the motion of its
+body, and what it makes of the load that is carried, come from the same differentiated passes, run
+for that body alone with its parent at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
+from .inverse import REQUIRED
+from .loads import EFFORTS, FORCES, LAWS, LOADS
+from .motion import BODY, CONNECTION, COORDINATES, DRIVES, FORWARD, HINGE, POSES, PRESCRIBED
+from .slope import SLOPE, D, Sloped, sloped
+from .steps import (
+    TIPS_TO_ROOT,
+    Add,
+    Along,
+    Call,
+    Copy,
+    Do,
+    EachSpeed,
+    Move,
+    Pass,
+    Pick,
+    Run,
+    Spread,
+    Step,
+    Sweep,
+    call,
+    only,
+)
+
+#: Relative motion across any hinge, and the body behind it.  Inverse dynamics has left the motion
+#: of every hinge in its slots, so that one way across serves all of them.
+_HINGE_MOTION = Pass(
+    "hinge_motion", "body", "Relative motion across the hinge.",
+    (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
+)  # fmt: skip
+_ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
+               motion_I="parent.motion", **BODY)  # fmt: skip
+_FORWARD = Pass(
+    FORWARD.name, "body", FORWARD.purpose,
+    (
+        Do(whole=SECTION_MOTION, when="section"),
+        Do(whole=_HINGE_MOTION, when="!section"),
+        _ACROSS,
+        Do(whole=MODAL_OWN, when="modal"),
+        call("body.bias_load", when="!modal", p="body.p", motion="body.motion", e="body.e"),
+    ),
+    skip=FORWARD.skip,
+)  # fmt: skip
+
+
+def _without_hinges(whole: Pass) -> Pass:
+    """Hinges have their motion already."""
+    steps = (step for step in whole.steps if not isinstance(step, Do))
+    return replace(whole, steps=tuple(steps))
+
+
+_MOVED_ALONG = (
+    Run(whole=sloped(PRESCRIBED)),
+    Run(hook="drive_slopes", when="driven"),
+    Run(whole=sloped(DRIVES), when="driven"),
+    Run(hook="expression_slopes", when="valued"),
+    Run(whole=sloped(_FORWARD)),
+)
+_POSED = Run(whole=sloped(_without_hinges(POSES)), when="posed")
+_ACTING = (
+    Run(whole=sloped(DRAG), when="posed flexible"),
+    Run(whole=sloped(LOADS), when="posed"),
+    Run(whole=sloped(FORCES), when="posed"),
+)
+DIRECTIONAL = Sweep(
+    "required_slope", "Derivative of the efforts that given accelerations need.",
+    (
+        *_MOVED_ALONG,
+        Run(whole=sloped(EFFORTS)),
+        Run(whole=sloped(LAWS)),
+        _POSED,
+        *_ACTING,
+        Run(whole=sloped(_without_hinges(REQUIRED))),
+    ),
+)  # fmt: skip
+
+_NO_LOADS = Pass(
+    "no_loads", "body", "Loads begun from none.",
+    (Copy(to=D + "body.e"), Copy(to=D + "modes.e_f", when="modal")),
+)  # fmt: skip
+
+#: What acts by where bodies are and how fast, the bodies' own loads apart: springs, loads, drag and
+#: the values of expressions reach across the tree, so that the elimination does not see them.
+APPLIED_SLOPE = Sweep(
+    "applied_slope", "Derivative of what acts on bodies, and of the values of expressions.",
+    (*_MOVED_ALONG, _POSED, Run(whole=_NO_LOADS, when="posed"), *_ACTING),
+)  # fmt: skip
+
+
+# --- along the unknowns of one body -------------------------------------------------------------
+
+
+def _still(step: Call, *ports: str) -> Sloped:
+    """The derivative of a call in which these ports do not move."""
+    return Sloped(step.when, step.kernel + SLOPE, step.ports, still=ports)
+
+
+def _carried(matrices: str, effort: Iterable[Step], to: str, count: str) -> tuple[Step, ...]:
+    """A direction's rows of B, G and W, the body being behind its hinge or section."""
+    return (
+        _still(_ACROSS, "motion_I"),
+        Move(to=f"{matrices}.B[9 * c]", source=D + "body.motion", count="9"),
+        call("frames.tangent_turned", Rc="body.R", d_Rc=D + "body.R", d_r=D + "body.r", f="body.e",
+             G=f"{matrices}.G[6 * c]"),
+        *effort,
+        Move(to=f"{matrices}.W[{count} * c]", source=to, count=count),
+    )  # fmt: skip
+
+
+_FELT_BY_MODES = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
+                      tau="modes.felt")  # fmt: skip
+
+
+def _section(matrices: str) -> tuple[Step, ...]:
+    return (
+        Along(
+            of="modes",
+            steps=(
+                Do(whole=sloped(SECTION_MOTION)),
+                Copy(to=D + "modes.e_f"),
+                *_carried(matrices, (_still(_FELT_BY_MODES, "e"),), D + "modes.felt", "n"),
+            ),
+        ),
+    )
+
+
+_FELT_BY_HINGE = call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau")
+_DRIVEN = call("frames.driven_effort", felt="local.tau[k]", J="body.rotor[k]",
+               udot="body.given[k]", tau="body.tau[k]", tau_d="local.required[k]")  # fmt: skip
+_HINGE = (
+    Along(
+        of="free",
+        steps=(
+            Copy(to=D + "body.s", source=D + "body.given"),
+            Do(whole=sloped(_HINGE_MOTION)),
+            Move(to=D + "body.tau", source="tangent.laws[nu * c]", count="nu"),
+            *_carried(
+                "tangent",
+                (
+                    _still(_FELT_BY_HINGE, "f"),
+                    EachSpeed(steps=(Sloped("", _DRIVEN.kernel + SLOPE, _DRIVEN.ports),)),
+                    Pick(to="local.free", source=D + "local.required"),
+                ),
+                "local.free",
+                "speeds",
+            ),
+        ),
+    ),
+)
+
+LAG = Pass(
+    "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
+    (
+        Along(
+            of="coordinates",
+            steps=(
+                Do(whole=sloped(_HINGE_MOTION)),
+                Move(to="tangent.turns[nq * c]", source=D + "body.qdot", count="nq"),
+                Move(to="tangent.unit[nq * c]", source=D + "body.q", count="nq"),
+            ),
+        ),
+        call("tangent.lag", n="nq", sq="step.q", kappa="step.kappa", one="tangent.unit",
+             g_q="tangent.turns", A="tangent.rates", Q="tangent.lag", work="tangent.lag_work"),
+        Along(
+            of="rates",
+            steps=(
+                Do(whole=sloped(_HINGE_MOTION)),
+                call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot",
+                     dq="tangent.along[nq * c]"),
+            ),
+        ),
+    ),
+)  # fmt: skip
+
+LAGGED = Pass(
+    "lagged", "body", "Change of the coordinates of a hinge by that of its speeds.",
+    (
+        Do(whole=sloped(_HINGE_MOTION)),
+        Add(to=D + "body.qdot", source="body.rho"),
+        call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot", dq="body.change"),
+    ),
+)  # fmt: skip
+
+
+# --- factored -----------------------------------------------------------------------------------
+
+LAW_SLOPES = Pass(
+    "law_slopes", "law", "Slopes of a law along the unknowns of its hinge.",
+    (
+        Along(
+            of="free",
+            steps=(
+                *(
+                    Sloped(step.when, step.kernel + SLOPE, step.ports, still=("effort",))
+                    for step in LAWS.steps
+                    if isinstance(step, Call)
+                ),
+                Add(to="law.slopes", source=D + "local.tau"),
+            ),
+        ),
+    ),
+)  # fmt: skip
+
+TANGENT_OWN = Pass(
+    "tangent_own", "body", "A body's own load by its motion and its modes.",
+    (
+        Copy(to="tangent.laws"),
+        Do(whole=LAG, when="curved"),
+        call("body.load_by_motion", when="!modal", p="body.p", motion="body.motion",
+             J="tangent.S"),
+        *only(
+            "modal",
+            Along(
+                of="motion",
+                steps=(
+                    Do(whole=sloped(MODAL_OWN)),
+                    Move(to="tangent.S[6 * c]", source=D + "body.e", count="6"),
+                    Move(to="bend.Z_z[n * c]", source=D + "modes.e_f", count="n"),
+                ),
+            ),
+            Along(
+                of="modes",
+                steps=(
+                    Do(whole=sloped(MODAL_OWN)),
+                    Move(to="bend.K[6 * c]", source=D + "body.e", count="6"),
+                    Move(to="bend.Z_x[n * c]", source=D + "modes.e_f", count="n"),
+                ),
+            ),
+        ),
+        *only("modal !section", Copy(to="bend.B"), Copy(to="bend.G"), Copy(to="bend.W"),
+              Copy(to="bend.still")),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+
+def _node(matrices: str, **ports: str) -> dict[str, str]:
+    names = ("B", "G", "W", "V", "D", "right", "gain", "work")
+    return {name: f"{matrices}.{name}" for name in names} | ports
+
+
+_OWN = {name: f"bend.{name}" for name in ("K", "Z_z", "Z_x")}
+_REDUCED = Copy(to="tangent.S", source="local.S_c")
+_TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
+
+TANGENT_CONDENSE = Pass(
+    "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
+    (
+        *only("modal section", *_section("bend")),
+        call("tangent.node_own", n="modes", when="modal section", fails="tangent", H="section.H",
+             S="tangent.S", S_c="local.S_c", **_node("bend", **_OWN)),
+        call("tangent.node_own", n="modes", when="modal !section", fails="tangent", H="bend.still",
+             S="tangent.S", S_c="local.S_c", **_node("bend", **_OWN)),
+        *only("modal", _REDUCED),
+        *only(
+            "moving",
+            *_HINGE,
+            Pick(to="tangent.H", source="hinge.H", rows=6),
+            call("tangent.node", n="free", fails="tangent", H="tangent.H", S="tangent.S",
+                 S_c="local.S_c", **_node("tangent")),
+            _REDUCED,
+        ),
+        *only("outward", *_section("port")),
+        call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
+        call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
+             B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+TANGENT = Sweep(
+    "tangent",
+    "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
+    (Run(whole=TANGENT_OWN), Run(whole=LAW_SLOPES), Run(whole=TANGENT_CONDENSE)),
+)
+
+
+# --- one right-hand side ------------------------------------------------------------------------
+
+_FELT_CHANGE = (
+    call("modal.modal_effort", H="section.H", e=D + "body.e", e_f=D + "modes.e_f",
+         tau=D + "modes.felt"),
+    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+)  # fmt: skip
+
+TANGENT_COLUMN = Pass(
+    "tangent_column", "body", "A right-hand side as loads of the rows.",
+    (
+        Copy(to=D + "body.e"),
+        Copy(to=D + "body.tau"),
+        Add(to=D + "body.tau", source="body.column", times=-1),
+        *only("modal", Copy(to=D + "modes.e_f"),
+              Add(to=D + "modes.e_f", source="modes.column", times=-1)),
+    ),
+)  # fmt: skip
+
+
+def _pushed(matrices: str, size: str, subspace: str, rows: str) -> tuple[Step, ...]:
+    return (
+        call("tangent.push", n=size, fails="tangent", H=subspace, V=f"{matrices}.V",
+             D=f"{matrices}.D", e=D + "body.e", e_f=rows, rest=f"{matrices}.rest",
+             y=f"{matrices}.y", e_c="local.e_c", work=f"{matrices}.work"),
+        Copy(to=D + "body.e", source="local.e_c"),
+    )  # fmt: skip
+
+
+TANGENT_CARRIED = Pass(
+    "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
+    (
+        *only("modal section", *_pushed("bend", "modes", "section.H", D + "modes.e_f")),
+        *only("modal !section", *_pushed("bend", "modes", "bend.still", D + "modes.e_f")),
+        *only(
+            "moving",
+            Pick(to="local.rows", source=D + "body.tau"),
+            *_pushed("tangent", "free", "tangent.H", "local.rows"),
+        ),
+        *only("outward", *_FELT_CHANGE),
+        call("frames.transport", Rc="body.R", r="body.r", e=D + "body.e", e_I=D + "parent.e"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+_MOVED = Copy(to=D + "body.motion", source="local.z")
+
+
+def _answered(matrices: str, size: str, unknowns: str) -> tuple[Step, ...]:
+    return (
+        call("tangent.answer", n=size, B=f"{matrices}.B", gain=f"{matrices}.gain",
+             y=f"{matrices}.y", z_c=D + "body.motion", x=unknowns, z="local.z"),
+        _MOVED,
+    )  # fmt: skip
+
+
+TANGENT_ANSWERED = Pass(
+    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
+    (
+        Copy(to="body.answer"),
+        call("frames.tangent_moved", **_TH, z_I=D + "parent.motion", z=D + "body.motion"),
+        call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
+             z_c=D + "body.motion", z="local.z"),
+        *only("outward", _MOVED),
+        *only(
+            "moving",
+            *_answered("tangent", "free", "local.x"),
+            Spread(to="body.answer", free="local.x"),
+        ),
+        *only("modal", *_answered("bend", "modes", "modes.answer")),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+TANGENT_SOLUTION = Sweep(
+    "tangent_solution",
+    "One right-hand side through the factored tangent.",
+    (
+        Run(whole=TANGENT_COLUMN),
+        Run(hook="unit_load"),
+        Run(whole=TANGENT_CARRIED),
+        Run(whole=TANGENT_ANSWERED),
+    ),
+)

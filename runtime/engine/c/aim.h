@@ -1,0 +1,77 @@
+/* Where the derivatives of one body point: coordinates, speeds and accelerations of the direction
+ * at hand, in the arrays of `state->slope`, which are zero but for it. */
+#ifndef MSTMM_AIM_H
+#define MSTMM_AIM_H
+
+#include "sweep.h"
+
+/* The derivatives' arrays are those of the caller of a sweep, who may write them. */
+static inline real *mstmm_aimed(const real *array) { return (real *)array; }
+
+static inline void mstmm_aim_nowhere(mstmm_state *state, const mstmm_body *body)
+{
+    real *q = mstmm_aimed(state->slope->q) + body->q, *u = mstmm_aimed(state->slope->u) + body->u;
+    real *given = mstmm_aimed(state->slope->given) + body->u;
+    for (int i = 0; i < body->nq; i++) q[i] = 0;
+    for (int j = 0; j < body->nu; j++) u[j] = given[j] = 0;
+}
+
+/* A coordinate alone, a speed alone. */
+static inline void mstmm_aim_coordinate(mstmm_state *state, const mstmm_body *body, int i)
+{
+    mstmm_aim_nowhere(state, body);
+    mstmm_aimed(state->slope->q)[body->q + i] = 1;
+}
+
+static inline void mstmm_aim_rate(mstmm_state *state, const mstmm_body *body, int j)
+{
+    mstmm_aim_nowhere(state, body);
+    mstmm_aimed(state->slope->u)[body->u + j] = 1;
+}
+
+/* A speed, the acceleration and the change of the coordinates that come with it in a step. */
+static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body, int j)
+{
+    const mstmm_tangents *step = state->tangents;
+    real *q = mstmm_aimed(state->slope->q) + body->q;
+    mstmm_aim_rate(state, body, j);
+    mstmm_aimed(state->slope->given)[body->u + j] = step->s;
+    if (body->straight) {
+        q[j] = 1 / step->sq;
+    } else {
+        const real *along = step->numbers + body->tangent
+                            + MSTMM_TANGENT_ALONG(body->nu, body->nq) + j * body->nq;
+        for (int i = 0; i < body->nq; i++) q[i] = along[i];
+    }
+}
+
+static inline void mstmm_aim_no_mode(mstmm_state *state, const mstmm_modal *modal)
+{
+    for (int i = 0; i < modal->n; i++) {
+        mstmm_aimed(state->slope->q)[modal->q + i] = 0;
+        mstmm_aimed(state->slope->u)[modal->u + i] = 0;
+        mstmm_aimed(state->slope->given)[modal->u + i] = 0;
+    }
+}
+
+static inline void mstmm_aim_mode(mstmm_state *state, const mstmm_modal *modal, int i)
+{
+    mstmm_aim_no_mode(state, modal);
+    mstmm_aimed(state->slope->q)[modal->q + i] = 1 / state->tangents->sq;
+    mstmm_aimed(state->slope->u)[modal->u + i] = 1;
+    mstmm_aimed(state->slope->given)[modal->u + i] = state->tangents->s;
+}
+
+/* Entry k of a motion, none for -1. */
+static inline void mstmm_aim_motion(real *motion, int k)
+{
+    for (int i = 0; i < 9; i++) motion[i] = i == k;
+}
+
+/* S of the tangent, of a body or (-1) of the ground. */
+static inline real *mstmm_tangent_at(const mstmm_state *state, int body)
+{
+    return state->tangents->numbers + (body < 0 ? 0 : state->model->bodies[body].tangent);
+}
+
+#endif

@@ -1,0 +1,318 @@
+/* Entries of the residual and its tangent; see tangent.h.  The passes are printed from the schedule
+ * (sweep_steps.c). */
+#include "tangent.h"
+
+#include <string.h>
+
+#include "aim.h"
+#include "hinge.h"
+#include "solve.c.jinja"
+#include "sweep_steps.h"
+
+int64_t mstmm_bend_numbers(int n);
+int64_t mstmm_port_numbers(int n);
+
+int64_t mstmm_tangent_lay(mstmm_model *model)
+{
+    int64_t place = 54; /* S of the ground, which nobody reads */
+    for (int i = 0; i < model->n_bodies; i++) {
+        mstmm_body *body = &model->bodies[i];
+        body->tangent = place;
+        place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
+        if (body->modal) {
+            body->modal->tangent = place;
+            place += mstmm_bend_numbers(body->modal->n);
+        }
+        if (body->section && !body->section->inward) {
+            body->section->tangent = place;
+            place += mstmm_port_numbers(body->section->modal->n);
+        }
+    }
+    return place;
+}
+
+/* Parts of `work`: state, accelerations and the rest of what a sweep writes, then a second
+ * workspace and the direction. */
+typedef struct {
+    real *q, *u, *a, *required, *qdot, *shadow, *d_q, *d_u, *d_a, *d_qdot, *answer, *column;
+    real *still, *change;
+    int64_t used;
+} mstmm_parts;
+
+static mstmm_parts cut(const mstmm_model *model, int64_t slots, real *work)
+{
+    mstmm_parts at = {.used = 0};
+    const int64_t nq = model->nq, nu = model->nu;
+    const struct { real **to; int64_t count; } all[] = {
+        {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.required, nu}, {&at.qdot, nq},
+        {&at.d_q, nq}, {&at.d_u, nu}, {&at.d_a, nu}, {&at.d_qdot, nq}, {&at.answer, nu},
+        {&at.column, nu}, {&at.still, nq}, {&at.change, nq}, {&at.shadow, model->workspace + slots},
+    };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        if (work) *all[i].to = work + at.used;
+        at.used += all[i].count;
+    }
+    return at;
+}
+
+int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots)
+{
+    return cut(model, slots, NULL).used;
+}
+
+static mstmm_parts parts_of(const mstmm_tangent *at)
+{
+    return cut(at->model, at->slots, at->work);
+}
+
+/* Rows of speeds that somebody imposes are no equations. */
+static void without_imposed(const mstmm_model *model, const real *memory, real *rows)
+{
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        if (!mstmm_imposed(body, memory)) continue;
+        for (int j = 0; j < body->nu; j++)
+            if (body->imposed_mask[j]) rows[body->u + j] = 0;
+    }
+}
+
+static mstmm_state state_of(mstmm_tangent *at, const mstmm_parts *parts)
+{
+    return (mstmm_state){.model = at->model, .workspace = at->workspace, .t = at->t, .q = parts->q,
+                         .u = parts->u, .memory = at->memory, .given = parts->a,
+                         .required = parts->required, .qdot = parts->qdot,
+                         .failure = &at->failure, .residual = 1};
+}
+
+int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
+                   mstmm_balance *balance)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    at->t = t;
+    memcpy(parts.q, q, (size_t)model->nq * sizeof(real));
+    memcpy(parts.u, u, (size_t)model->nu * sizeof(real));
+    memcpy(parts.a, a, (size_t)model->nu * sizeof(real));
+    mstmm_state state = state_of(at, &parts);
+    state.balance = balance;
+    if (balance) balance->power = balance->potential = 0;
+    mstmm_ground(&state);
+    const int code = mstmm_run_inverse_dynamics(&state);
+    if (code) return code;
+    memcpy(r, parts.required, (size_t)model->nu * sizeof(real));
+    without_imposed(model, at->memory, r);
+    return 0;
+}
+
+/* The state of the last residual: driven coordinates have been filled in. */
+static mstmm_state known_state(mstmm_tangent *at, const mstmm_parts *parts)
+{
+    mstmm_state state = state_of(at, parts);
+    if (at->model->n_drives) {
+        state.q = mstmm_filled_q(&state);
+        state.u = mstmm_filled_u(&state);
+    }
+    return state;
+}
+
+static mstmm_state slope_of(mstmm_tangent *at, const mstmm_parts *parts, real *required)
+{
+    mstmm_state slope = state_of(at, parts);
+    slope.workspace = parts->shadow;
+    slope.t = 0;
+    slope.q = parts->d_q;
+    slope.u = parts->d_u;
+    slope.given = parts->d_a;
+    slope.required = required;
+    slope.qdot = parts->d_qdot;
+    return slope;
+}
+
+int mstmm_hook_drive_slopes(mstmm_state *state)
+{
+    mstmm_state *slope = state->slope;
+    const mstmm_model *model = state->model;
+    const real *inputs[] = {&state->t, &slope->t};
+    real *outputs[] = {mstmm_drive_values(slope)};
+    memcpy(mstmm_filled_q(slope), slope->q, (size_t)model->nq * sizeof(real));
+    memcpy(mstmm_filled_u(slope), slope->u, (size_t)model->nu * sizeof(real));
+    const int code = mstmm_tape_run(model->drive_slopes, inputs, mstmm_slots(slope), outputs);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code);
+    slope->q = mstmm_filled_q(slope);
+    slope->u = mstmm_filled_u(slope);
+    return 0;
+}
+
+int mstmm_hook_expression_slopes(mstmm_state *state)
+{
+    mstmm_state *slope = state->slope;
+    const real *inputs[] = {&state->t, state->q, state->u, &slope->t, slope->q, slope->u};
+    real *outputs[] = {mstmm_values(slope)};
+    const int code = mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
+    return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
+}
+
+int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const real *length,
+                             const real *d_length, real *d_value)
+{
+    mstmm_state *slope = state->slope;
+    const real *inputs[] = {&state->t, state->q, state->u, length,
+                            &slope->t, slope->q, slope->u, d_length};
+    real *outputs[] = {d_value};
+    return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);
+}
+
+int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
+                         const real *d_a, real *d_r)
+{
+    const mstmm_parts parts = parts_of(at);
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, d_r);
+    slope.t = d_t;
+    slope.q = d_q;
+    slope.u = d_u;
+    slope.given = d_a;
+    state.slope = &slope;
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
+    const int code = mstmm_run_required_slope(&state);
+    if (!code) without_imposed(at->model, at->memory, d_r);
+    return code;
+}
+
+/* --- across the tree --- */
+
+/* Number k of what the couplings change, in the derivatives' workspace. */
+static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
+{
+    const mstmm_couplings *all = at->couplings;
+    const mstmm_model *model = at->model;
+    if (k < 6 * all->n_bodies)
+        return mstmm_block(model, slope->workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E + k % 6;
+    k -= 6 * all->n_bodies;
+    for (int i = 0; i < all->n_drags; i++) {
+        const mstmm_modal *modal = model->bodies[all->drags[i]].modal;
+        if (k < modal->n) return slope->workspace + modal->place + MSTMM_MODES_E_F(modal->n) + k;
+        k -= modal->n;
+    }
+    return mstmm_values(slope) + all->values[k];
+}
+
+/* The change of every coupling along du. */
+static int coupled_along(mstmm_tangent *at, const real *du, real *changes)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    int code = mstmm_tangent_coordinates(at, du, NULL, parts.change);
+    if (code) return code;
+    memcpy(parts.d_q, parts.change, (size_t)model->nq * sizeof(real));
+    memcpy(parts.d_u, du, (size_t)model->nu * sizeof(real));
+    for (int j = 0; j < model->nu; j++) parts.d_a[j] = at->s * du[j];
+    state.slope = &slope;
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
+    code = mstmm_run_applied_slope(&state);
+    for (int k = 0; !code && k < at->n_coupled; k++) changes[k] = *coupled(at, &slope, k);
+    return code;
+}
+
+int mstmm_hook_unit_load(mstmm_state *state)
+{
+    if (state->tangents->unit) *state->tangents->unit = 1;
+    return 0;
+}
+
+/* du to r, and to a unit of coupling k (-1: of none), the couplings left out. */
+static int solve_alone(mstmm_tangent *at, const real *r, int k, real *du)
+{
+    const mstmm_parts parts = parts_of(at);
+    mstmm_tangents step = {.numbers = at->numbers, .s = at->s, .sq = at->sq, .kappa = at->kappa};
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    const int loads = at->n_coupled - at->couplings->n_efforts;
+    state.slope = &slope;
+    state.tangents = &step;
+    state.column = r;
+    state.answer = du;
+    if (k >= 0 && k < loads) step.unit = coupled(at, &slope, k);
+    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 1;
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
+    const int code = mstmm_run_tangent_solution(&state);
+    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 0;
+    return code;
+}
+
+/* With couplings c = G du and answers Y to each: du = du_0 + Y c, (1 - G Y) c = G du_0. */
+static int close_couplings(mstmm_tangent *at)
+{
+    const int m = at->n_coupled, nu = at->model->nu;
+    const mstmm_parts parts = parts_of(at);
+    memset(parts.column, 0, (size_t)nu * sizeof(real));
+    for (int k = 0; k < m; k++) {
+        real *answer = at->answers + (int64_t)k * nu, *changes = at->closure + 2 * m * m;
+        int code = solve_alone(at, parts.column, k, answer);
+        if (!code) code = coupled_along(at, answer, changes);
+        if (code) return code;
+        for (int i = 0; i < m; i++) at->closure[i * m + k] = (i == k) - changes[i];
+    }
+    return 0;
+}
+
+int mstmm_tangent_factor(mstmm_tangent *at, real s, real sq, real kappa)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    mstmm_tangents step = {.numbers = at->numbers, .s = s, .sq = sq, .kappa = kappa};
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    state.slope = &slope;
+    state.tangents = &step;
+    at->s = s;
+    at->sq = sq;
+    at->kappa = kappa;
+    memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
+    memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
+    memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    const int code = mstmm_run_tangent(&state);
+    return code || !at->n_coupled ? code : close_couplings(at);
+}
+
+int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du)
+{
+    const int m = at->n_coupled, nu = at->model->nu;
+    int code = solve_alone(at, r, -1, du);
+    if (code || !m) return code;
+    real *work = at->closure + m * m, *changes = work + m * m, *amounts = changes + m;
+    code = coupled_along(at, du, changes);
+    if (code) return code;
+    if (mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, 1e-13))
+        return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1, 1);
+    for (int k = 0; k < m; k++)
+        for (int j = 0; j < nu; j++) du[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
+    return 0;
+}
+
+int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    mstmm_tangents step = {.numbers = at->numbers, .s = at->s, .sq = at->sq, .kappa = at->kappa,
+                           .rho = rho ? rho : parts.still, .change = dq};
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    state.slope = &slope;
+    state.tangents = &step;
+    memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
+    slope.u = du;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        if (body->straight) {
+            for (int j = 0; j < body->nu; j++)
+                dq[body->q + j] = (du[body->u + j] + step.rho[body->q + j]) / at->sq;
+        } else {
+            const int code = mstmm_at_lagged(&state, i);
+            if (code) return code;
+        }
+        if (!body->modal) continue;
+        for (int j = 0; j < body->modal->n; j++) {
+            const int place = body->modal->q + j;
+            dq[place] = (du[body->modal->u + j] + step.rho[place]) / at->sq;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,51 @@
+/* The residual of a scene and its tangent: what implicit methods, equilibria and linear models ask
+ * for.  R(t, q, u, a) are the efforts that accelerations a need beyond all that acts. */
+#ifndef MSTMM_TANGENT_HEADER
+#define MSTMM_TANGENT_HEADER
+
+#include "sweep.h"
+
+/* cdef begin */
+/* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
+ * where bodies are, and efforts that expressions of the state give. */
+typedef struct {
+    int n_bodies, n_drags, n_efforts;
+    const int *bodies; /* on which such loads act: 6 numbers each */
+    const int *drags;  /* flexible bodies with drag: a number a mode */
+    const int *values, *speeds; /* an expression's value, and the speed that it acts on */
+} mstmm_couplings;
+
+/* A scene at one state with its derivatives: everything is the caller's.  `work` has
+ * mstmm_tangent_work numbers, zero at first, `numbers` those of mstmm_tangent_lay. */
+typedef struct {
+    const mstmm_model *model;
+    real *workspace, *memory, *work, *numbers;
+    int64_t slots;        /* largest workspace of a tape of derivatives */
+    const mstmm_couplings *couplings;
+    int n_coupled;        /* numbers that they change by */
+    real *answers;        /* n_coupled x nu: to one of each */
+    real *closure;        /* n_coupled x (2 n_coupled + 3) */
+    real t, s, sq, kappa; /* of the last residual and tangent */
+    mstmm_failure failure;
+} mstmm_tangent;
+
+/* Lays out the tangent's numbers over the bodies; returns how many there are. */
+int64_t mstmm_tangent_lay(mstmm_model *model);
+int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots);
+/* R (nu) at a state, which the next calls refer to; zero on speeds that somebody imposes.
+ * `balance` may be NULL. */
+int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
+                   mstmm_balance *balance);
+/* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
+int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
+                         const real *d_a, real *d_r);
+/* Factors dR along changes du, da = s du, dq = (sq - kappa g_q)^-1 N du, where g_q are the slopes
+ * of the coordinates' rates N u by the coordinates. */
+int mstmm_tangent_factor(mstmm_tangent *at, real s, real sq, real kappa);
+/* du (nu) that makes the change of R equal to r. */
+int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du);
+/* dq (nq) of a du: sq dq = kappa g_q dq + N du + rho; rho (nq) may be NULL. */
+int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq);
+/* cdef end */
+
+#endif

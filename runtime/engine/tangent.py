@@ -1,0 +1,145 @@
+"""The residual of a packed scene and its tangent, by the looped engine in O(bodies).
+
+R(t, q, u, a) are the efforts that the accelerations a need beyond everything that acts; where
+R = 0, a are the accelerations.  What an implicit step, an equilibrium or a linear model asks for is
+R and its tangent, eliminated from the tips to the root (derive/equations/tangent.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.ir import Assign, Element, KernelIR, Operand, Store, Temporary
+
+from ..pack.system import LoadNumbers
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+
+class Tangent:
+    """Residual and tangent of one scene; each thread needs its own.
+
+    Speeds that a drive or a hold imposes have no rows: entries of residuals there are zero, and so
+    are those of solutions.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        packed, ffi = engine.packed, engine.ffi
+        self.nq, self.nu = engine.nq, engine.nu
+        slopes = packed.slopes()
+        model = packed.model
+        self.memory = engine.start_memory()
+        self.workspace = np.zeros(packed.workspace)
+        self.numbers = np.zeros(max(1, engine.lib.mstmm_tangent_lay(model)))
+        self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
+        self.couplings, self.coupled = _couplings(engine)
+        self.answers = np.zeros(max(1, self.coupled * self.nu))
+        self.closure = np.zeros(self.coupled * (2 * self.coupled + 3) + 1)
+        self.record = record = ffi.new("mstmm_tangent *")
+        record.model, record.slots = model, slopes.slots
+        record.couplings, record.n_coupled = self.couplings[0], self.coupled
+        for name in ("workspace", "memory", "work", "numbers", "answers", "closure"):
+            setattr(record, name, engine.pointer(getattr(self, name)))
+
+    def residual(self, t: float, q: Array, u: Array, a: Array) -> Array:
+        """R (nu,) at a state, to which the other calls refer from now on."""
+        r = np.empty(self.nu)
+        self._call("residual", float(t), q, u, a, r, self.engine.ffi.NULL)
+        return r
+
+    def slope(self, d_t: float, d_q: Array, d_u: Array, d_a: Array) -> Array:
+        """Derivative (nu,) of R along a direction of time, coordinates, speeds, accelerations."""
+        found = np.empty(self.nu)
+        self._call("residual_slope", float(d_t), d_q, d_u, d_a, found)
+        return found
+
+    def factor(self, s: float, sq: float, kappa: float = 1.0) -> None:
+        """Factor the change of R along du, da = s du, dq = (sq - kappa g_q)^-1 N du, where N u are
+        the rates of the coordinates and g_q their slopes by the coordinates."""
+        self._call("tangent_factor", float(s), float(sq), float(kappa))
+
+    def solve(self, r: Array) -> Array:
+        """du (nu,) along which R changes by r (nu,)."""
+        du = np.empty(self.nu)
+        self._call("tangent_solve", np.ascontiguousarray(r, float), du)
+        return du
+
+    def coordinates(self, du: Array, rho: Array | None = None) -> Array:
+        """dq (nq,) of a du: sq dq = kappa g_q dq + N du + rho."""
+        dq = np.zeros(self.nq)
+        null = self.engine.ffi.NULL
+        self._call("tangent_coordinates", du, null if rho is None else rho, dq)
+        return dq
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        pointer = self.engine.pointer
+        given = [
+            pointer(np.ascontiguousarray(a, float)) if isinstance(a, np.ndarray) else a
+            for a in arguments
+        ]
+        if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *given):
+            t = float(self.record.t)
+            raise self.engine.failed(self.record.failure, t, np.zeros(self.nq), np.zeros(self.nu))
+
+
+def _couplings(engine: Engine) -> tuple[list[Any], int]:
+    """The record of what reaches across the tree with what keeps it, and how many numbers it is."""
+    packed, ffi = engine.packed, engine.ffi
+    system, model = packed.system, packed.model
+    depends = _depends_on_state(system.values)
+    acted = {load.body for load in system.loads if _turns(load, depends)}
+    acted |= {body for force in system.forces for body, _, _ in force.ends}
+    efforts: list[tuple[int, int]] = []
+    for k in range(model.n_laws):
+        law = model.laws[k]
+        first = model.bodies[law.body].u + law.speed
+        for j in range(law.n):
+            if law.effort[j] >= 0 and depends[law.effort[j]]:
+                efforts.append((law.effort[j], first + j))
+    drags = [i for i in range(model.n_bodies) if model.bodies[i].modal != ffi.NULL
+             and model.bodies[i].modal.drag != ffi.NULL]  # fmt: skip
+    bodies = sorted((acted | set(drags)) - {-1})
+    record = ffi.new("mstmm_couplings *")
+    kept = [record]
+    for name, numbers in (
+        ("bodies", bodies), ("drags", drags), ("values", [v for v, _ in efforts]),
+        ("speeds", [j for _, j in efforts]),
+    ):  # fmt: skip
+        array = ffi.new("int[]", numbers or [0])
+        kept.append(array)
+        setattr(record, name, array)
+    record.n_bodies, record.n_drags, record.n_efforts = len(bodies), len(drags), len(efforts)
+    modes = sum(model.bodies[i].modal.n for i in drags)
+    return kept, 6 * len(bodies) + modes + len(efforts)
+
+
+def _turns(load: LoadNumbers, depends: Sequence[bool]) -> bool:
+    """Whether a load changes with the state, seen from its body."""
+    places = (*load.force, *load.moment)
+    return load.axes != load.body or any(depends[place] for place in places if place >= 0)
+
+
+def _depends_on_state(values: KernelIR | None) -> list[bool]:
+    """Whether each value of the scene's expressions reads coordinates or speeds."""
+    if values is None:
+        return []
+    reads: dict[int, bool] = {}
+    found = [False] * values.outputs[0].length(1)
+
+    def moving(operand: Operand) -> bool:
+        if isinstance(operand, Temporary):
+            return reads[operand.number]
+        return isinstance(operand, Element) and operand.port in ("q", "u")
+
+    for statement in values.statements:
+        if isinstance(statement, Assign):
+            reads[statement.number] = any(map(moving, statement.args))
+        elif isinstance(statement, Store):
+            found[int(statement.index[0])] = moving(statement.value)
+    return found
