@@ -51,6 +51,8 @@ class Status(IntEnum):
     TOO_MANY_STEPS = -7
     EVENT_CHATTER = -8
     BAD_ARGUMENT = -9
+    TANGENT_FAILED = -10
+    NOT_CONVERGED = -11
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,8 @@ class Statistics:
             stability allows: an explicit method suits the system badly, or the fixed step is long.
         stability_limited_steps: how many steps were.
         crossings: how often a step ended where an expression of the state switches.
+        residuals, tangents, solves, iterations: what implicit methods asked of the system, and
+            iterations of Newton's method.
     """
 
     steps: int
@@ -121,6 +125,10 @@ class Statistics:
     stability_limited: bool
     stability_limited_steps: int
     crossings: int = 0
+    residuals: int = 0
+    tangents: int = 0
+    solves: int = 0
+    iterations: int = 0
 
 
 class Run:
@@ -158,6 +166,11 @@ class Run:
         bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
         capacity: int | None = None,
     ) -> None:
+        if tableau.implicit and not system.implicit:
+            raise SceneError(
+                f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
+                "motion, which this system has not; take an explicit method such as dop853"
+            )
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
@@ -313,6 +326,10 @@ class Run:
             stability_limited=bool(c.stability_limited),
             stability_limited_steps=int(c.stability_limited_steps),
             crossings=int(c.crossings),
+            residuals=int(c.residuals),
+            tangents=int(c.tangents),
+            solves=int(c.solves),
+            iterations=int(c.iterations),
         )
 
     @property
@@ -418,6 +435,11 @@ def failure_text(
         else f"no end in sight {at}: at the pace of the last steps the run would take more than "
         "1e10 of them; the motion sticks where the right-hand side jumps, or is too stiff for the "
         "tolerance; max_steps, if given, is the only limit",
+        Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {at} (code "
+        f"{fail.code}): the motion may be singular there, or leave an unstable position faster "
+        "than the step allows; " + (cause or "a smaller step may help"),
+        Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}; "
+        + (cause or "a smaller step, or a Rosenbrock method such as rodas4p2, may help"),
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",
     }

@@ -21,7 +21,8 @@ class Settings:
     """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`.
 
     `first_step`, `min_step` and `max_step` (s) are chosen by the loop where they are 0, and
-    `max_steps` is 0 for as many as it takes.
+    `max_steps` is 0 for as many as it takes.  `radius` is the spectral radius, 0 to 1, that
+    generalised alpha leaves to infinitely fast motion, None for its usual one.
     """
 
     t_end: float
@@ -35,6 +36,7 @@ class Settings:
     max_steps: int = 0
     first_step: float = 0.0
     min_step: float = 0.0
+    radius: float | None = None
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
@@ -79,7 +81,15 @@ def checked(settings: Settings) -> Settings:
         max_steps=whole(
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
+        radius=None if settings.radius is None else _radius(settings.radius),
     )  # fmt: skip
+
+
+def _radius(value: float) -> float:
+    found = real("radius", value, "a spectral radius from 0 to 1")
+    if not 0.0 <= found <= 1.0:
+        raise SceneError(f"radius = {found:g}: expected a spectral radius from 0 to 1")
+    return found
 
 
 def _above_zero(name: str, value: float, expected: str) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from mstmm.arrays import Array
 
 from .steppers import Tableau
+from .steppers.implicit import Alpha, Implicit, Rosenbrock
 
 
 @cache
@@ -35,6 +36,16 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
     t.stability_limit = tableau.real_stability_limit
     t.n_nodes, t.n_iterations = tableau.iterated or (0, 0)
     t.mix, t.is_read = doubles(tableau.mix), integers(tableau.read_blocks)
+    if isinstance(tableau, Implicit):
+        t.kind, t.gamma = tableau.kind, tableau.gamma
+        t.n_inner, t.inner = len(tableau.inner), doubles(tableau.inner)
+        t.quadrature = doubles(tableau.quadrature)
+    if isinstance(tableau, Rosenbrock):
+        t.d = doubles(tableau.d)
+    if isinstance(tableau, Alpha):
+        for name in ("alpha_m", "alpha_f", "beta_n", "gamma_n", "collocation", "error_constant"):
+            setattr(t, name, getattr(tableau, name))
+        t.backward, t.one_iteration = tableau.backward, tableau.one_iteration
     _tableaus_kept.append(kept)
     return t
 

@@ -81,8 +81,9 @@ class StepCheck:
 def check_step(
     engine: Engine, tableau: Tableau, settings: Settings, y: Array, memory: Array
 ) -> StepCheck | None:
-    """Check of a fixed step at the start; None for adaptive runs or where nothing moves."""
-    if settings.step is None or engine.nu == 0:
+    """Check of a fixed step at the start; None for adaptive runs, for implicit methods, and where
+    nothing moves."""
+    if settings.step is None or tableau.implicit or engine.nu == 0:
         return None
     n = engine.nq + engine.nu
     try:

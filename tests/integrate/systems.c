@@ -4,14 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "integrate.h"
-
-typedef struct parameters {
-  double p[8];
-  double memory[4];
-  long calls; /* whatever the system counts */
-  const mstmm_system *system; /* for test_use_lanes */
-} parameters;
+#include "systems.h"
 
 static int harmonic(void *context, double t, const double *y, double *dy) {
   const double *p = ((parameters *)context)->p; /* omega, zeta */

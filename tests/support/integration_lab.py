@@ -20,7 +20,8 @@ from .c_library import compile_library
 
 #: The whole of the time integration's C.
 INTEGRATION = Path(mstmm.runtime.integrate.__path__[0], "c")
-TEST_SYSTEMS = Path(__file__).parent.parent / "integrate" / "systems.c"
+TESTS = Path(__file__).parent.parent / "integrate"
+TEST_SYSTEMS = [TESTS / "systems.c", TESTS / "mechanisms.c"]
 TEST_DECLARATIONS = """
 typedef struct parameters { double p[8]; double memory[4]; long calls; const mstmm_system *system; }
 parameters;
@@ -31,6 +32,8 @@ void test_use_three(mstmm_system *system, parameters *at);
 void test_use_normalise(mstmm_system *system);
 void test_use_accept(mstmm_system *system, parameters *at);
 void test_use_lanes(mstmm_system *system, parameters *at, int lanes);
+parameters *test_mechanism(mstmm_system *system, const char *name);
+void test_use_event(mstmm_system *system, const char *name);
 """
 
 
@@ -62,11 +65,11 @@ class Lab:
     """The compiled library and its test systems."""
 
     def __init__(self, folder: Path, *flags: str) -> None:
-        sources = [*sorted(INTEGRATION.glob("*.c")), TEST_SYSTEMS]
+        sources = [*sorted(INTEGRATION.glob("*.c")), *TEST_SYSTEMS]
         self.ffi: Any = cffi.FFI()
-        declared = [cdef(INTEGRATION / f"{name}.h") for name in ("integrate", "lanes")]
+        declared = [cdef(INTEGRATION / f"{name}.h") for name in ("implicit", "integrate", "lanes")]
         self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
-        options = ("-O2", f"-I{INTEGRATION}", *flags)
+        options = ("-O2", f"-I{INTEGRATION}", f"-I{TESTS}", *flags)
         self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
 
     def problem(self, rhs: str, n: int, *p: float, n_error: int | None = None) -> Problem:
@@ -75,6 +78,15 @@ class Lab:
         assert not self.lib.test_fill(
             system, at, rhs.encode(), n, n if n_error is None else n_error
         )
+        for i, value in enumerate(p):
+            at.p[i] = value
+        return Problem(self, system, at)
+
+    def mechanism(self, name: str, *p: float) -> Problem:
+        """A mechanical system of `mechanisms.c` with its parameters, for implicit methods too."""
+        system = self.ffi.new("mstmm_system *")
+        at = self.lib.test_mechanism(system, name.encode())
+        assert at != self.ffi.NULL
         for i, value in enumerate(p):
             at.p[i] = value
         return Problem(self, system, at)

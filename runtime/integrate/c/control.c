@@ -1,9 +1,12 @@
 /* The trial step: where it ends, whether its error is small enough, how long the next one is. */
 #include <math.h>
 
+#include "implicit_step.h"
 #include "step.h"
 
 static const double SAFETY = 0.9, SMALLEST_FACTOR = 0.2, LARGEST_FACTOR = 10.0;
+static const double LARGEST_IMPLICIT = 6.0; /* the same for implicit methods */
+static const double WORTH = 1.2; /* a longer step pays for a new tangent of Newton's iteration */
 static const double AFTER_FAILURE = 0.25; /* of the step whose stages could not be evaluated */
 static const double SAME = 1e-9;      /* of a step: a grid point so near to a break is the break */
 static const double STRETCH = 1.01;   /* a step may be this much longer to end at a stop */
@@ -67,12 +70,26 @@ static double factor_from(const mstmm_run *run, double error) {
   return fmin(LARGEST_FACTOR, factor);
 }
 
+/* As errors have grown lately they are taken to go on (K. Gustafsson, ACM Transactions on
+ * Mathematical Software 20 (1994) 496-517). */
+static double predicted_factor(const mstmm_run *run, double error) {
+  const double order = run->tableau->error_order + 1.0, before = run->real.error_previous;
+  double factor = error == 0.0 ? LARGEST_IMPLICIT : SAFETY * pow(error, -1.0 / order);
+  if (run->real.h_previous > 0.0 && before > 0.0 && error > 0.0)
+    factor = fmin(factor, SAFETY * (run->real.h / run->real.h_previous) *
+                              pow(before / (error * error), 1.0 / order));
+  factor = fmin(factor, LARGEST_IMPLICIT);
+  return run->tableau->kind != MSTMM_ROSENBROCK && factor >= 1.0 && factor < WORTH ? 1.0 : factor;
+}
+
 void mstmm_propose(mstmm_run *run, double error) {
-  double factor = fmax(SMALLEST_FACTOR, factor_from(run, error));
+  const int implicit = run->tableau->kind != MSTMM_EXPLICIT;
+  const double found = implicit ? predicted_factor(run, error) : factor_from(run, error);
+  double factor = fmax(SMALLEST_FACTOR, found);
   if (run->count.rejected_last) factor = fmin(1.0, factor);
   const double proposal = run->real.h * factor;
   run->real.h_next = run->count.cut_short ? fmax(run->real.h_next, proposal) : proposal;
-  run->real.error_previous = fmax(error, 1e-4);
+  run->real.error_previous = fmax(error, implicit ? 1e-2 : 1e-4);
 }
 
 int mstmm_reject(mstmm_run *run, int failed, double error) {
@@ -161,7 +178,9 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
     return mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_worst_component(work), run->real.t_new);
   if (mstmm_in_gap(run)) *error = 0.0;
   if (run->fixed_step == 0.0 && *error >= 1.0) return 0;
-  return mstmm_output_inside(run) || mstmm_n_watched(work->system) ? mstmm_build_dense(work) : 0;
+  const int dense = mstmm_output_inside(run) || mstmm_n_watched(work->system);
+  if (work->implicit) return mstmm_implicit_finish(work, dense);
+  return dense ? mstmm_build_dense(work) : 0;
 }
 
 int mstmm_try_step(const mstmm_work *work) {
@@ -184,7 +203,7 @@ int mstmm_try_step(const mstmm_work *work) {
   }
   if (!fixed) mstmm_propose(run, error);
   mstmm_count_step(run, error, absolute);
-  watch_stability(work);
+  if (!work->implicit) watch_stability(work);
   run->real.t_scan = run->real.t;
   run->count.phase = work->system->n_switches ? PHASE_SWITCH : PHASE_SCAN;
   run->real.t_switch = INFINITY;

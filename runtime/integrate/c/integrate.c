@@ -239,7 +239,7 @@ static int accept(const mstmm_work *work, double t, double *y) {
 /* The current state becomes (t, y). */
 static void move_to(const mstmm_work *work, double t, const double *y) {
   mstmm_run *run = work->run;
-  memcpy(work->y, y, (size_t)work->system->n_state * sizeof *y);
+  memcpy(work->y, y, (size_t)work->row * sizeof *y);
   run->real.t = t;
   run->real.h_cut = 0.0;
   run->count.sampled = 0;
@@ -300,12 +300,21 @@ static int phase_cross(const mstmm_work *work) {
   return 0;
 }
 
+/* How many steps of one length have been made, as far as anybody asks */
+static void note_length(mstmm_run *run) {
+  const double h = run->real.h;
+  const int same = fabs(h - run->real.h_previous) <= MSTMM_SAME_STEP * h;
+  run->count.history = !same ? 1 : run->count.history < 2 ? run->count.history + 1 : 2;
+  run->real.h_previous = h;
+}
+
 static int phase_accept(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int64_t row = work->row;
   const int status = accept(work, run->real.t_new, work->y_new);
   if (status < 0) return status;
   move_to(work, run->real.t_new, work->y_new);
+  note_length(run);
   run->count.first_stage_valid = status == 0 && !run->count.at_break;
   if (run->count.first_stage_valid)
     memcpy(work->k, work->k + work->tableau->n_stages * row, (size_t)row * sizeof(double));
@@ -356,6 +365,7 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
   mstmm_work work;
   if (run->count.phase == PHASE_END) return (int)run->count.status;
   mstmm_work_cut(run, &work);
+  run->count.tangent_held = 0; /* the caller may have used the system since */
   const int64_t steps = run->count.steps;
   const double now = seconds();
   pace at = {.deadline = now + wall_seconds, .last = now, .stride = 1, .left = 1};

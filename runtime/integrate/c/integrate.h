@@ -1,12 +1,16 @@
-/* Time integration: one loop for every embedded explicit Runge-Kutta method, told which one by a
- * tableau.  It knows nothing of mechanics: a system is a right-hand side, a few call-backs and an
- * array of discrete memory.  The loop owns no memory, keeps no global and never recurses.
+/* Time integration: one loop for explicit Runge-Kutta methods, Rosenbrock methods, diagonally
+ * implicit ones and the family of Newmark, told which one by a tableau.  It knows nothing of
+ * mechanics: a system is a right-hand side, a few call-backs (for implicit methods those of
+ * implicit.h) and an array of discrete memory.  The loop owns no memory, keeps no global and never
+ * recurses.
  *
  * Between the two marks below stand the declarations that cffi reads as they are. */
 #ifndef MSTMM_INTEGRATE_H
 #define MSTMM_INTEGRATE_H
 
 #include <stdint.h>
+
+#include "implicit.h"
 
 /* cdef begin */
 typedef struct mstmm_system {
@@ -32,6 +36,7 @@ typedef struct mstmm_system {
    * t[lane], y[i * lanes + lane], dy alike; codes[lane] as rhs returns; nonzero if any failed */
   int lanes;
   int (*rhs_lanes)(void *context, const double *t, const double *y, double *dy, int *codes);
+  const mstmm_implicit *implicit; /* what implicit methods ask; NULL: explicit methods alone */
 } mstmm_system;
 
 enum {
@@ -40,6 +45,8 @@ enum {
   MSTMM_FIRE_STOP = 2,     /* the run ends here */
   MSTMM_FIRE_CONTINUE = 3  /* nothing changed; fire again the next time it becomes true */
 };
+
+enum { MSTMM_EXPLICIT = 0, MSTMM_ROSENBROCK = 1, MSTMM_DIRK = 2, MSTMM_ALPHA = 3 };
 
 /* s = n_stages stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage of
  * the next step, then n_extra stages for dense output alone.
@@ -65,6 +72,24 @@ typedef struct mstmm_tableau {
   int n_nodes, n_iterations;
   const double *mix;  /* n_nodes x 8: mix[8 j + i] = weight of node j in node i, zeros behind */
   const int *is_read; /* n_iterations: 1 where the step, the error or dense output need the block */
+  /* An implicit method.  k_0 is the slope at the step's start for all of them, k_s that at its end.
+   * Rosenbrock: k_i = U_i / h, i = 1 .. s - 1, with the weights of the form without products by the
+   * tangent; s - 1 rows more, behind those of dense output, hold C.
+   * DIRK: k_i the slopes at the stages, the last one at the step's end; rows of stages without the
+   * diagonal; s - 1 rows more: weights of the k_j from which the iteration for k_i starts.
+   * Alpha: k_1 = (y_new - y) / h, k_2 the error / h. */
+  int kind;
+  double gamma;    /* Rosenbrock and DIRK: the diagonal */
+  const double *d; /* Rosenbrock: s weights of h dR/dt */
+  double alpha_m, alpha_f, beta_n, gamma_n, collocation; /* Alpha; the last 1 but for Wilson */
+  double error_constant; /* Alpha: of h^2 times the change of acceleration */
+  int backward;          /* Alpha: Houbolt's differences, after two steps by the constants above */
+  int one_iteration;     /* Alpha: one linearised equation a step, at the predictor */
+  /* Quadratures, but for DIRK whose stages carry them: slopes at the ends and n_inner nodes between,
+   * of which row l holds the weights in the polynomials of dense output. */
+  int n_inner;
+  const double *inner;      /* n_inner */
+  const double *quadrature; /* (n_inner + 2) x n_dense, nodes in their order */
 } mstmm_tableau;
 
 enum {
@@ -80,7 +105,9 @@ enum {
   MSTMM_FIRE_FAILED = -6,
   MSTMM_TOO_MANY_STEPS = -7, /* max_steps; with `code` 1 there is none, but no end in sight */
   MSTMM_EVENT_CHATTER = -8, /* `event` fires without end at one time */
-  MSTMM_BAD_ARGUMENT = -9   /* `code` says which, see mstmm_run_start */
+  MSTMM_BAD_ARGUMENT = -9,  /* `code` says which, see mstmm_run_start */
+  MSTMM_TANGENT_FAILED = -10, /* with `code`, at `fail_time` */
+  MSTMM_NOT_CONVERGED = -11   /* Newton's iteration, at `fail_time` */
 };
 
 /* The changing part of a run, only doubles and only 64-bit integers, so that it can be saved. */
@@ -101,6 +128,11 @@ typedef struct mstmm_run_real {
   double h_cut;        /* > 0: the step is to be no longer, so that it ends before a switch */
   double pace_time;    /* t so many steps ago: how fast the run gets on */
   double chatter_time; /* since then switch `chatter` is not watched */
+  /* implicit methods: the last accepted step (0: none since a restart), and where the tangent of
+   * Newton's iteration was taken, besides the state kept in the workspace */
+  double h_previous;
+  double tangent_t, tangent_s, tangent_sq;
+  double contraction; /* of Newton's iteration with that tangent; < 0: not known */
 } mstmm_run_real;
 
 typedef struct mstmm_run_count {
@@ -119,6 +151,11 @@ typedef struct mstmm_run_count {
   int64_t steps, rejected, evaluations, events_fired;
   /* how many steps were about as long as stability allows, and whether that is a good part */
   int64_t stability_limited_steps, stability_limited;
+  /* implicit methods */
+  int64_t residuals, tangents, solves, iterations;
+  int64_t tangent_valid; /* the workspace holds where it was taken */
+  int64_t tangent_held;  /* and the system has it factored */
+  int64_t history;       /* steps of the length of the last one, at most 2 */
 } mstmm_run_count;
 
 typedef struct mstmm_run {

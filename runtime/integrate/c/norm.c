@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "implicit_step.h"
 #include "step.h"
 
 /* 1 / (atol + rtol size) of eight components, 0 where that would not be a number */
@@ -28,6 +29,7 @@ double mstmm_combined_error(double h, double high, double low, int64_t n, int bo
 MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
   const mstmm_tableau *tableau = work->tableau;
   const int64_t n = work->system->n_error, row = work->row;
+  if (work->implicit) return mstmm_implicit_norm(work, absolute);
   const int both = tableau->n_errors > 1;
   const mstmm_terms first = mstmm_error_terms(tableau, 0), second = mstmm_error_terms(tableau, 1);
   const wide zero = {0.0};
@@ -55,6 +57,7 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
 int64_t mstmm_worst_component(const mstmm_work *work) {
   const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
   int64_t worst = -1;
+  if (work->implicit) return mstmm_implicit_worst(work);
   double largest = -1.0;
   for (int64_t i = 0; i < work->system->n_error; i++) {
     double e = 0.0;
@@ -124,6 +127,7 @@ double mstmm_step_from(const mstmm_slopes *at, double guess, const double *f1, i
 /* A failing trial evaluation only makes the step cautious. */
 double mstmm_initial_step(const mstmm_work *work, double interval) {
   const int64_t n = work->system->n_state;
+  if (work->implicit) return mstmm_implicit_first_step(work, interval);
   const mstmm_slopes at = {.n = work->system->n_error, .stride = 1, .y = work->y, .k = work->k,
                            .atol = work->atol, .rtol = work->run->rtol, .interval = interval};
   const double h0 = mstmm_guess_step(&at), end = work->run->real.t + interval;

@@ -25,19 +25,46 @@ static double *aligned(double *workspace) {
   return rest ? workspace + (ALIGNMENT - rest) / sizeof(double) : workspace;
 }
 
+static int newton(const mstmm_tableau *tableau) {
+  return tableau->kind == MSTMM_DIRK || tableau->kind == MSTMM_ALPHA;
+}
+
+/* Numbers behind the components of a state, in the rows of implicit methods */
+static int64_t accelerations(const mstmm_implicit *implicit, const mstmm_tableau *tableau) {
+  if (!implicit) return 0;
+  return (int64_t)implicit->n_u * (tableau->kind != MSTMM_ALPHA ? 1 : tableau->backward ? 3 : 2);
+}
+
+static void cut_implicit(cutting *at, mstmm_work *work) {
+  const int64_t n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  double **of_row[] = {&work->y_star, &work->y_first, &work->error};
+  double **of_q[] = {&work->rho_q, &work->dq};
+  double **of_u[] = {&work->residual, &work->residual_rate, &work->rho_u, &work->du,
+                     &work->da,       &work->map_q,         &work->map_u};
+  for (size_t i = 0; i < sizeof of_row / sizeof *of_row; i++) *of_row[i] = take(at, work->row);
+  for (size_t i = 0; i < sizeof of_q / sizeof *of_q; i++) *of_q[i] = take(at, n_q);
+  for (size_t i = 0; i < sizeof of_u / sizeof *of_u; i++) *of_u[i] = take(at, n_u);
+  work->flow = take(at, 3 * n_q);
+  work->nodes = take(at, (work->tableau->n_inner + 2) * (int64_t)mstmm_n_rest(work));
+}
+
 /* Cuts `base` into the arrays of *work, whose sizes are there.  Returns the doubles needed; *kept
  * is what must be kept between steps. */
 static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
   const mstmm_system *system = work->system;
   const mstmm_tableau *tableau = work->tableau;
-  const int64_t ne = mstmm_n_watched(system), row = (system->n_state + WIDE - 1) / WIDE * WIDE;
+  const mstmm_implicit *implicit = tableau->kind == MSTMM_EXPLICIT ? NULL : system->implicit;
+  const int64_t wide_state = system->n_state + accelerations(implicit, tableau);
+  const int64_t ne = mstmm_n_watched(system), row = (wide_state + WIDE - 1) / WIDE * WIDE;
   const int64_t lanes = tableau->n_nodes ? WIDE * row : 0;
   cutting at = {.base = base, .used = 0};
   work->row = row;
+  work->implicit = implicit;
   work->y = take(&at, row);
   work->truth = take(&at, ne);
   work->last_fire = take(&at, ne);
   work->side = take(&at, ne);
+  if (newton(tableau)) work->base = take(&at, row);
   work->k = take(&at, row);
   *kept = at.used;
   take(&at, (tableau->n_stages + tableau->n_extra) * row);
@@ -53,6 +80,7 @@ static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
   work->g_right = take(&at, ne);
   work->g_trial = take(&at, ne);
   work->memory = take(&at, system->n_memory);
+  if (implicit) cut_implicit(&at, work);
   return at.used;
 }
 
@@ -64,11 +92,20 @@ void mstmm_work_cut(mstmm_run *run, mstmm_work *work) {
   for (int64_t i = 0; i < n; i++) work->atol[i] = run->atol ? run->atol[i] : 0.0;
 }
 
+static int implicit_is_sound(const mstmm_system *system, const mstmm_tableau *tableau) {
+  const mstmm_implicit *at = system->implicit;
+  if (tableau->kind == MSTMM_EXPLICIT) return 1;
+  return at && at->n_q >= 0 && at->n_u >= 0 && at->n_q + at->n_u <= system->n_state &&
+         (at->coordinates || at->n_q == at->n_u) && at->residual && at->rates && at->tangent &&
+         at->solve && (at->residual_rate || tableau->kind != MSTMM_ROSENBROCK) &&
+         tableau->n_extra == 0 && tableau->n_nodes == 0 && tableau->n_inner >= 0;
+}
+
 static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tableau) {
   const int lanes = system->lanes;
   return system->n_state >= 0 && system->n_error >= 0 && system->n_error <= system->n_state &&
          system->n_events >= 0 && system->n_switches >= 0 && system->n_memory >= 0 &&
-         system->rhs && (!system->n_events || system->fire) &&
+         system->rhs && implicit_is_sound(system, tableau) && (!system->n_events || system->fire) &&
          (!mstmm_n_watched(system) || system->events) &&
          (!system->n_memory || system->memory) &&
          (lanes == 0 || ((lanes == 2 || lanes == 4 || lanes == WIDE) && system->rhs_lanes)) &&
@@ -108,6 +145,7 @@ static int bad_argument(const mstmm_run *run) {
       !(run->min_step >= 0.0) || !(run->max_step >= 0.0) || run->max_steps < 0)
     return 3;
   if (run->fixed_step == 0.0 && (!run->tableau->n_errors || (system->n_error && !run->atol))) return 3;
+  if (newton(run->tableau) && !run->atol) return 3; /* it says when the iteration may stop */
   for (int i = 0; run->atol && i < system->n_error; i++)
     if (!(run->atol[i] > 0.0)) return 3;
   if (run->n_breaks < 0 || !increasing(run->n_breaks, run->breaks)) return 4;
@@ -138,6 +176,7 @@ static void clear(mstmm_run *run) {
   run->count.event = -1;
   run->count.chatter = -1;
   run->real.t = run->t_start;
+  run->real.contraction = -1.0;
   run->real.smallest_step = INFINITY;
 }
 
@@ -216,7 +255,7 @@ static int belongs(const mstmm_run *run, const mstmm_run_count *saved) {
   return saved->n_state == c->n_state && saved->n_events == c->n_events &&
          saved->n_switches == c->n_switches && saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
          saved->n_extra == c->n_extra && saved->n_dense == c->n_dense && saved->lanes == c->lanes &&
-         saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
+         saved->history >= 0 && saved->history <= 2 && saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
          saved->event < c->n_events + c->n_switches && saved->break_index >= 0 &&
          saved->next_switch >= 0 && saved->next_switch <= c->n_events + c->n_switches &&
          saved->bound_index >= 0 && saved->bound_index <= run->n_bounds &&

@@ -1,7 +1,8 @@
-/* Arithmetic of one explicit Runge-Kutta step: its stages and its dense output. */
+/* Arithmetic of one step: the stages of explicit Runge-Kutta methods, and everyone's dense output. */
 #include <math.h>
 #include <string.h>
 
+#include "implicit_step.h"
 #include "iterate.h"
 #include "step.h"
 
@@ -11,18 +12,9 @@ int mstmm_first_stage(const mstmm_work *work) {
   const double t = run->count.at_break ? nextafter(run->real.t, INFINITY) : run->real.t;
   int status = mstmm_evaluate(work, t, work->y, work->k);
   if (!status) status = mstmm_check_finite(work, t, work->k);
+  if (!status && work->implicit) mstmm_implicit_restart(work);
   run->count.first_stage_valid = !status;
   return status;
-}
-
-/* out = y + h sum_j w_j k_j */
-MSTMM_INLINE void combine(const mstmm_work *work, mstmm_terms terms, int64_t row, double *out) {
-  const double h = work->run->real.h;
-  for (int64_t i = 0; i < row; i += WIDE) {
-    wide sum;
-    mstmm_add_terms(&terms, work->k + i, row, &sum);
-    *(wide *)(out + i) = *(const wide *)(work->y + i) + h * sum;
-  }
 }
 
 /* `row` is work->row, or a constant equal to it for which the compiler drops the loops. */
@@ -30,7 +22,7 @@ MSTMM_INLINE int explicit_stages(const mstmm_work *work, int64_t row) {
   const mstmm_tableau *tableau = work->tableau;
   int status = 0;
   for (int i = 1; i < tableau->n_stages && !status; i++) {
-    combine(work, mstmm_stage_terms(tableau, i), row, work->y_stage);
+    mstmm_combine(work, mstmm_stage_terms(tableau, i), row, work->y_stage);
     status = mstmm_evaluate(work, mstmm_time_in(work->run, tableau->c[i]), work->y_stage,
                             work->k + i * row);
   }
@@ -41,11 +33,12 @@ MSTMM_WIDE int mstmm_stages(const mstmm_work *work) {
   const mstmm_tableau *tableau = work->tableau;
   const int64_t row = work->row;
   double *last = work->k + tableau->n_stages * row;
+  if (work->implicit) return mstmm_implicit_stages(work);
   int status = tableau->n_nodes ? mstmm_iterate(work)
                : row == WIDE    ? explicit_stages(work, WIDE)
                                 : explicit_stages(work, row);
   if (status) return status;
-  combine(work, mstmm_step_terms(tableau), row, work->y_new);
+  mstmm_combine(work, mstmm_step_terms(tableau), row, work->y_new);
   status = mstmm_check_finite(work, work->run->real.t_new, work->y_new);
   if (!status) status = mstmm_evaluate(work, mstmm_time_in(work->run, 1.0), work->y_new, last);
   if (!status) status = mstmm_check_finite(work, work->run->real.t_new, last);
@@ -60,7 +53,7 @@ MSTMM_WIDE int mstmm_build_dense(const mstmm_work *work) {
   for (int i = 0; i < tableau->n_extra && !status; i++) {
     double *k = work->k + (tableau->n_stages + 1 + i) * row;
     const double t = mstmm_time_in(work->run, tableau->c_extra[i]);
-    combine(work, mstmm_extra_terms(tableau, i), row, work->y_event);
+    mstmm_combine(work, mstmm_extra_terms(tableau, i), row, work->y_event);
     status = mstmm_evaluate(work, t, work->y_event, k);
     if (!status) status = mstmm_check_finite(work, t, k);
   }
@@ -88,4 +81,5 @@ MSTMM_WIDE void mstmm_dense(const mstmm_work *work, double t, double *y) {
       sum = (j % 2 ? 1.0 - theta : theta) * (sum + *(const wide *)(work->dense + j * row + i));
     *(wide *)(y + i) = *(const wide *)(work->y + i) + sum;
   }
+  if (work->implicit) (void)mstmm_impose(work, t, y); /* who needs what fails here fails by it */
 }

@@ -8,6 +8,8 @@
 #include "integrate.h"
 #include "wide.h"
 
+#define MSTMM_SAME_STEP 1e-9 /* relative difference of two steps that are of one length */
+
 /* The workspace cut into named arrays.  First lies what must be kept between steps: the state, the
  * first stage, what is known of events; the rest matters only inside a step.  Rows of the state
  * hold `row` numbers, n_state rounded up to whole vectors; those behind n_state stay 0. */
@@ -27,7 +29,28 @@ typedef struct mstmm_work {
   double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterate.c */
   double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
   double *memory;                                /* n_memory: saved while an event is tried */
+  /* Implicit methods, NULL and nothing for others.  Rows of the state are longer then: behind the
+   * n_state components stand the accelerations, and with the family of Newmark what else a step
+   * leaves to the next, see alpha.c. */
+  const mstmm_implicit *implicit;
+  double *base;                /* a row, kept: where the tangent of Newton's iteration was taken */
+  double *y_star, *y_first, *error; /* a row each */
+  double *residual, *residual_rate, *rho_u, *du, *da; /* n_u each */
+  double *rho_q, *dq;          /* n_q each */
+  double *map_q, *map_u;       /* n_u each: what is known of the step, see alpha.c */
+  double *flow;                /* 3 n_q */
+  double *nodes;               /* quadratures at the ends and nodes of a step */
 } mstmm_work;
+
+MSTMM_INLINE double *mstmm_accelerations(const mstmm_work *work, double *row) {
+  return row + work->system->n_state;
+}
+MSTMM_INLINE double *mstmm_behind(const mstmm_work *work, double *row) {
+  return row + work->system->n_state + work->implicit->n_u;
+}
+MSTMM_INLINE int mstmm_n_rest(const mstmm_work *work) {
+  return work->system->n_state - work->implicit->n_q - work->implicit->n_u;
+}
 
 /* Rows of a method's weights, see mstmm_tableau. */
 MSTMM_INLINE mstmm_terms mstmm_row(const mstmm_tableau *tableau, int r) {
@@ -52,6 +75,12 @@ MSTMM_INLINE mstmm_terms mstmm_dense_terms(const mstmm_tableau *tableau, int j) 
   return mstmm_row(tableau, tableau->n_stages + 2 + tableau->n_extra + j);
 }
 
+/* Implicit methods: a second set of weights for each of the stages 1 .. s - 1. */
+MSTMM_INLINE mstmm_terms mstmm_second_terms(const mstmm_tableau *tableau, int i) {
+  return mstmm_row(tableau,
+                   tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + i);
+}
+
 int mstmm_all_finite(int64_t n, const double *x);
 int64_t mstmm_first_not_finite(int64_t n, const double *x);
 /* Notes a failure in the run and returns its status. */
@@ -72,6 +101,18 @@ MSTMM_INLINE int mstmm_evaluate(const mstmm_work *work, double t, const double *
   work->run->count.evaluations++;
   const int code = work->system->rhs(work->system->context, t, y, dy);
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
+/* out = y + h sum_j w_j k_j; `row` is work->row, or a constant equal to it for which the compiler
+ * drops the loops. */
+MSTMM_INLINE void mstmm_combine(const mstmm_work *work, mstmm_terms terms, int64_t row,
+                                double *out) {
+  const double h = work->run->real.h;
+  for (int64_t i = 0; i < row; i += WIDE) {
+    wide sum;
+    mstmm_add_terms(&terms, work->k + i, row, &sum);
+    *(wide *)(out + i) = *(const wide *)(work->y + i) + h * sum;
+  }
 }
 
 #endif

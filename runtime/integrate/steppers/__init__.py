@@ -1,8 +1,8 @@
 """Time-integration methods by name.
 
-A new explicit Runge-Kutta method is one file: a function `tableau() -> Tableau`.  Inside the
-package its module name goes into `BUILT_IN`; outside it, call `register(my_tableau())` before the
-run.  Nothing else changes: the C loop reads the coefficients at run time.
+A new method is one file: a function `tableau() -> Tableau`, of an explicit Runge-Kutta method by
+`Tableau` itself, of an implicit one by what `implicit` offers.  Inside the package its module name
+goes into `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else changes: the C loop reads the coefficients at run time.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from .tableau import Tableau, from_monomials, frozen, hermite
 
 __all__ = [
     "BUILT_IN",
+    "EXPLICIT",
+    "IMPLICIT",
+    "WITH_RADIUS",
     "Tableau",
     "from_monomials",
     "frozen",
@@ -25,15 +28,23 @@ __all__ = [
     "register",
 ]
 
-BUILT_IN = ("rk4", "dopri5", "dop853", "pirk13")
+EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
+IMPLICIT = (
+    "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
+    "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt",
+)  # fmt: skip
+BUILT_IN = EXPLICIT + IMPLICIT
+
+#: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
+WITH_RADIUS = ("genalpha", "dttmm")
 
 _registered: dict[str, Tableau] = {}
 
 
 @cache
-def _built_in(name: str) -> Tableau:
+def _built_in(name: str, radius: float | None = None) -> Tableau:
     module = import_module(f".{name}", __name__)
-    tableau: Tableau = module.tableau()
+    tableau: Tableau = module.tableau() if radius is None else module.tableau(radius)
     return tableau
 
 
@@ -53,14 +64,24 @@ def names() -> tuple[str, ...]:
     return (*BUILT_IN, *_registered)
 
 
-def get(name: str) -> Tableau:
+def get(name: str, radius: float | None = None) -> Tableau:
     """The tableau of a method.
 
+    Args:
+        name: of the method.
+        radius: spectral radius at infinity, 0 to 1, of a method that lets it be chosen.
+
     Raises:
-        SceneError: if there is no such method; names those there are.
+        SceneError: if there is no such method, and names those there are; for a radius that the
+            method does not take.
     """
+    if radius is not None and name not in WITH_RADIUS:
+        raise SceneError(
+            f"radius = {radius:g}: method {name!r} takes none; those that do are "
+            + ", ".join(WITH_RADIUS)
+        )
     if name in BUILT_IN:
-        return _built_in(name)
+        return _built_in(name, radius)
     if name not in _registered:
         raise SceneError(
             f"method {name!r} is not known; there are: {', '.join(names())}, and SciPy's as "

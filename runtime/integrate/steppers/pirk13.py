@@ -30,7 +30,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from .tableau import Tableau, from_monomials, frozen
+from .tableau import Tableau, from_monomials, frozen, integrals
 
 _ITERATIONS = 12
 _COMPARED = 9  # the error estimate: what three iterations less give
@@ -53,19 +53,6 @@ def _nodes() -> list[Fraction]:
     return sorted((1 + sign * zero) / 2 for zero in zeros for sign in (-1, 1))
 
 
-def _integrals(nodes: Sequence[Fraction]) -> list[Polynomial]:
-    """Coefficients of theta, theta^2, ... of the integral from 0 of each Lagrange polynomial."""
-    found = []
-    for i, node in enumerate(nodes):
-        product: Polynomial = [Fraction(1)]
-        for j, other in enumerate(nodes):
-            if j != i:
-                shifted, scaled = [Fraction(0), *product], [other * x for x in product] + [0]
-                product = [(a - b) / (node - other) for a, b in zip(shifted, scaled, strict=True)]
-        found.append([x / (power + 1) for power, x in enumerate(product)])
-    return found
-
-
 def _value(polynomial: Polynomial, at: Fraction) -> float:
     return float(sum(x * at ** (power + 1) for power, x in enumerate(polynomial)))
 
@@ -83,9 +70,9 @@ def tableau() -> Tableau:
     """The method `pirk13`."""
     nodes = _nodes()
     n = len(nodes)
-    integrals = _integrals(nodes)
-    weights = np.array([_value(p, Fraction(1)) for p in integrals])
-    block = np.array([[_value(p, node) for p in integrals] for node in nodes])
+    slopes = integrals(nodes)
+    weights = np.array([_value(p, Fraction(1)) for p in slopes])
+    block = np.array([[_value(p, node) for p in slopes] for node in nodes])
     places = [slice(1 + i * n, 1 + (i + 1) * n) for i in range(_ITERATIONS)]
     stages = 1 + n * _ITERATIONS
     c = np.array([0.0, *[float(node) for node in nodes] * _ITERATIONS])
@@ -114,7 +101,7 @@ def tableau() -> Tableau:
 def _dense(nodes: Sequence[Fraction], weights: Array, stages: int) -> Array:
     """The slope's polynomial goes through k_0, the last eight stages and the next step's first."""
     points = [Fraction(0), *nodes, Fraction(1)]
-    narrow = np.array(from_monomials(_integrals(points)))
+    narrow = np.array(from_monomials(integrals(points)))
     narrow[:, 0] = [0.0, *weights, 0.0]  # what it is but for the last digits of the nodes
     wide = np.zeros((stages + 1, narrow.shape[1]))
     wide[0], wide[stages - len(nodes) : stages], wide[stages] = narrow[0], narrow[1:-1], narrow[-1]

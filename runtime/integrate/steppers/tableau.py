@@ -149,13 +149,16 @@ class Tableau:
         blocks = [slice(1 + i * nodes, 1 + (i + 1) * nodes) for i in range(iterations)]
         return [int(any(np.any(row[block]) for row in reading)) for block in blocks]
 
-    @cached_property
-    def rows(self) -> tuple[list[int], list[int], Array]:
-        """Starts, columns and weights of the sparse rows that `mstmm_tableau` in C describes."""
+    def _rows(self) -> list[Array]:
         none = np.zeros(0)
         rows = [*self.A[1:], self.B]
         rows += [none if row is None else row for row in (self.E, self.E_low)]
-        rows += [*self.A_extra, *self.dense.T]
+        return [*rows, *self.A_extra, *self.dense.T]
+
+    @cached_property
+    def rows(self) -> tuple[list[int], list[int], Array]:
+        """Starts, columns and weights of the sparse rows that `mstmm_tableau` in C describes."""
+        rows = self._rows()
         starts, columns, weights = [0], list[int](), list[float]()
         for row in rows:
             places = np.flatnonzero(row)
@@ -163,6 +166,11 @@ class Tableau:
             weights += row[places].tolist()
             starts.append(len(columns))
         return starts, columns, frozen(weights)
+
+    @property
+    def implicit(self) -> bool:
+        """True if steps need a tangent of the equations of motion."""
+        return False
 
     @property
     def n_stages(self) -> int:
@@ -269,6 +277,24 @@ def from_monomials(P: Iterable[Iterable[Any]]) -> Array:
             rest = [r - weights[j] * b for r, b in zip(rest, basis[j], strict=True)]
         dense.append([float(w) for w in weights])
     return frozen(dense)
+
+
+def integrals(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
+    """Coefficients of theta, theta^2, ... of the integral from 0 of each Lagrange polynomial."""
+    found = []
+    for i, node in enumerate(nodes):
+        product = [Fraction(1)]
+        for j, other in enumerate(nodes):
+            if j != i:
+                shifted, scaled = [Fraction(0), *product], [other * x for x in product] + [0]
+                product = [(a - b) / (node - other) for a, b in zip(shifted, scaled, strict=True)]
+        found.append([x / (power + 1) for power, x in enumerate(product)])
+    return found
+
+
+def integrals_in_basis(nodes: Sequence[Fraction]) -> Array:
+    """(n, n) dense weights of an integral whose slope is known at n nodes."""
+    return from_monomials(integrals(nodes))
 
 
 def _basis_in_monomials(degree: int) -> list[list[Fraction]]:

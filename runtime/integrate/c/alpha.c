@@ -1,0 +1,159 @@
+/* The family of Newmark: one acceleration a step is unknown, coordinates and speeds at its end are
+ * linear in it.  Generalised alpha, HHT and Newmark, Wilson's collocation, Houbolt's differences.
+ *
+ * Over a step the coordinates move along q' = N(q) theta, theta constant, so that rotations need no
+ * chart (O. Brüls, A. Cardona, M. Arnold, Mechanism and Machine Theory 48 (2012) 121-137).
+ * Behind the state and its accelerations stand auxiliary accelerations (M. Arnold, O. Brüls,
+ * Multibody System Dynamics 18 (2007) 185-202), or the last two theta for Houbolt's differences. */
+#include <math.h>
+#include <string.h>
+
+#include "implicit_step.h"
+
+/* work->flow := where q arrives along q' = N(q) theta from `from` within time 1, by the classical
+ * Runge-Kutta method: exact but for rotations, and there beyond what the family resolves. */
+static int flow(const mstmm_work *work, double t, const double *from, const double *theta,
+                double *to) {
+  static const double nodes[] = {0.0, 0.5, 0.5, 1.0}, weights[] = {1.0, 2.0, 2.0, 1.0};
+  const int n = work->implicit->n_q;
+  double *q = work->flow, *rate = q + n, *sum = rate + n;
+  for (int i = 0; i < n; i++) rate[i] = sum[i] = 0.0;
+  for (int j = 0; j < 4; j++) {
+    for (int i = 0; i < n; i++) q[i] = from[i] + nodes[j] * rate[i];
+    const int status = mstmm_rates(work, t, q, theta, rate);
+    if (status) return status;
+    for (int i = 0; i < n; i++) sum[i] += weights[j] * rate[i];
+  }
+  for (int i = 0; i < n; i++) to[i] = from[i] + sum[i] / 6.0;
+  return 0;
+}
+
+/* y_stage from the acceleration in it */
+static int place(const mstmm_work *work, const mstmm_stage *stage) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  double *y = work->y_stage, *a = mstmm_accelerations(work, y), *theta = work->rho_u;
+  for (int i = 0; i < n_u; i++) {
+    theta[i] = work->map_q[i] + stage->cq * a[i];
+    y[n_q + i] = work->map_u[i] + stage->cu * a[i];
+  }
+  const int status = flow(work, stage->t, work->y, theta, y);
+  return status ? status : mstmm_impose(work, stage->t, y);
+}
+
+static int move(const mstmm_work *work, const mstmm_stage *stage) {
+  double *a = mstmm_accelerations(work, work->y_stage);
+  for (int i = 0; i < work->implicit->n_u; i++) a[i] += work->da[i];
+  return place(work, stage);
+}
+
+/* ---- the maps from the acceleration at the stage ---- */
+
+/* Auxiliary acceleration i at the step's start: it lies at a time of its own, which moves when the
+ * step changes; without that the order is lost. */
+static double auxiliary(const mstmm_work *work, int i) {
+  const double now = work->k[work->implicit->n_q + i], before = work->run->real.h_previous;
+  const double kept = mstmm_behind(work, work->y)[i];
+  return before > 0.0 && !work->tableau->backward ? now + (kept - now) * (work->run->real.h / before) : now;
+}
+
+/* Part of the auxiliary acceleration at the end that is known */
+static double known_part(const mstmm_work *work, int i) {
+  const mstmm_tableau *t = work->tableau;
+  const double now = work->k[work->implicit->n_q + i];
+  return (t->alpha_f * now - t->alpha_m * auxiliary(work, i)) / (1.0 - t->alpha_m);
+}
+
+/* Newmark's map over the time `h` */
+static void map_alpha(const mstmm_work *work, mstmm_stage *stage, double h) {
+  const mstmm_tableau *t = work->tableau;
+  const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m), *u = work->y + work->implicit->n_q;
+  for (int i = 0; i < work->implicit->n_u; i++) {
+    const double a = auxiliary(work, i), rest = known_part(work, i);
+    work->map_q[i] = h * u[i] + h * h * ((0.5 - t->beta_n) * a + t->beta_n * rest);
+    work->map_u[i] = u[i] + h * ((1.0 - t->gamma_n) * a + t->gamma_n * rest);
+  }
+  stage->cq = h * h * t->beta_n * part;
+  stage->cu = h * t->gamma_n * part;
+}
+
+/* Houbolt's differences, in increments of the last two steps */
+static void map_backward(const mstmm_work *work, mstmm_stage *stage, double h) {
+  const int n_u = work->implicit->n_u;
+  const double *last = mstmm_behind(work, work->y), *before = last + n_u;
+  for (int i = 0; i < n_u; i++) {
+    work->map_q[i] = 1.5 * last[i] - 0.5 * before[i];
+    work->map_u[i] = (11.0 * work->map_q[i] - 7.0 * last[i] + 2.0 * before[i]) / (6.0 * h);
+  }
+  stage->cq = 0.5 * h * h;
+  stage->cu = 11.0 / 12.0 * h;
+}
+
+/* ---- the step ---- */
+
+/* Are there two increments of steps of this length? */
+static int has_history(const mstmm_work *work) {
+  const mstmm_run *run = work->run;
+  return work->tableau->backward && run->count.history == 2 &&
+         fabs(run->real.h - run->real.h_previous) <= MSTMM_SAME_STEP * run->real.h;
+}
+
+/* Linear acceleration up to the collocation point: back to the step's end */
+static int come_back(const mstmm_work *work, mstmm_stage *stage) {
+  const mstmm_tableau *tableau = work->tableau;
+  const int n_q = work->implicit->n_q;
+  double *a = mstmm_accelerations(work, work->y_stage);
+  for (int i = 0; i < work->implicit->n_u; i++)
+    a[i] = work->k[n_q + i] + (a[i] - work->k[n_q + i]) / tableau->collocation;
+  stage->t = mstmm_time_in(work->run, 1.0);
+  map_alpha(work, stage, work->run->real.h);
+  return place(work, stage);
+}
+
+/* What the next step must know, behind the state of y_new. */
+static void remember(const mstmm_work *work, const mstmm_stage *stage) {
+  const mstmm_tableau *t = work->tableau;
+  const int n_u = work->implicit->n_u;
+  const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m);
+  const double *a = mstmm_accelerations(work, work->y_new);
+  double *behind = mstmm_behind(work, work->y_new);
+  if (t->backward) memcpy(behind + n_u, mstmm_behind(work, work->y), (size_t)n_u * sizeof *a);
+  for (int i = 0; i < n_u; i++)
+    behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i] : known_part(work, i) + part * a[i];
+}
+
+/* The step as a whole in k_1, its error in k_2 (O. C. Zienkiewicz, Y. M. Xie, Earthquake Engineering
+ * and Structural Dynamics 20 (1991) 871-887) */
+static int fill_rows(const mstmm_work *work, double t) {
+  const int n_u = work->implicit->n_u;
+  const double h = work->run->real.h, part = work->tableau->error_constant * h;
+  const double *behind = mstmm_behind(work, work->y_new);
+  double *whole = work->k + work->row, *error = whole + work->row;
+  for (int64_t i = 0; i < work->row; i++) whole[i] = (work->y_new[i] - work->y[i]) / h;
+  memset(error, 0, (size_t)work->row * sizeof(double));
+  if (!work->tableau->n_errors) return 0;
+  for (int i = 0; i < n_u; i++) work->rho_u[i] = part * (behind[i] - auxiliary(work, i));
+  return mstmm_rates(work, t, work->y_new, work->rho_u, error);
+}
+
+int mstmm_alpha_stages(const mstmm_work *work) {
+  const mstmm_tableau *tableau = work->tableau;
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  const double h = work->run->real.h, collocation = tableau->collocation;
+  mstmm_stage stage = {.t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
+  if (has_history(work))
+    map_backward(work, &stage, h);
+  else
+    map_alpha(work, &stage, collocation * h);
+  stage.s = 1.0 / stage.cu;
+  stage.sq = stage.cu / stage.cq;
+  memcpy(work->y_stage, work->y, (size_t)work->row * sizeof(double));
+  memcpy(mstmm_accelerations(work, work->y_stage), work->k + n_q, (size_t)n_u * sizeof(double));
+  int status = place(work, &stage);
+  if (!status) status = mstmm_newton(work, &stage);
+  if (!status && collocation != 1.0) status = come_back(work, &stage);
+  if (status) return status;
+  memcpy(work->y_new, work->y_stage, (size_t)work->row * sizeof(double));
+  remember(work, &stage);
+  status = fill_rows(work, stage.t);
+  return status ? status : mstmm_check_new(work);
+}

@@ -1,0 +1,226 @@
+/* What the implicit methods share: the calls of the system, the norm of their errors, and what a step
+ * needs once it is accepted. */
+#include "implicit_step.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "step.h"
+
+/* ---- the system ---- */
+
+int mstmm_impose(const mstmm_work *work, double t, double *row) {
+  const mstmm_implicit *at = work->implicit;
+  if (!at->impose) return 0;
+  const int code =
+      at->impose(work->system->context, t, row, mstmm_accelerations(work, row));
+  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
+int mstmm_residual(const mstmm_work *work, double t, const double *row, double *rest) {
+  work->run->count.residuals++;
+  const int code = work->implicit->residual(work->system->context, t, row,
+                                            row + work->system->n_state, work->residual, rest);
+  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
+int mstmm_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq) {
+  const int code = work->implicit->rates(work->system->context, q, u, dq);
+  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
+int mstmm_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
+                  int kappa) {
+  work->run->count.tangents++;
+  const int code = work->implicit->tangent(work->system->context, t, row,
+                                           row + work->system->n_state, s, sq, kappa);
+  return code ? mstmm_note(work->run, MSTMM_TANGENT_FAILED, code, -1, t) : 0;
+}
+
+int mstmm_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u) {
+  work->run->count.solves++;
+  const int code = work->implicit->solve(work->system->context, work->residual, rho_q, rho_u,
+                                         work->dq, work->du, work->da);
+  return code ? mstmm_note(work->run, MSTMM_TANGENT_FAILED, code, -1, t) : 0;
+}
+
+int mstmm_slope(const mstmm_work *work, double t, const double *row, double *slope) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  int status = mstmm_rates(work, t, row, row + n_q, slope);
+  memcpy(slope + n_q, row + work->system->n_state, (size_t)n_u * sizeof *slope);
+  if (!status && mstmm_n_rest(work)) status = mstmm_residual(work, t, row, slope + n_q + n_u);
+  return status ? status : mstmm_check_finite(work, t, slope);
+}
+
+int mstmm_check_new(const mstmm_work *work) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  const double *a = mstmm_accelerations(work, work->y_new), t = work->run->real.t_new;
+  const int status = mstmm_check_finite(work, t, work->y_new);
+  if (status || mstmm_all_finite(n_u, a)) return status;
+  return mstmm_note(work->run, MSTMM_NOT_FINITE, 0, n_q + mstmm_first_not_finite(n_u, a), t);
+}
+
+/* ---- steps ---- */
+
+void mstmm_implicit_restart(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  memcpy(mstmm_accelerations(work, work->y), work->k + work->implicit->n_q,
+         (size_t)work->implicit->n_u * sizeof(double));
+  run->real.h_previous = run->real.error_previous = 0.0;
+  run->count.tangent_valid = run->count.history = 0;
+}
+
+int mstmm_implicit_stages(const mstmm_work *work) {
+  switch (work->tableau->kind) {
+    case MSTMM_ROSENBROCK: return mstmm_rosenbrock_stages(work);
+    case MSTMM_DIRK: return mstmm_dirk_stages(work);
+    default: return mstmm_alpha_stages(work);
+  }
+}
+
+/* Quadratures over the step, and their dense output: from their rates at its ends, which the slopes
+ * hold, and on the dense output of the motion between. */
+static int integrate_quadratures(const mstmm_work *work) {
+  const mstmm_tableau *tableau = work->tableau;
+  const int rest = mstmm_n_rest(work), first = work->system->n_state - rest;
+  const int n = tableau->n_inner + 2;
+  const size_t bytes = (size_t)rest * sizeof(double);
+  const double h = work->run->real.h;
+  memcpy(work->nodes, work->k + first, bytes);
+  memcpy(work->nodes + (n - 1) * rest, work->k + tableau->n_stages * work->row + first, bytes);
+  for (int l = 1; l < n - 1; l++) {
+    const double c = tableau->inner[l - 1];
+    mstmm_dense(work, work->run->real.t + c * h, work->y_stage);
+    const int status = mstmm_residual(work, mstmm_time_in(work->run, c), work->y_stage,
+                                      work->nodes + l * rest);
+    if (status) return status;
+  }
+  for (int i = 0; i < rest; i++) {
+    for (int j = 0; j < tableau->n_dense; j++) {
+      double sum = 0.0;
+      for (int l = 0; l < n; l++)
+        sum += tableau->quadrature[l * tableau->n_dense + j] * work->nodes[l * rest + i];
+      work->dense[j * work->row + first + i] = h * sum;
+    }
+    work->y_new[first + i] = work->y[first + i] + work->dense[first + i];
+  }
+  return mstmm_check_finite(work, work->run->real.t_new, work->y_new);
+}
+
+int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
+  const mstmm_tableau *tableau = work->tableau;
+  const int own = tableau->kind != MSTMM_DIRK, rest = own && mstmm_n_rest(work);
+  int status = 0;
+  if (own)
+    status = mstmm_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
+                         work->k + tableau->n_stages * work->row);
+  if (!status && (rest || wants_dense)) status = mstmm_build_dense(work);
+  if (!status && rest) status = integrate_quadratures(work);
+  return status;
+}
+
+/* ---- norms ---- */
+
+static double tolerance(const mstmm_work *work, const double *other, int64_t i) {
+  const double size = fmax(fabs(work->y[i]), fabs(other[i]));
+  return work->atol[i] + work->run->rtol * size;
+}
+
+/* Size of error e of component i in units of its tolerance, which goes with the size of the state
+ * here or at the other end.  Speeds are weighed by what they move in
+ * a step: the vibration of a stiff spring is fast and small, and nobody asked for its speed. */
+static double scaled(const mstmm_work *work, const double *other, int64_t i, double e) {
+  const int n_q = work->implicit->n_q, *coordinates = work->implicit->coordinates;
+  const double h = work->run->real.h;
+  double unit = tolerance(work, other, i);
+  if (i >= n_q && i < n_q + work->implicit->n_u) {
+    unit = tolerance(work, other, coordinates ? coordinates[i - n_q] : i - n_q) + 0.1 * h * unit;
+    e *= h;
+  }
+  return unit > 0.0 ? fabs(e) / unit : 0.0;
+}
+
+static double rms(const mstmm_work *work, const double *other, int64_t first, int64_t last) {
+  double sum = 0.0;
+  if (last > work->system->n_error) last = work->system->n_error;
+  for (int64_t i = first; i < last; i++) {
+    const double e = scaled(work, other, i, work->error[i]);
+    sum += e * e;
+  }
+  return last > first ? sqrt(sum / (double)(last - first)) : 0.0;
+}
+
+/* The largest of three, or NaN where one is */
+static double largest(double a, double b, double c) {
+  const double found = a > b ? a : b;
+  return a + b + c != a + b + c ? NAN : found > c ? found : c;
+}
+
+/* Size of what stands in work->error */
+static double norm(const mstmm_work *work, const double *other) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  return largest(rms(work, other, 0, n_q), rms(work, other, n_q, n_q + n_u),
+                 rms(work, other, n_q + n_u, work->system->n_state));
+}
+
+static void estimate(const mstmm_work *work) {
+  const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
+  for (int64_t i = 0; i < work->row; i += WIDE) {
+    wide sum;
+    mstmm_add_terms(&terms, work->k + i, work->row, &sum);
+    *(wide *)(work->error + i) = work->run->real.h * sum;
+  }
+}
+
+double mstmm_implicit_norm(const mstmm_work *work, double *absolute) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u, n = work->system->n_error;
+  double sum = 0.0;
+  estimate(work);
+  for (int i = 0; i < n; i++) {
+    const double e = work->error[i] * (i >= n_q && i < n_q + n_u ? work->run->real.h : 1.0);
+    sum += e * e;
+  }
+  *absolute = n ? sqrt(sum / n) : 0.0;
+  return norm(work, work->y_new);
+}
+
+double mstmm_increment_norm(const mstmm_work *work) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  memcpy(work->error, work->dq, (size_t)n_q * sizeof(double));
+  memcpy(work->error + n_q, work->du, (size_t)n_u * sizeof(double));
+  for (int64_t i = n_q + n_u; i < work->row; i++) work->error[i] = 0.0;
+  return norm(work, work->y_stage);
+}
+
+int64_t mstmm_implicit_worst(const mstmm_work *work) {
+  int64_t worst = -1;
+  double most = -1.0;
+  estimate(work);
+  for (int64_t i = 0; i < work->system->n_error; i++) {
+    const double e = scaled(work, work->y_new, i, work->error[i]);
+    if (e > most || e != e) {
+      most = e == e ? e : INFINITY;
+      worst = i;
+    }
+  }
+  return worst;
+}
+
+/* A step over which speeds and accelerations of the start displace by 1 % of the tolerance, were they
+ * of the order of the estimate: a guess, which the estimate corrects in a step or two. */
+double mstmm_implicit_first_step(const mstmm_work *work, double interval) {
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u, n = work->system->n_error;
+  const int *coordinates = work->implicit->coordinates;
+  double speed = 0.0, acceleration = 0.0;
+  for (int i = 0; i < n_q && i < n; i++) {
+    const double e = work->k[i] / tolerance(work, work->y, i);
+    speed += e * e / n_q;
+  }
+  for (int i = 0; i < n_u && n_q + i < n; i++) {
+    const double e = work->k[n_q + i] / tolerance(work, work->y, coordinates ? coordinates[i] : i);
+    acceleration += e * e / n_u;
+  }
+  const double fastest = sqrt(fmax(speed, acceleration)), most = 0.1 * interval;
+  if (!(fastest > 0.0)) return most;
+  return fmin(most, pow(0.01 / fastest, 1.0 / (work->tableau->error_order + 1)));
+}

@@ -1,0 +1,36 @@
+/* What a mechanical system offers to implicit methods: its equations of motion as a residual, and
+ * their linearisation factored and solved.  Whoever has it hangs it into mstmm_system. */
+#ifndef MSTMM_IMPLICIT_H
+#define MSTMM_IMPLICIT_H
+
+/* cdef begin */
+/* y = [q (n_q), u (n_u), quadratures (the rest)];  q' = N(q) u,  u' = a,  0 = R(t, q, u, a).
+ * K, C, M are the slopes of R in q, u, a.  Functions return 0 or a failure code. */
+typedef struct mstmm_implicit {
+  int n_q, n_u;
+  /* n_u: a coordinate that each speed changes, whose tolerance weighs the speed's error.  NULL, where
+   * there are as many coordinates as speeds: the one of the same number. */
+  const int *coordinates;
+  /* R (n_u); work: rates of the quadratures, or NULL.  Rows of speeds that somebody imposes are
+   * zero; what a drive prescribes is filled in by t, whatever y and a say of it. */
+  int (*residual)(void *context, double t, const double *y, const double *a, double *r,
+                  double *work);
+  /* dR/dt at fixed (q, u, a), drives and their derivatives included */
+  int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
+  /* dq = N(q) u */
+  int (*rates)(void *context, const double *q, const double *u, double *dq);
+  /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du, dq = W du,
+   * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base. */
+  int (*tangent)(void *context, double t, const double *y, const double *a, double s, double sq,
+                 int kappa);
+  /* K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,  s du = da + rho_u, at the base
+   * point; rho may be NULL (zeros).  Entries of imposed speeds come back as zeros. */
+  int (*solve)(void *context, const double *r, const double *rho_q, const double *rho_u,
+               double *dq, double *du, double *da);
+  /* Writes the coordinates, speeds and accelerations that drives prescribe at t into y and a; NULL:
+   * there are none */
+  int (*impose)(void *context, double t, double *y, double *a);
+} mstmm_implicit;
+/* cdef end */
+
+#endif

@@ -1,0 +1,59 @@
+/* What the implicit methods share among themselves and with the loop. */
+#ifndef MSTMM_IMPLICIT_STEP_H
+#define MSTMM_IMPLICIT_STEP_H
+
+#include "work.h"
+
+/* ---- for the loop: as the functions of step.h without the word ---- */
+
+/* The slope at the start of a step has just been evaluated: accelerations from it, and nothing else
+ * is known. */
+void mstmm_implicit_restart(const mstmm_work *work);
+/* From the slope at the start to y_new and the error. */
+int mstmm_implicit_stages(const mstmm_work *work);
+/* What an accepted step needs besides: the slope at its end, quadratures, dense output if wanted. */
+int mstmm_implicit_finish(const mstmm_work *work, int wants_dense);
+double mstmm_implicit_norm(const mstmm_work *work, double *absolute);
+int64_t mstmm_implicit_worst(const mstmm_work *work);
+double mstmm_implicit_first_step(const mstmm_work *work, double interval);
+
+/* ---- the steppers ---- */
+
+int mstmm_rosenbrock_stages(const mstmm_work *work);
+int mstmm_dirk_stages(const mstmm_work *work);
+int mstmm_alpha_stages(const mstmm_work *work);
+
+/* ---- the system, with its failures and counts; a row holds its accelerations ---- */
+
+int mstmm_impose(const mstmm_work *work, double t, double *row);
+int mstmm_residual(const mstmm_work *work, double t, const double *row, double *rest);
+int mstmm_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq);
+int mstmm_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
+                  int kappa);
+/* For the right-hand side in work->residual, to work->dq, du and da. */
+int mstmm_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
+/* A slope row at a state row: rates, accelerations, and rates of the quadratures. */
+int mstmm_slope(const mstmm_work *work, double t, const double *row, double *slope);
+/* Is every number of y_new one, accelerations too? */
+int mstmm_check_new(const mstmm_work *work);
+
+/* ---- Newton's iteration ---- */
+
+/* The equations of one stage, whose unknown state stands in work->y_stage. */
+typedef struct mstmm_stage {
+  double t, s, sq; /* as `tangent` takes them */
+  int kappa;
+  double h;      /* DIRK: gamma times the step */
+  double cq, cu; /* Alpha: what an acceleration adds to coordinates and speeds */
+  /* How far the coordinates are from their own equation, to work->rho_q; NULL: they obey it. */
+  int (*defect)(const mstmm_work *work, const struct mstmm_stage *stage);
+  /* Takes the increments in work->dq and da into y_stage. */
+  int (*move)(const mstmm_work *work, const struct mstmm_stage *stage);
+} mstmm_stage;
+
+/* Solves a stage from where y_stage stands. */
+int mstmm_newton(const mstmm_work *work, const mstmm_stage *stage);
+/* Size of the increments in work->dq and du in units of the tolerance. */
+double mstmm_increment_norm(const mstmm_work *work);
+
+#endif

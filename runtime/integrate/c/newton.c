@@ -1,0 +1,112 @@
+/* Newton's iteration for a stage of an implicit method, with a tangent that is kept from step to step
+ * as long as it serves.
+ *
+ * Where it was taken is part of the run's state, so that a run that is continued elsewhere factors
+ * the same tangent again and goes on bit for bit. */
+#include "implicit_step.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double ENOUGH = 0.05;  /* of the tolerance: what is left of a stage's equations */
+static const double SLOW = 0.05;    /* contraction at which a kept tangent is renewed */
+static const double CHANGED = 0.1;  /* of the step: the same */
+static const double SURE = 1e-3;    /* no contraction is trusted to be better */
+static const double FORGET = 1.5;   /* how fast one that is not measured again grows */
+static const double ROUNDING = 1e-10; /* of the first increment: no iteration makes it smaller */
+enum { MOST_ITERATIONS = 10 };
+
+/* How hard to try: with the tangent in hand, with a new one, with a new one in every iteration */
+enum { KEPT, RENEWED, EACH };
+
+static int take(const mstmm_work *work, const mstmm_stage *stage) {
+  mstmm_run *run = work->run;
+  memcpy(work->base, work->y_stage, (size_t)work->row * sizeof(double));
+  run->real.tangent_t = stage->t;
+  run->real.tangent_s = stage->s;
+  run->real.tangent_sq = stage->sq;
+  run->real.contraction = -1.0;
+  const int status =
+      mstmm_tangent(work, stage->t, work->base, stage->s, stage->sq, stage->kappa);
+  run->count.tangent_valid = run->count.tangent_held = !status;
+  return status;
+}
+
+/* Does the tangent in hand serve this stage? */
+static int serves(const mstmm_work *work, const mstmm_stage *stage) {
+  const mstmm_run *run = work->run;
+  return run->count.tangent_valid && run->real.contraction <= SLOW &&
+         fabs(stage->s / run->real.tangent_s - 1.0) <= CHANGED;
+}
+
+/* Factors the kept tangent again where somebody else may have used the system since. */
+static int hold(const mstmm_work *work, const mstmm_stage *stage) {
+  mstmm_run *run = work->run;
+  if (run->count.tangent_held) return 0;
+  const int code = work->implicit->tangent(
+      work->system->context, run->real.tangent_t, work->base,
+      mstmm_accelerations(work, work->base), run->real.tangent_s, run->real.tangent_sq,
+      stage->kappa);
+  run->count.tangent_held = !code;
+  return code ? mstmm_note(run, MSTMM_TANGENT_FAILED, code, -1, stage->t) : 0;
+}
+
+/* One iteration; *size is that of the increment. */
+static int improve(const mstmm_work *work, const mstmm_stage *stage, double *size) {
+  work->run->count.iterations++;
+  int status = mstmm_residual(work, stage->t, work->y_stage, NULL);
+  for (int i = 0; i < work->implicit->n_u; i++) work->residual[i] = -work->residual[i];
+  if (!status && stage->defect) status = stage->defect(work, stage);
+  if (!status) status = mstmm_solve(work, stage->t, stage->defect ? work->rho_q : NULL, NULL);
+  if (!status) status = stage->move(work, stage);
+  if (!status) *size = mstmm_increment_norm(work);
+  return status;
+}
+
+static int not_converged(const mstmm_work *work, double t) {
+  return mstmm_note(work->run, MSTMM_NOT_CONVERGED, 0, -1, t);
+}
+
+/* What is left of the error after an increment of this size */
+static double left(double contraction, double size) {
+  const double rate = fmax(contraction, SURE);
+  return rate / (1.0 - rate) * size;
+}
+
+static int iterate(const mstmm_work *work, const mstmm_stage *stage, int effort) {
+  double *contraction = &work->run->real.contraction, size = 0.0, before = 0.0, first = 0.0;
+  for (int i = 0; i < MOST_ITERATIONS; i++) {
+    int status = i && effort == EACH ? take(work, stage) : 0;
+    if (!status) status = improve(work, stage, &size);
+    if (status) return status;
+    if (work->tableau->one_iteration) return 0;
+    if (!isfinite(size)) break;
+    if (i == 0) first = size;
+    if (size <= ROUNDING * first) return 0;
+    const int measured = i > 0 && before > 0.0;
+    if (measured) {
+      *contraction = size / before;
+      if (*contraction >= 1.0 && effort != EACH && left(SURE, size) >= ENOUGH) break;
+    }
+    const double known = effort == EACH ? fmin(*contraction, 0.5) : *contraction;
+    if (known >= 0.0 && known < 1.0 && left(known, size) < ENOUGH) {
+      if (!measured) *contraction *= FORGET;
+      return 0;
+    }
+    before = size;
+  }
+  return not_converged(work, stage->t);
+}
+
+int mstmm_newton(const mstmm_work *work, const mstmm_stage *stage) {
+  int effort = serves(work, stage) && !work->tableau->one_iteration ? KEPT : RENEWED;
+  memcpy(work->y_first, work->y_stage, (size_t)work->row * sizeof(double));
+  for (;; effort++) {
+    int status = effort == KEPT ? hold(work, stage) : take(work, stage);
+    if (!status) status = iterate(work, stage, effort);
+    if (!status) return 0;
+    work->run->count.tangent_valid = 0;
+    if (effort == EACH) return status;
+    memcpy(work->y_stage, work->y_first, (size_t)work->row * sizeof(double));
+  }
+}

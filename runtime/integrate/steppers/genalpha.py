@@ -1,0 +1,29 @@
+"""Generalised alpha: second order, with damping of what the step does not resolve.
+
+J. Chung, G. M. Hulbert, A time integration algorithm for structural dynamics with improved numerical
+dissipation: the generalized-alpha method, Journal of Applied Mechanics 60 (1993) 371-375.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .implicit import Implicit, alpha
+
+RADIUS = 0.8  # the spectral radius left to infinitely fast motion unless one is asked for
+
+
+def constants(radius: float) -> dict[str, float]:
+    """The constants of the method with the spectral radius r at infinity, 0 <= r <= 1."""
+    alpha_m, alpha_f = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
+    gamma = 0.5 + alpha_f - alpha_m
+    return {
+        "alpha_m": alpha_m, "alpha_f": alpha_f, "gamma_n": gamma,
+        "beta_n": 0.25 * (gamma + 0.5) ** 2,
+    }  # fmt: skip
+
+
+def tableau(radius: float = RADIUS) -> Implicit:
+    """The method `genalpha`."""
+    of: dict[str, Any] = dict(constants(radius))
+    return alpha("genalpha", "Chung and Hulbert (1993)", **of)

@@ -1,0 +1,19 @@
+"""The method of Hilber, Hughes and Taylor with a little damping, alpha = 0.05.
+
+H. M. Hilber, T. J. R. Hughes, R. L. Taylor, Improved numerical dissipation for time integration
+algorithms in structural dynamics, Earthquake Engineering and Structural Dynamics 5 (1977) 283-292.
+"""
+
+from __future__ import annotations
+
+from .implicit import Implicit, alpha
+
+_ALPHA = 0.05
+
+
+def tableau() -> Implicit:
+    """The method `hht`."""
+    return alpha(
+        "hht", "Hilber, Hughes and Taylor (1977)", alpha_f=_ALPHA,
+        beta_n=0.25 * (1.0 + _ALPHA) ** 2, gamma_n=0.5 + _ALPHA,
+    )  # fmt: skip

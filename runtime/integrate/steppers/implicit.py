@@ -1,0 +1,323 @@
+"""Implicit methods as the C loop takes them: Rosenbrock, diagonally implicit, the family of Newmark.
+
+All of them work on q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is
+the slope at the start of the step, and k_s that at its end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.arrays import Array
+
+from .tableau import Tableau, frozen, hermite, integrals_in_basis
+
+ROSENBROCK, DIRK, ALPHA = 1, 2, 3  # as in `c/integrate.h`
+
+#: Nodes between the ends of a step of the rules of Lobatto, by the order that is asked for.
+_LOBATTO = {2: (), 4: (0.5,), 6: ((1 - math.sqrt(0.2)) / 2, (1 + math.sqrt(0.2)) / 2)}
+
+
+def numbers(text: str) -> Array:
+    """Numbers between blanks."""
+    return np.array([float(Fraction(word)) for word in text.split()])
+
+
+def lower(text: str, size: int) -> Array:
+    """(size, size) strictly lower triangular, from its rows one after the other."""
+    matrix = np.zeros((size, size))
+    matrix[np.tril_indices(size, -1)] = numbers(text)
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Implicit(Tableau):
+    """What implicit methods have in common; see `Tableau` for what they share with the others.
+
+    Attributes:
+        gamma: the diagonal of Rosenbrock and diagonally implicit methods.
+        second: (s, s) a second set of weights for the stages, strictly lower triangular.
+    """
+
+    kind: ClassVar[int] = 0
+    gamma: float = 0.0
+    second: Array = field(default_factory=lambda: frozen(np.zeros((0, 0))))
+
+    @property
+    def implicit(self) -> bool:
+        """True."""
+        return True
+
+    @property
+    def real_stability_limit(self) -> float:
+        """Infinite: no step of an implicit method here is too long for a motion that decays."""
+        return math.inf
+
+    @property
+    def inner(self) -> Array:
+        """Nodes between a step's ends at which rates of quadratures are taken."""
+        wanted = 2 if self.order <= 2 else 4 if self.order <= 4 else 6
+        return frozen(_LOBATTO[wanted])
+
+    @property
+    def quadrature(self) -> Array:
+        """(n + 2, d) weights of the rates at the start, the inner nodes and the end in the dense
+        output of what they integrate to."""
+        nodes = [Fraction(0), *(Fraction(float(x)) for x in self.inner), Fraction(1)]
+        found = integrals_in_basis(nodes)
+        return frozen(np.pad(found, ((0, 0), (0, self.n_dense - found.shape[1]))))
+
+    def _rows(self) -> list[Array]:
+        lower = [np.tril(self.A, -1)[i] for i in range(1, self.n_stages)]
+        none = np.zeros(0)
+        rows = [*lower, self.B, none if self.E is None else self.E, none, *self.dense.T]
+        return rows + [row for row in self.second[1:]]
+
+
+@dataclass(frozen=True, eq=False)
+class Rosenbrock(Implicit):
+    """A Rosenbrock method in the form without products by the tangent, U_i / h in its stages.
+
+    With Z = K W + C + s M and s = 1 / (gamma h) the stages solve
+    Z U_i = -R(t + C_i h, y + A_ij U_j) - d_i h R_t and what the second set of weights, divided by
+    h, leaves of earlier stages; y + B U is the step.
+
+    Attributes:
+        d: (s,) weights of h times the slope of R in time.
+    """
+
+    kind: ClassVar[int] = ROSENBROCK
+    d: Array = field(default_factory=lambda: frozen(np.zeros(0)))
+
+    def _check_consistency(self) -> None:
+        name = f"tableau {self.name}"
+        if np.any(np.triu(self.A)) or np.any(np.triu(self.second)):
+            raise ValueError(f"{name}: a stage depends on later ones")
+        shapes = {"second": (self.second, self.A.shape), "d": (self.d, self.B.shape)}
+        for label, (array, shape) in shapes.items():
+            if array.shape != shape:
+                raise ValueError(f"{name}: {label} is {array.shape}, expected {shape}")
+        alpha, gamma = self.classical
+        if abs(gamma.sum(axis=1) - self.d[1:]).max() > 1e-12:
+            raise ValueError(f"{name}: d is not what C says of it")
+        if abs(alpha.sum(axis=1) - self.C[1:]).max() > 1e-12:
+            raise ValueError(f"{name}: the nodes are not what A says of them")
+        if not self.gamma > 0.0 or abs(self.weights_classical.sum() - 1.0) > 1e-12:
+            raise ValueError(f"{name}: its weights do not add up to 1")
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Gamma of the classical form, of which the second set of weights holds the inverse."""
+        s = self.n_stages - 1
+        return np.asarray(np.linalg.inv(np.eye(s) / self.gamma - self.second[1:, 1:]))
+
+    @cached_property
+    def classical(self) -> tuple[Array, Array]:
+        """(alpha, Gamma), (s - 1, s - 1) each, of the form with products by the tangent."""
+        return np.asarray(self.A[1:, 1:] @ self._inverse), self._inverse
+
+    @cached_property
+    def weights_classical(self) -> Array:
+        """(s - 1,) weights of the step in that form."""
+        return np.asarray(self.B[1:] @ self._inverse)
+
+    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
+        """R(z) of one step on y' = lambda y with z = h lambda."""
+        alpha, gamma = self.classical
+        return _rational(alpha + gamma, self.weights_classical, z)
+
+
+def rosenbrock(
+    name: str,
+    order: int,
+    gamma: float,
+    A: ArrayLike,
+    C: ArrayLike,
+    nodes: Sequence[float],
+    d: Sequence[float],
+    B: ArrayLike,
+    E: ArrayLike,
+    H: ArrayLike | None = None,
+    **about: Any,
+) -> Rosenbrock:
+    """A method from the coefficients in which they are published, in the form of Hairer and Wanner.
+
+    Args:
+        name, order: of the method.
+        gamma, A, C, nodes, d: of its stages.
+        B, E: weights of the step and of the error estimate.
+        H: (2 or 3, stages) dense output y_0 (1 - x) + x (y_1 + (1 - x) (H_0 + x H_1 + x^2 H_2) U);
+            without, the cubic through both ends and their slopes.
+        about: `error_order`, `dense_order` and `source`.
+    """
+    s = len(nodes)
+    first = ((1, 0), (1, 0))
+    b, e = np.pad(np.asarray(B, float), (1, 0)), np.pad(np.asarray(E, float), (1, 1))
+    return Rosenbrock(
+        name=name, order=order, gamma=gamma,
+        A=frozen(np.pad(np.asarray(A, float), first)),
+        second=frozen(np.pad(np.asarray(C, float)[:, :s], first)),
+        C=frozen([0.0, *nodes]), d=frozen([0.0, *d]), B=frozen(b), E=frozen(e),
+        dense=hermite(b) if H is None else _stiff_dense(b, np.asarray(H, float)), **about,
+    )  # fmt: skip
+
+
+def _stiff_dense(b: Array, H: Array) -> Array:
+    """Published dense output in the basis of `Tableau`: x^3 (1 - x) is phi_2 - phi_3 of it."""
+    columns = [b[1:], H[0], H[1]] if len(H) == 2 else [b[1:], H[0], H[1] + H[2], -H[2]]
+    return frozen(np.pad(np.stack(columns, axis=1), ((1, 1), (0, 0))))
+
+
+def _rational(matrix: Array, weights: Array, z: ArrayLike) -> NDArray[np.complex128]:
+    """1 + z b (1 - z beta)^-1 1 at every z."""
+    points = np.asarray(z, dtype=np.complex128)
+    one = np.eye(len(weights))
+    found = [
+        1.0 + x * (weights @ np.linalg.solve(one - x * matrix, np.ones(len(weights))))
+        for x in points.ravel()
+    ]
+    return np.reshape(np.array(found, dtype=np.complex128), points.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagonal(Implicit):
+    """A diagonally implicit Runge-Kutta method with an explicit first stage, stiffly accurate.
+
+    `A` holds gamma on its diagonal but for the first stage, `second` the weights of the slopes so
+    far from which the iteration for the next one starts.
+    """
+
+    kind: ClassVar[int] = DIRK
+
+    @property
+    def inner(self) -> Array:
+        """None: the stages carry what is integrated besides the motion."""
+        return frozen(np.zeros(0))
+
+    def _check_consistency(self) -> None:
+        name, diagonal = f"tableau {self.name}", np.diag(self.A)
+        if np.any(np.triu(self.A, 1)) or diagonal[0] != 0.0 or np.any(diagonal[1:] != self.gamma):
+            raise ValueError(f"{name}: its diagonal is not (0, gamma, gamma, ...)")
+        if abs(self.A.sum(1) - self.C).max() > 1e-12 or not np.array_equal(self.A[-1], self.B):
+            raise ValueError(f"{name}: sum(A[i]) = C[i] or A[-1] = B does not hold")
+        if self.second.shape != self.A.shape or np.any(np.triu(self.second)):
+            raise ValueError(f"{name}: an iteration starts from later stages")
+
+    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
+        """R(z) of one step on y' = lambda y with z = h lambda."""
+        return _rational(self.A, self.B, z)
+
+
+def diagonal(
+    name: str, order: int, A: Sequence[Sequence[float]], C: Sequence[float], E: ArrayLike,
+    **about: Any,
+) -> Diagonal:  # fmt: skip
+    """A method from rows of its matrix, each up to the diagonal; `about` as in `rosenbrock`."""
+    s = len(A)
+    matrix = np.array([[*row, *[0.0] * (s - len(row))] for row in A])
+    return Diagonal(
+        name=name, order=order, gamma=float(matrix[1, 1]), A=frozen(matrix), B=frozen(matrix[-1]),
+        C=frozen(C), E=frozen(np.append(np.asarray(E, float), 0.0)), second=frozen(_starts(C)),
+        dense=hermite(matrix[-1]), dense_order=3, **about,
+    )  # fmt: skip
+
+
+def _starts(C: Sequence[float]) -> Array:
+    """For every stage the weights of the polynomial through the (at most three) nearest before."""
+    weights = np.zeros((len(C), len(C)))
+    for i in range(1, len(C)):
+        near = sorted(range(i), key=lambda j: abs(C[j] - C[i]))[:3]
+        for j in near:
+            others = [k for k in near if k != j]
+            weights[i, j] = math.prod((C[i] - C[k]) / (C[j] - C[k]) for k in others)
+    return weights
+
+
+@dataclass(frozen=True, eq=False)
+class Alpha(Implicit):
+    """A method of Newmark's family: coordinates and speeds linear in the new acceleration.
+
+        (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) u'_1 + alpha_f u'_0
+        q_1 = q_0 + h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)
+        u_1 = u_0 + h ((1 - gamma) a_0 + gamma a_1)
+
+    Attributes:
+        alpha_m, alpha_f, beta_n, gamma_n: its constants; `alpha_m = alpha_f = 0` makes a = u'.
+        collocation: the equations of motion hold so many steps ahead, the acceleration is linear
+            up to there (Wilson); 1 for others.
+        backward: Houbolt's differences over three steps; the constants serve the first two.
+        one_iteration: one linearised equation a step, at the predictor u'_1 = u'_0.
+    """
+
+    kind: ClassVar[int] = ALPHA
+    alpha_m: float = 0.0
+    alpha_f: float = 0.0
+    beta_n: float = 0.25
+    gamma_n: float = 0.5
+    collocation: float = 1.0
+    backward: bool = False
+    one_iteration: bool = False
+
+    def _check_consistency(self) -> None:
+        if not (self.beta_n > 0.0 and self.gamma_n > 0.0 and self.collocation >= 1.0):
+            raise ValueError(f"tableau {self.name}: its constants must be above zero")
+
+    @property
+    def error_constant(self) -> float:
+        """Of h^2 times the change of acceleration: the local error of the coordinates."""
+        return self.beta_n + (self.alpha_m - self.alpha_f) / 2.0 - 1.0 / 6.0
+
+    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
+        """The largest eigenvalue of one step on the oscillation with the eigenvalue z / h."""
+        points = np.asarray(z, dtype=np.complex128)
+        found = [max(np.linalg.eigvals(self._step(x)), key=abs) for x in points.ravel()]
+        return np.reshape(np.array(found, dtype=np.complex128), points.shape)
+
+    def _step(self, z: complex) -> Array:
+        """The step of u' = -c u - k q with h = 1 and the eigenvalues z and its conjugate."""
+        k, c = abs(z) ** 2, -2.0 * z.real
+        return _backward_step(k, c) if self.backward else self._newmark_step(k, c)
+
+    def _newmark_step(self, k: float, c: float) -> Array:
+        """On (q, u, u', a)."""
+        h, q, u, rate, a = self.collocation, *np.eye(4)
+        part = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+        rest = (self.alpha_f * rate - self.alpha_m * a) / (1.0 - self.alpha_m)
+
+        def moved(h: float, new: Array) -> tuple[Array, Array]:
+            known = rest + part * new
+            to = q + h * u + h * h * ((0.5 - self.beta_n) * a + self.beta_n * known)
+            return to, u + h * ((1.0 - self.gamma_n) * a + self.gamma_n * known)
+
+        free = moved(h, np.zeros(4))
+        slope = 1.0 + part * (c * h * self.gamma_n + k * h * h * self.beta_n)
+        new = -(c * free[1] + k * free[0]) / slope
+        new = rate + (new - rate) / self.collocation
+        return np.array([*moved(1.0, new), new, rest + part * new])
+
+
+def _backward_step(k: float, c: float) -> Array:
+    """Houbolt's step on three coordinates in a row."""
+    q0, q1, q2 = np.eye(3)  # the last one first
+    rest_a, rest_u = -5.0 * q0 + 4.0 * q1 - q2, (-18.0 * q0 + 9.0 * q1 - 2.0 * q2) / 6.0
+    new = -(rest_a + c * rest_u) / (2.0 + c * 11.0 / 6.0 + k)
+    return np.array([new, q0, q1])
+
+
+def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Alpha:
+    """A method of second order from its constants."""
+    zeros = np.zeros(3)
+    return Alpha(
+        name=name, order=2, source=source, A=frozen(np.zeros((3, 3))), C=frozen(zeros),
+        B=frozen([0.0, 1.0, 0.0]), E=frozen([0.0, 0.0, 1.0, 0.0]) if adaptive else None,
+        error_order=2 if adaptive else 0, dense=hermite([0.0, 1.0, 0.0]), dense_order=2,
+        second=frozen(np.zeros((3, 3))), **constants,
+    )  # fmt: skip

@@ -1,0 +1,14 @@
+"""Newmark's method with constant average acceleration: no damping at all.
+
+N. M. Newmark, A method of computation for structural dynamics, Journal of the Engineering Mechanics
+Division 85 (1959) 67-94.
+"""
+
+from __future__ import annotations
+
+from .implicit import Implicit, alpha
+
+
+def tableau() -> Implicit:
+    """The method `newmark`."""
+    return alpha("newmark", "Newmark (1959)", beta_n=0.25, gamma_n=0.5)
