@@ -8,11 +8,11 @@
 #include <math.h>
 #include <string.h>
 
-static const double ENOUGH = 0.05;  /* of the tolerance: what is left of a stage's equations */
+static const double ENOUGH = 0.02;  /* of the tolerance: what is left of a stage's equations */
 static const double SLOW = 0.05;    /* contraction at which a kept tangent is renewed */
 static const double CHANGED = 0.1;  /* of the step: the same */
-static const double SURE = 1e-3;    /* no contraction is trusted to be better */
-static const double FORGET = 1.5;   /* how fast one that is not measured again grows */
+static const double SURE = 1e-2;    /* no contraction is trusted to be better */
+static const double FORGET = 2.0;   /* how fast one that is not measured again grows */
 static const double ROUNDING = 1e-10; /* of the first increment: no iteration makes it smaller */
 enum { MOST_ITERATIONS = 10 };
 

@@ -87,13 +87,19 @@ int64_t mstmm_first_not_finite(int64_t n, const double *x);
 int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time);
 int mstmm_check_finite(const mstmm_work *work, double t, const double *x);
 
-/* Time of a stage with node c in the trial step.
+/* The next break, INFINITY: none */
+MSTMM_INLINE double mstmm_next_break(const mstmm_run *run) {
+  return run->count.break_index < run->n_breaks ? run->breaks[run->count.break_index] : INFINITY;
+}
+
+/* Time of a stage with node c in the trial step, which may lie behind the step's end.
  * A break belongs to neither side: stages of the step that ends there see the last number before
  * it, stages of the step that starts there the first number after it. */
 MSTMM_INLINE double mstmm_time_in(const mstmm_run *run, double c) {
   double t = c == 1.0 ? run->real.t_new : run->real.t + c * run->real.h;
   if (run->count.lands_on_break && t >= run->real.t_new) t = nextafter(run->real.t_new, -INFINITY);
   if (run->count.at_break && t <= run->real.t) t = nextafter(run->real.t, INFINITY);
+  if (c > 1.0 && t >= mstmm_next_break(run)) t = nextafter(mstmm_next_break(run), -INFINITY);
   return t;
 }
 

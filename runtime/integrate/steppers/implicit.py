@@ -146,6 +146,7 @@ def rosenbrock(
     B: ArrayLike,
     E: ArrayLike,
     H: ArrayLike | None = None,
+    dense_order: int = 3,
     **about: Any,
 ) -> Rosenbrock:
     """A method from the coefficients in which they are published, in the form of Hairer and Wanner.
@@ -156,7 +157,8 @@ def rosenbrock(
         B, E: weights of the step and of the error estimate.
         H: (2 or 3, stages) dense output y_0 (1 - x) + x (y_1 + (1 - x) (H_0 + x H_1 + x^2 H_2) U);
             without, the cubic through both ends and their slopes.
-        about: `error_order`, `dense_order` and `source`.
+        dense_order: of that.
+        about: `error_order` and `source`.
     """
     s = len(nodes)
     first = ((1, 0), (1, 0))
@@ -166,7 +168,8 @@ def rosenbrock(
         A=frozen(np.pad(np.asarray(A, float), first)),
         second=frozen(np.pad(np.asarray(C, float)[:, :s], first)),
         C=frozen([0.0, *nodes]), d=frozen([0.0, *d]), B=frozen(b), E=frozen(e),
-        dense=hermite(b) if H is None else _stiff_dense(b, np.asarray(H, float)), **about,
+        dense=hermite(b) if H is None else _stiff_dense(b, np.asarray(H, float)),
+        dense_order=dense_order, **about,
     )  # fmt: skip
 
 

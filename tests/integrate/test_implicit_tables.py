@@ -1,0 +1,180 @@
+"""The coefficients of implicit methods: the equations they must solve, and what they promise."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.rooted_trees import Tree, density, trees
+
+from mstmm.errors import SceneError
+from mstmm.runtime.integrate import steppers
+from mstmm.runtime.integrate.steppers import Tableau, frozen, get
+from mstmm.runtime.integrate.steppers.implicit import Alpha, Diagonal, Rosenbrock, rosenbrock
+
+ROSENBROCK = ("rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw")
+DIAGONAL = ("esdirk436", "kvaerno5")
+NEWMARK = ("genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt")
+
+
+def of_rosenbrock(name: str) -> Rosenbrock:
+    method = get(name)
+    assert isinstance(method, Rosenbrock)
+    return method
+
+
+class Weights:
+    """Elementary weights of a method's stages: a vertex with one branch takes the matrix with the
+    tangent in it, others the matrix without (Hairer and Wanner II, theorem IV.7.4)."""
+
+    def __init__(self, one: NDArray[np.float64], several: NDArray[np.float64]) -> None:
+        self.one, self.several = one, several
+
+    def of(self, tree: Tree) -> NDArray[np.float64]:
+        """Of the stages, without the root's weight."""
+        matrix = self.one if len(tree) == 1 else self.several
+        product = np.ones(len(matrix))
+        for branch in tree:
+            product = product * (matrix @ self.of(branch))
+        return product
+
+    def worst(self, weights: NDArray[np.float64], order: int, step: bool = True) -> float:
+        """Largest residual of the conditions of one order, of a step or of an error estimate."""
+        return max(
+            abs(float(weights @ self.of(tree)) - (1 / density(tree) if step else 0.0))
+            for tree in trees(order)
+        )
+
+
+def conditions(tableau: Tableau) -> tuple[Weights, NDArray[np.float64], NDArray[np.float64]]:
+    """Weights of the stages, of the step and of the error estimate."""
+    assert tableau.E is not None
+    if isinstance(tableau, Rosenbrock):
+        alpha, gamma = tableau.classical
+        inverse = gamma  # U = Gamma k: weights of U times Gamma are weights of k
+        error = tableau.E[1:-1] @ inverse
+        return Weights(alpha + gamma, alpha), tableau.weights_classical, error
+    return Weights(tableau.A, tableau.A), tableau.B, tableau.E[:-1]
+
+
+@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
+def test_conditions_hold_up_to_the_order_and_no_further(name: str) -> None:
+    tableau = get(name)
+    stages, step, _ = conditions(tableau)
+    for order in range(1, tableau.order + 1):
+        assert stages.worst(step, order) < 3e-12, order
+    assert stages.worst(step, tableau.order + 1) > 1e-6
+
+
+@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
+def test_estimates_vanish_to_their_order_and_no_further(name: str) -> None:
+    tableau = get(name)
+    stages, _, error = conditions(tableau)
+    for order in range(1, tableau.error_order + 1):
+        assert stages.worst(error, order, step=False) < 3e-12, order
+    assert stages.worst(error, tableau.error_order + 1, step=False) > 1e-6
+
+
+@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
+def test_infinitely_fast_motion_is_gone_after_a_step(name: str) -> None:
+    tableau = get(name)
+    assert abs(tableau.amplification(-1e9)) < 1e-7
+    assert abs(tableau.amplification(1e9j)) < 1e-7
+    frequencies = np.logspace(-2, 4, 200)
+    assert np.all(np.abs(tableau.amplification(1j * frequencies)) < 1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL + NEWMARK)
+def test_amplification_agrees_with_the_exponential_to_the_order(name: str) -> None:
+    tableau = get(name)
+    points = [size * (1 + 1j) for size in (0.2, 0.1)]
+    errors = [abs(tableau.amplification(z) - np.exp(z)) for z in points]
+    assert np.log2(errors[0] / errors[1]) > tableau.order + 0.75
+
+
+@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
+def test_dense_output_ends_with_the_step(name: str) -> None:
+    tableau = get(name)
+    assert np.all(tableau.weights(0.0) == 0.0)
+    assert tableau.weights(1.0) == pytest.approx(np.append(tableau.B, 0.0), abs=1e-14)
+
+
+def test_dense_output_is_the_published_polynomial() -> None:
+    # y_0 (1 - x) + x (y_1 + (1 - x) (H_0 + x H_1 + x^2 H_2) U), of stage 5 of Rodas5P
+    tableau = get("rodas5p")
+    x, step = 0.3, 0.030198172008377946
+    H = (0.524948541321073, 20.176138334709044, -52.072871366152654)
+    wanted = x * (step + (1 - x) * (H[0] + x * H[1] + x**2 * H[2]))
+    assert tableau.weights(x)[5] == pytest.approx(wanted, rel=1e-14)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3, 0.8, 1.0])
+@pytest.mark.parametrize("name", steppers.WITH_RADIUS)
+def test_the_radius_is_what_is_left_of_infinitely_fast_motion(name: str, radius: float) -> None:
+    tableau = get(name, radius)
+    assert abs(tableau.amplification(1e5j)) == pytest.approx(radius, abs=3e-3)
+    sizes = np.abs(tableau.amplification(1j * np.logspace(-2, 4, 100)))
+    assert sizes.max() < 1 + 1e-9
+
+
+def test_constants_of_the_family_are_the_published_ones() -> None:
+    alpha, newmark, hht = get("genalpha", 1.0), get("newmark"), get("hht")
+    assert isinstance(alpha, Alpha)
+    assert isinstance(newmark, Alpha)
+    assert isinstance(hht, Alpha)
+    assert (alpha.alpha_m, alpha.alpha_f, alpha.beta_n, alpha.gamma_n) == (0.5, 0.5, 0.25, 0.5)
+    assert (newmark.beta_n, newmark.gamma_n, newmark.error_constant) == (0.25, 0.5, 0.25 - 1 / 6)
+    assert hht.beta_n == pytest.approx(0.275625)
+    # undamped: nothing is lost at any frequency
+    assert np.abs(newmark.amplification(1j * np.logspace(-2, 3, 50))) == pytest.approx(1.0)
+    # at h omega = 1 as of 10 periods: an amplitude of .967 is left of radius .8
+    steps = 20 * math.pi
+    left = abs(get("genalpha").amplification(1j)) ** steps
+    assert left == pytest.approx(0.967, abs=0.002)
+
+
+def test_quadratures_are_exact_to_their_degree() -> None:
+    for name, degree in (("genalpha", 1), ("rodas4", 3), ("rodas5p", 5)):
+        tableau = get(name)
+        assert isinstance(tableau, (Alpha, Rosenbrock))
+        nodes = np.array([0.0, *tableau.inner, 1.0])
+        for power in range(degree + 1):
+            found = tableau.quadrature[:, 0] @ nodes**power
+            assert found == pytest.approx(1 / (power + 1), rel=1e-14)
+
+
+def test_a_radius_that_makes_no_sense_is_refused() -> None:
+    with pytest.raises(SceneError, match="method 'rodas4' takes none; those that do are genalpha"):
+        get("rodas4", 0.5)
+
+
+def test_contradictory_coefficients_are_refused() -> None:
+    rodas, esdirk, newmark = of_rosenbrock("rodas4"), get("esdirk436"), get("newmark")
+    assert isinstance(esdirk, Diagonal)
+    wrong = np.array(rodas.second)
+    wrong[2, 1] = 1.0
+    cases: list[tuple[Tableau, dict[str, object], str]] = [
+        (rodas, {"d": frozen([0.0, *[0.1] * 6])}, "d is not what C says"),
+        (rodas, {"d": frozen([0.0])}, r"d is \(1,\), expected \(7,\)"),
+        (rodas, {"C": frozen([0.0, 0.1, *rodas.C[2:]])}, "the nodes are not"),
+        (rodas, {"B": frozen(2 * rodas.B), "dense": frozen(2 * rodas.dense)}, "add up to 1"),
+        (rodas, {"A": frozen(rodas.A.T)}, "depends on later ones"),
+        (esdirk, {"gamma": 0.3}, "diagonal"),
+        (esdirk, {"C": frozen([0.0] * 6)}, "does not hold"),
+        (esdirk, {"second": frozen(np.eye(6))}, "starts from later stages"),
+        (newmark, {"beta_n": 0.0}, "above zero"),
+    ]
+    for tableau, change, message in cases:
+        with pytest.raises(ValueError, match=message):
+            dataclasses.replace(tableau, **change)
+
+
+def test_a_method_from_outside_is_one_call() -> None:
+    # the linearly implicit Euler method
+    euler = rosenbrock(
+        "euler", 1, 1.0, [[0.0]], [[0.0]], [0.0], [1.0], B=[1.0], E=[0.0], source="test"
+    )
+    assert euler.amplification(-3.0) == pytest.approx(0.25)
