@@ -60,6 +60,7 @@ class Plan:
     flexibility: str | None = None
     accuracy: float | None = None
     max_step: float = 0.0
+    radius: float | None = None
 
     @property
     def resumable(self) -> bool:
@@ -80,7 +81,8 @@ def simulate(
     method: Annotated[
         str,
         typer.Option(
-            "--method", metavar="NAME", help="dop853, dopri5, rk4, scipy-NAME or sundials-NAME."
+            "--method", metavar="NAME", help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
+            "more for stiff motion (see mstmm list); scipy-NAME or sundials-NAME."
         ),
     ] = METHOD,
     step: Annotated[
@@ -97,6 +99,11 @@ def simulate(
         float | None,
         typer.Option("--max-step", metavar="S", parser=positive, help="Longest step of a method "
                      "that chooses its steps, s: no narrow part of a force is passed over."),
+    ] = None,
+    radius: Annotated[
+        float | None,
+        typer.Option("--radius", metavar="X", parser=not_negative, help="Spectral radius, 0 to 1, "
+                     "that genalpha and dttmm leave to infinitely fast motion (0.8)."),
     ] = None,
     times: Annotated[
         Times | None,
@@ -160,7 +167,7 @@ def simulate(
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
-        max_step or 0.0,
+        max_step or 0.0, radius,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -270,7 +277,7 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     return model.simulate(
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
-        max_step=plan.max_step, progress=progress, resume=plan.resume,
+        max_step=plan.max_step, radius=plan.radius, progress=progress, resume=plan.resume,
         checkpoint=str(plan.checkpoint) if plan.resumable else None,
     )  # fmt: skip
 

@@ -12,6 +12,8 @@ from mstmm.arrays import numbers, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
+from .steppers import check_radius
+
 #: Absolute tolerances below this are this: squares of errors against them must not overflow.
 _LEAST = 1e-100
 
@@ -81,14 +83,13 @@ def checked(settings: Settings) -> Settings:
         max_steps=whole(
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
-        radius=None if settings.radius is None else _radius(settings.radius),
+        radius=None if settings.radius is None else _radius(settings.method, settings.radius),
     )  # fmt: skip
 
 
-def _radius(value: float) -> float:
+def _radius(method: str, value: float) -> float:
     found = real("radius", value, "a spectral radius from 0 to 1")
-    if not 0.0 <= found <= 1.0:
-        raise SceneError(f"radius = {found:g}: expected a spectral radius from 0 to 1")
+    check_radius(method, found)
     return found
 
 

@@ -200,6 +200,7 @@ class Model(Compiled):
         initial: tuple[ArrayLike, ArrayLike] | None = None,
         max_step: float = 0.0,
         max_steps: int = 0,
+        radius: float | None = None,
         certify: bool = False,
         progress: Callable[[float, float], None] | None = None,
         checkpoint: str | Path | None = None,
@@ -209,12 +210,15 @@ class Model(Compiled):
 
         Args:
             method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
-                code), or scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA,
-                sundials-BDF, sundials-Adams: integrators of SciPy and SUNDIALS on the same
-                kernels.
+                code); for stiff motion rodas4p2, rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436,
+                kvaerno5, genalpha, dttmm, hht, newmark, wilson or houbolt; or scipy-DOP853,
+                scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams:
+                integrators of SciPy and SUNDIALS on the same kernels.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
+            radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
+                (0.8).
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
             progress: called with (t, t_end) about every 0.1 s.
@@ -230,7 +234,7 @@ class Model(Compiled):
         settings = checked(
             Settings(
                 t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
-                max_steps,
+                max_steps, radius=radius,
             )
         )  # fmt: skip
         q, u = self.initial_state() if initial is None else pair("initial", initial)
@@ -255,6 +259,7 @@ class Model(Compiled):
         t_start: float = 0.0,
         max_step: float = 0.0,
         max_steps: int = 0,
+        radius: float | None = None,
         threads: int | None = None,
     ) -> BatchResult:
         """Integrate n independent trajectories to `t_end` (s).
@@ -264,7 +269,7 @@ class Model(Compiled):
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
             threads: as many as the machine has processors if not given.
-            method, step, rtol, atol, t_start, max_step, max_steps: as in `simulate`.
+            method, step, rtol, atol, t_start, max_step, max_steps, radius: as in `simulate`.
 
         Trajectories run side by side in the lanes of vectors where the scene has neither events,
         releases, twist springs nor drives, and over threads.  The numbers of one depend on no
@@ -276,8 +281,9 @@ class Model(Compiled):
         from ..run.batch import prepared, simulate_batch
 
         settings = Settings(
-            t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps
-        )
+            t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps,
+            radius=radius,
+        )  # fmt: skip
         settings, q, u = prepared(self, settings, initial_states)
         return simulate_batch(
             self, settings, q, u, {} if parameters is None else parameters, threads

@@ -82,7 +82,7 @@ def simulate_batch(
 ) -> BatchResult:
     """See `Model.simulate_batch`; settings hold the output times."""
     n, times = len(q), np.asarray(settings.output_times)
-    library = _lanes(model)
+    library = None if get(settings.method).implicit else _lanes(model)
     models = _models(model, parameters, n)
     count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(

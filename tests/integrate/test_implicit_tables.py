@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,7 +157,7 @@ def test_contradictory_coefficients_are_refused() -> None:
     assert isinstance(esdirk, Diagonal)
     wrong = np.array(rodas.second)
     wrong[2, 1] = 1.0
-    cases: list[tuple[Tableau, dict[str, object], str]] = [
+    cases: list[tuple[Tableau, dict[str, Any], str]] = [
         (rodas, {"d": frozen([0.0, *[0.1] * 6])}, "d is not what C says"),
         (rodas, {"d": frozen([0.0])}, r"d is \(1,\), expected \(7,\)"),
         (rodas, {"C": frozen([0.0, 0.1, *rodas.C[2:]])}, "the nodes are not"),
@@ -175,6 +176,6 @@ def test_contradictory_coefficients_are_refused() -> None:
 def test_a_method_from_outside_is_one_call() -> None:
     # the linearly implicit Euler method
     euler = rosenbrock(
-        "euler", 1, 1.0, [[0.0]], [[0.0]], [0.0], [1.0], B=[1.0], E=[0.0], source="test"
+        "euler", 1, 1.0, [[0.0]], [[0.0]], np.zeros(1), np.ones(1), B=[1.0], E=[0.0], source="test"
     )
     assert euler.amplification(-3.0) == pytest.approx(0.25)

@@ -10,6 +10,7 @@ from support.rooted_trees import Tree, density, trees
 
 from mstmm.runtime.integrate.steppers import Tableau, get
 
+
 class Stages:
     """Elementary weights of a method's stages, each tree once."""
 

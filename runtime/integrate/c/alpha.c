@@ -20,7 +20,7 @@ static int flow(const mstmm_work *work, double t, const double *from, const doub
   for (int i = 0; i < n; i++) rate[i] = sum[i] = 0.0;
   for (int j = 0; j < 4; j++) {
     for (int i = 0; i < n; i++) q[i] = from[i] + nodes[j] * rate[i];
-    const int status = mstmm_rates(work, t, q, theta, rate);
+    const int status = mstmm_step_rates(work, t, q, theta, rate);
     if (status) return status;
     for (int i = 0; i < n; i++) sum[i] += weights[j] * rate[i];
   }
@@ -29,19 +29,19 @@ static int flow(const mstmm_work *work, double t, const double *from, const doub
 }
 
 /* y_stage from the acceleration in it */
-static int place(const mstmm_work *work, const mstmm_stage *stage) {
+static int place(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
-  double *y = work->y_stage, *a = mstmm_accelerations(work, y), *theta = work->rho_u;
+  double *y = work->y_stage, *a = mstmm_row_a(work, y), *theta = work->rho_u;
   for (int i = 0; i < n_u; i++) {
     theta[i] = work->map_q[i] + stage->cq * a[i];
     y[n_q + i] = work->map_u[i] + stage->cu * a[i];
   }
   const int status = flow(work, stage->t, work->y, theta, y);
-  return status ? status : mstmm_impose(work, stage->t, y);
+  return status ? status : mstmm_step_impose(work, stage->t, y);
 }
 
-static int move(const mstmm_work *work, const mstmm_stage *stage) {
-  double *a = mstmm_accelerations(work, work->y_stage);
+static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
+  double *a = mstmm_row_a(work, work->y_stage);
   for (int i = 0; i < work->implicit->n_u; i++) a[i] += work->da[i];
   return place(work, stage);
 }
@@ -52,7 +52,7 @@ static int move(const mstmm_work *work, const mstmm_stage *stage) {
  * step changes; without that the order is lost. */
 static double auxiliary(const mstmm_work *work, int i) {
   const double now = work->k[work->implicit->n_q + i], before = work->run->real.h_previous;
-  const double kept = mstmm_behind(work, work->y)[i];
+  const double kept = mstmm_row_behind(work, work->y)[i];
   return before > 0.0 && !work->tableau->backward ? now + (kept - now) * (work->run->real.h / before) : now;
 }
 
@@ -64,7 +64,7 @@ static double known_part(const mstmm_work *work, int i) {
 }
 
 /* Newmark's map over the time `h` */
-static void map_alpha(const mstmm_work *work, mstmm_stage *stage, double h) {
+static void map_alpha(const mstmm_work *work, mstmm_newton_equations *stage, double h) {
   const mstmm_tableau *t = work->tableau;
   const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m), *u = work->y + work->implicit->n_q;
   for (int i = 0; i < work->implicit->n_u; i++) {
@@ -77,9 +77,9 @@ static void map_alpha(const mstmm_work *work, mstmm_stage *stage, double h) {
 }
 
 /* Houbolt's differences, in increments of the last two steps */
-static void map_backward(const mstmm_work *work, mstmm_stage *stage, double h) {
+static void map_backward(const mstmm_work *work, mstmm_newton_equations *stage, double h) {
   const int n_u = work->implicit->n_u;
-  const double *last = mstmm_behind(work, work->y), *before = last + n_u;
+  const double *last = mstmm_row_behind(work, work->y), *before = last + n_u;
   for (int i = 0; i < n_u; i++) {
     work->map_q[i] = 1.5 * last[i] - 0.5 * before[i];
     work->map_u[i] = (11.0 * work->map_q[i] - 7.0 * last[i] + 2.0 * before[i]) / (6.0 * h);
@@ -98,10 +98,10 @@ static int has_history(const mstmm_work *work) {
 }
 
 /* Linear acceleration up to the collocation point: back to the step's end */
-static int come_back(const mstmm_work *work, mstmm_stage *stage) {
+static int come_back(const mstmm_work *work, mstmm_newton_equations *stage) {
   const mstmm_tableau *tableau = work->tableau;
   const int n_q = work->implicit->n_q;
-  double *a = mstmm_accelerations(work, work->y_stage);
+  double *a = mstmm_row_a(work, work->y_stage);
   for (int i = 0; i < work->implicit->n_u; i++)
     a[i] = work->k[n_q + i] + (a[i] - work->k[n_q + i]) / tableau->collocation;
   stage->t = mstmm_time_in(work->run, 1.0);
@@ -110,13 +110,13 @@ static int come_back(const mstmm_work *work, mstmm_stage *stage) {
 }
 
 /* What the next step must know, behind the state of y_new. */
-static void remember(const mstmm_work *work, const mstmm_stage *stage) {
+static void remember(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_tableau *t = work->tableau;
   const int n_u = work->implicit->n_u;
   const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m);
-  const double *a = mstmm_accelerations(work, work->y_new);
-  double *behind = mstmm_behind(work, work->y_new);
-  if (t->backward) memcpy(behind + n_u, mstmm_behind(work, work->y), (size_t)n_u * sizeof *a);
+  const double *a = mstmm_row_a(work, work->y_new);
+  double *behind = mstmm_row_behind(work, work->y_new);
+  if (t->backward) memcpy(behind + n_u, mstmm_row_behind(work, work->y), (size_t)n_u * sizeof *a);
   for (int i = 0; i < n_u; i++)
     behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i] : known_part(work, i) + part * a[i];
 }
@@ -126,20 +126,20 @@ static void remember(const mstmm_work *work, const mstmm_stage *stage) {
 static int fill_rows(const mstmm_work *work, double t) {
   const int n_u = work->implicit->n_u;
   const double h = work->run->real.h, part = work->tableau->error_constant * h;
-  const double *behind = mstmm_behind(work, work->y_new);
+  const double *behind = mstmm_row_behind(work, work->y_new);
   double *whole = work->k + work->row, *error = whole + work->row;
   for (int64_t i = 0; i < work->row; i++) whole[i] = (work->y_new[i] - work->y[i]) / h;
   memset(error, 0, (size_t)work->row * sizeof(double));
   if (!work->tableau->n_errors) return 0;
   for (int i = 0; i < n_u; i++) work->rho_u[i] = part * (behind[i] - auxiliary(work, i));
-  return mstmm_rates(work, t, work->y_new, work->rho_u, error);
+  return mstmm_step_rates(work, t, work->y_new, work->rho_u, error);
 }
 
 int mstmm_alpha_stages(const mstmm_work *work) {
   const mstmm_tableau *tableau = work->tableau;
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double h = work->run->real.h, collocation = tableau->collocation;
-  mstmm_stage stage = {.t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
+  mstmm_newton_equations stage = {.t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
   if (has_history(work))
     map_backward(work, &stage, h);
   else
@@ -147,9 +147,9 @@ int mstmm_alpha_stages(const mstmm_work *work) {
   stage.s = 1.0 / stage.cu;
   stage.sq = stage.cu / stage.cq;
   memcpy(work->y_stage, work->y, (size_t)work->row * sizeof(double));
-  memcpy(mstmm_accelerations(work, work->y_stage), work->k + n_q, (size_t)n_u * sizeof(double));
+  memcpy(mstmm_row_a(work, work->y_stage), work->k + n_q, (size_t)n_u * sizeof(double));
   int status = place(work, &stage);
-  if (!status) status = mstmm_newton(work, &stage);
+  if (!status) status = mstmm_newton_stage(work, &stage);
   if (!status && collocation != 1.0) status = come_back(work, &stage);
   if (status) return status;
   memcpy(work->y_new, work->y_stage, (size_t)work->row * sizeof(double));

@@ -9,27 +9,27 @@
 
 /* ---- the system ---- */
 
-int mstmm_impose(const mstmm_work *work, double t, double *row) {
+int mstmm_step_impose(const mstmm_work *work, double t, double *row) {
   const mstmm_implicit *at = work->implicit;
   if (!at->impose) return 0;
   const int code =
-      at->impose(work->system->context, t, row, mstmm_accelerations(work, row));
+      at->impose(work->system->context, t, row, mstmm_row_a(work, row));
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_residual(const mstmm_work *work, double t, const double *row, double *rest) {
+int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest) {
   work->run->count.residuals++;
   const int code = work->implicit->residual(work->system->context, t, row,
                                             row + work->system->n_state, work->residual, rest);
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq) {
+int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq) {
   const int code = work->implicit->rates(work->system->context, q, u, dq);
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
+int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
                   int kappa) {
   work->run->count.tangents++;
   const int code = work->implicit->tangent(work->system->context, t, row,
@@ -37,24 +37,24 @@ int mstmm_tangent(const mstmm_work *work, double t, const double *row, double s,
   return code ? mstmm_note(work->run, MSTMM_TANGENT_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u) {
+int mstmm_step_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u) {
   work->run->count.solves++;
   const int code = work->implicit->solve(work->system->context, work->residual, rho_q, rho_u,
                                          work->dq, work->du, work->da);
   return code ? mstmm_note(work->run, MSTMM_TANGENT_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_slope(const mstmm_work *work, double t, const double *row, double *slope) {
+int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double *slope) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
-  int status = mstmm_rates(work, t, row, row + n_q, slope);
+  int status = mstmm_step_rates(work, t, row, row + n_q, slope);
   memcpy(slope + n_q, row + work->system->n_state, (size_t)n_u * sizeof *slope);
-  if (!status && mstmm_n_rest(work)) status = mstmm_residual(work, t, row, slope + n_q + n_u);
+  if (!status && mstmm_n_rest(work)) status = mstmm_step_residual(work, t, row, slope + n_q + n_u);
   return status ? status : mstmm_check_finite(work, t, slope);
 }
 
 int mstmm_check_new(const mstmm_work *work) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
-  const double *a = mstmm_accelerations(work, work->y_new), t = work->run->real.t_new;
+  const double *a = mstmm_row_a(work, work->y_new), t = work->run->real.t_new;
   const int status = mstmm_check_finite(work, t, work->y_new);
   if (status || mstmm_all_finite(n_u, a)) return status;
   return mstmm_note(work->run, MSTMM_NOT_FINITE, 0, n_q + mstmm_first_not_finite(n_u, a), t);
@@ -64,7 +64,7 @@ int mstmm_check_new(const mstmm_work *work) {
 
 void mstmm_implicit_restart(const mstmm_work *work) {
   mstmm_run *run = work->run;
-  memcpy(mstmm_accelerations(work, work->y), work->k + work->implicit->n_q,
+  memcpy(mstmm_row_a(work, work->y), work->k + work->implicit->n_q,
          (size_t)work->implicit->n_u * sizeof(double));
   run->real.h_previous = run->real.error_previous = 0.0;
   run->count.tangent_valid = run->count.history = 0;
@@ -91,7 +91,7 @@ static int integrate_quadratures(const mstmm_work *work) {
   for (int l = 1; l < n - 1; l++) {
     const double c = tableau->inner[l - 1];
     mstmm_dense(work, work->run->real.t + c * h, work->y_stage);
-    const int status = mstmm_residual(work, mstmm_time_in(work->run, c), work->y_stage,
+    const int status = mstmm_step_residual(work, mstmm_time_in(work->run, c), work->y_stage,
                                       work->nodes + l * rest);
     if (status) return status;
   }
@@ -112,7 +112,7 @@ int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
   const int own = tableau->kind != MSTMM_DIRK, rest = own && mstmm_n_rest(work);
   int status = 0;
   if (own)
-    status = mstmm_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
+    status = mstmm_step_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
                          work->k + tableau->n_stages * work->row);
   if (!status && (rest || wants_dense)) status = mstmm_build_dense(work);
   if (!status && rest) status = integrate_quadratures(work);

@@ -25,34 +25,34 @@ int mstmm_alpha_stages(const mstmm_work *work);
 
 /* ---- the system, with its failures and counts; a row holds its accelerations ---- */
 
-int mstmm_impose(const mstmm_work *work, double t, double *row);
-int mstmm_residual(const mstmm_work *work, double t, const double *row, double *rest);
-int mstmm_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq);
-int mstmm_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
+int mstmm_step_impose(const mstmm_work *work, double t, double *row);
+int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
+int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq);
+int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
                   int kappa);
 /* For the right-hand side in work->residual, to work->dq, du and da. */
-int mstmm_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
+int mstmm_step_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
 /* A slope row at a state row: rates, accelerations, and rates of the quadratures. */
-int mstmm_slope(const mstmm_work *work, double t, const double *row, double *slope);
+int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double *slope);
 /* Is every number of y_new one, accelerations too? */
 int mstmm_check_new(const mstmm_work *work);
 
 /* ---- Newton's iteration ---- */
 
 /* The equations of one stage, whose unknown state stands in work->y_stage. */
-typedef struct mstmm_stage {
+typedef struct mstmm_newton_equations {
   double t, s, sq; /* as `tangent` takes them */
   int kappa;
   double h;      /* DIRK: gamma times the step */
   double cq, cu; /* Alpha: what an acceleration adds to coordinates and speeds */
   /* How far the coordinates are from their own equation, to work->rho_q; NULL: they obey it. */
-  int (*defect)(const mstmm_work *work, const struct mstmm_stage *stage);
+  int (*defect)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
   /* Takes the increments in work->dq and da into y_stage. */
-  int (*move)(const mstmm_work *work, const struct mstmm_stage *stage);
-} mstmm_stage;
+  int (*move)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
+} mstmm_newton_equations;
 
 /* Solves a stage from where y_stage stands. */
-int mstmm_newton(const mstmm_work *work, const mstmm_stage *stage);
+int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage);
 /* Size of the increments in work->dq and du in units of the tolerance. */
 double mstmm_increment_norm(const mstmm_work *work);
 

@@ -14,12 +14,13 @@ static const double CHANGED = 0.1;  /* of the step: the same */
 static const double SURE = 1e-2;    /* no contraction is trusted to be better */
 static const double FORGET = 2.0;   /* how fast one that is not measured again grows */
 static const double ROUNDING = 1e-10; /* of the first increment: no iteration makes it smaller */
+static const double NOTHING = 1e-4;   /* of the tolerance: rounding, by which nothing is measured */
 enum { MOST_ITERATIONS = 10 };
 
 /* How hard to try: with the tangent in hand, with a new one, with a new one in every iteration */
 enum { KEPT, RENEWED, EACH };
 
-static int take(const mstmm_work *work, const mstmm_stage *stage) {
+static int take(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   memcpy(work->base, work->y_stage, (size_t)work->row * sizeof(double));
   run->real.tangent_t = stage->t;
@@ -27,37 +28,37 @@ static int take(const mstmm_work *work, const mstmm_stage *stage) {
   run->real.tangent_sq = stage->sq;
   run->real.contraction = -1.0;
   const int status =
-      mstmm_tangent(work, stage->t, work->base, stage->s, stage->sq, stage->kappa);
+      mstmm_step_tangent(work, stage->t, work->base, stage->s, stage->sq, stage->kappa);
   run->count.tangent_valid = run->count.tangent_held = !status;
   return status;
 }
 
 /* Does the tangent in hand serve this stage? */
-static int serves(const mstmm_work *work, const mstmm_stage *stage) {
+static int serves(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_run *run = work->run;
   return run->count.tangent_valid && run->real.contraction <= SLOW &&
          fabs(stage->s / run->real.tangent_s - 1.0) <= CHANGED;
 }
 
 /* Factors the kept tangent again where somebody else may have used the system since. */
-static int hold(const mstmm_work *work, const mstmm_stage *stage) {
+static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   if (run->count.tangent_held) return 0;
   const int code = work->implicit->tangent(
       work->system->context, run->real.tangent_t, work->base,
-      mstmm_accelerations(work, work->base), run->real.tangent_s, run->real.tangent_sq,
+      mstmm_row_a(work, work->base), run->real.tangent_s, run->real.tangent_sq,
       stage->kappa);
   run->count.tangent_held = !code;
   return code ? mstmm_note(run, MSTMM_TANGENT_FAILED, code, -1, stage->t) : 0;
 }
 
 /* One iteration; *size is that of the increment. */
-static int improve(const mstmm_work *work, const mstmm_stage *stage, double *size) {
+static int improve(const mstmm_work *work, const mstmm_newton_equations *stage, double *size) {
   work->run->count.iterations++;
-  int status = mstmm_residual(work, stage->t, work->y_stage, NULL);
+  int status = mstmm_step_residual(work, stage->t, work->y_stage, NULL);
   for (int i = 0; i < work->implicit->n_u; i++) work->residual[i] = -work->residual[i];
   if (!status && stage->defect) status = stage->defect(work, stage);
-  if (!status) status = mstmm_solve(work, stage->t, stage->defect ? work->rho_q : NULL, NULL);
+  if (!status) status = mstmm_step_solve(work, stage->t, stage->defect ? work->rho_q : NULL, NULL);
   if (!status) status = stage->move(work, stage);
   if (!status) *size = mstmm_increment_norm(work);
   return status;
@@ -73,7 +74,7 @@ static double left(double contraction, double size) {
   return rate / (1.0 - rate) * size;
 }
 
-static int iterate(const mstmm_work *work, const mstmm_stage *stage, int effort) {
+static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, int effort) {
   double *contraction = &work->run->real.contraction, size = 0.0, before = 0.0, first = 0.0;
   for (int i = 0; i < MOST_ITERATIONS; i++) {
     int status = i && effort == EACH ? take(work, stage) : 0;
@@ -82,7 +83,7 @@ static int iterate(const mstmm_work *work, const mstmm_stage *stage, int effort)
     if (work->tableau->one_iteration) return 0;
     if (!isfinite(size)) break;
     if (i == 0) first = size;
-    if (size <= ROUNDING * first) return 0;
+    if (size <= ROUNDING * first || size < NOTHING) return 0;
     const int measured = i > 0 && before > 0.0;
     if (measured) {
       *contraction = size / before;
@@ -98,7 +99,7 @@ static int iterate(const mstmm_work *work, const mstmm_stage *stage, int effort)
   return not_converged(work, stage->t);
 }
 
-int mstmm_newton(const mstmm_work *work, const mstmm_stage *stage) {
+int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage) {
   int effort = serves(work, stage) && !work->tableau->one_iteration ? KEPT : RENEWED;
   memcpy(work->y_first, work->y_stage, (size_t)work->row * sizeof(double));
   for (;; effort++) {

@@ -12,9 +12,9 @@ static int prepare(const mstmm_work *work, int i, double t) {
   const mstmm_implicit *at = work->implicit;
   const mstmm_terms terms = mstmm_second_terms(work->tableau, i);
   const double late = work->tableau->d[i] * work->run->real.h;
-  const double *y = work->y_stage, *a = mstmm_accelerations(work, work->y_stage);
-  int status = mstmm_residual(work, t, y, NULL);
-  if (!status) status = mstmm_rates(work, t, y, y + at->n_q, work->rho_q);
+  const double *y = work->y_stage, *a = mstmm_row_a(work, work->y_stage);
+  int status = mstmm_step_residual(work, t, y, NULL);
+  if (!status) status = mstmm_step_rates(work, t, y, y + at->n_q, work->rho_q);
   if (status) return status;
   for (int j = 0; j < at->n_u; j++) {
     work->residual[j] = -work->residual[j] - late * work->residual_rate[j];
@@ -31,7 +31,7 @@ static int prepare(const mstmm_work *work, int i, double t) {
 /* k_i = U_i / h; quadratures are not the stages' affair */
 static void keep(const mstmm_work *work, int i) {
   const mstmm_implicit *at = work->implicit;
-  double *k = work->k + i * work->row, *a = mstmm_accelerations(work, k);
+  double *k = work->k + i * work->row, *a = mstmm_row_a(work, k);
   const double h = work->run->real.h;
   for (int64_t j = 0; j < work->row; j++) k[j] = 0.0;
   for (int j = 0; j < at->n_q; j++) k[j] = work->dq[j] / h;
@@ -44,9 +44,9 @@ static void keep(const mstmm_work *work, int i) {
 static int stage(const mstmm_work *work, int i) {
   const double t = mstmm_time_in(work->run, work->tableau->c[i]);
   mstmm_combine(work, mstmm_stage_terms(work->tableau, i), work->row, work->y_stage);
-  int status = mstmm_impose(work, t, work->y_stage);
+  int status = mstmm_step_impose(work, t, work->y_stage);
   if (!status) status = prepare(work, i, t);
-  if (!status) status = mstmm_solve(work, t, work->rho_q, work->rho_u);
+  if (!status) status = mstmm_step_solve(work, t, work->rho_q, work->rho_u);
   if (!status) keep(work, i);
   return status;
 }
@@ -55,9 +55,9 @@ static int begin(const mstmm_work *work, double t) {
   const double s = 1.0 / (work->tableau->gamma * work->run->real.h);
   const int code =
       work->implicit->residual_rate(work->system->context, t, work->y,
-                                    mstmm_accelerations(work, work->y), work->residual_rate);
+                                    mstmm_row_a(work, work->y), work->residual_rate);
   if (code) return mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t);
-  return mstmm_tangent(work, t, work->y, s, s, 1);
+  return mstmm_step_tangent(work, t, work->y, s, s, 1);
 }
 
 int mstmm_rosenbrock_stages(const mstmm_work *work) {
@@ -65,6 +65,6 @@ int mstmm_rosenbrock_stages(const mstmm_work *work) {
   for (int i = 1; i < work->tableau->n_stages && !status; i++) status = stage(work, i);
   if (status) return status;
   mstmm_combine(work, mstmm_step_terms(work->tableau), work->row, work->y_new);
-  status = mstmm_impose(work, mstmm_time_in(work->run, 1.0), work->y_new);
+  status = mstmm_step_impose(work, mstmm_time_in(work->run, 1.0), work->y_new);
   return status ? status : mstmm_check_new(work);
 }

@@ -42,10 +42,10 @@ typedef struct mstmm_work {
   double *nodes;               /* quadratures at the ends and nodes of a step */
 } mstmm_work;
 
-MSTMM_INLINE double *mstmm_accelerations(const mstmm_work *work, double *row) {
+MSTMM_INLINE double *mstmm_row_a(const mstmm_work *work, double *row) {
   return row + work->system->n_state;
 }
-MSTMM_INLINE double *mstmm_behind(const mstmm_work *work, double *row) {
+MSTMM_INLINE double *mstmm_row_behind(const mstmm_work *work, double *row) {
   return row + work->system->n_state + work->implicit->n_u;
 }
 MSTMM_INLINE int mstmm_n_rest(const mstmm_work *work) {

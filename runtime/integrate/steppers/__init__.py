@@ -2,7 +2,8 @@
 
 A new method is one file: a function `tableau() -> Tableau`, of an explicit Runge-Kutta method by
 `Tableau` itself, of an implicit one by what `implicit` offers.  Inside the package its module name
-goes into `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else changes: the C loop reads the coefficients at run time.
+goes into `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else
+changes: the C loop reads the coefficients at run time.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ __all__ = [
     "IMPLICIT",
     "WITH_RADIUS",
     "Tableau",
+    "check_radius",
     "from_monomials",
     "frozen",
     "get",
@@ -64,6 +66,19 @@ def names() -> tuple[str, ...]:
     return (*BUILT_IN, *_registered)
 
 
+def check_radius(name: str, radius: float | None) -> None:
+    """SceneError for a spectral radius outside 0 to 1, or for a method that does not take one."""
+    if radius is None:
+        return
+    if not 0.0 <= radius <= 1.0:
+        raise SceneError(f"radius = {radius:g}: expected a spectral radius from 0 to 1")
+    if name not in WITH_RADIUS:
+        raise SceneError(
+            f"radius = {radius:g}: method {name!r} takes none; those that do are "
+            + ", ".join(WITH_RADIUS)
+        )
+
+
 def get(name: str, radius: float | None = None) -> Tableau:
     """The tableau of a method.
 
@@ -75,11 +90,7 @@ def get(name: str, radius: float | None = None) -> Tableau:
         SceneError: if there is no such method, and names those there are; for a radius that the
             method does not take.
     """
-    if radius is not None and name not in WITH_RADIUS:
-        raise SceneError(
-            f"radius = {radius:g}: method {name!r} takes none; those that do are "
-            + ", ".join(WITH_RADIUS)
-        )
+    check_radius(name, radius)
     if name in BUILT_IN:
         return _built_in(name, radius)
     if name not in _registered:

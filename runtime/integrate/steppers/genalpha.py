@@ -1,7 +1,7 @@
 """Generalised alpha: second order, with damping of what the step does not resolve.
 
-J. Chung, G. M. Hulbert, A time integration algorithm for structural dynamics with improved numerical
-dissipation: the generalized-alpha method, Journal of Applied Mechanics 60 (1993) 371-375.
+J. Chung, G. M. Hulbert, A time integration algorithm for structural dynamics with improved
+numerical dissipation: the generalized-alpha method, Journal of Applied Mechanics 60 (1993) 371-375.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Implicit methods as the C loop takes them: Rosenbrock, diagonally implicit, the family of Newmark.
+"""Implicit methods as the C loop takes them: Rosenbrock, diagonally implicit, Newmark's family.
 
 All of them work on q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is
 the slope at the start of the step, and k_s that at its end.
@@ -79,7 +79,7 @@ class Implicit(Tableau):
         lower = [np.tril(self.A, -1)[i] for i in range(1, self.n_stages)]
         none = np.zeros(0)
         rows = [*lower, self.B, none if self.E is None else self.E, none, *self.dense.T]
-        return rows + [row for row in self.second[1:]]
+        return [*rows, *self.second[1:]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +141,8 @@ def rosenbrock(
     gamma: float,
     A: ArrayLike,
     C: ArrayLike,
-    nodes: Sequence[float],
-    d: Sequence[float],
+    nodes: Array,
+    d: Array,
     B: ArrayLike,
     E: ArrayLike,
     H: ArrayLike | None = None,

@@ -55,8 +55,8 @@ def tableau() -> Implicit:
     """The method `rodas5p`."""
     matrix = lower(_MATRIX, 8)
     return rosenbrock(
-        "rodas5p", 5, 0.21193756319429014, matrix, lower(_COUPLING, 8), numbers(_NODES), numbers(_TIME),
-        B=[*matrix[-1][:-1], 1.0], E=[0.0] * 7 + [1.0],
+        "rodas5p", 5, 0.21193756319429014, matrix, lower(_COUPLING, 8), numbers(_NODES),
+        numbers(_TIME), B=[*matrix[-1][:-1], 1.0], E=[0.0] * 7 + [1.0],
         H=numbers(_DENSE).reshape(-1, 8), error_order=4, dense_order=4,
         source="Steinebach (2023), Rodas5P",
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """Wilson's method: linear acceleration up to 1.4 steps ahead, where the equations hold.
 
-E. L. Wilson, I. Farhoomand, K. J. Bathe, Nonlinear dynamic analysis of complex structures, Earthquake
-Engineering and Structural Dynamics 1 (1973) 241-252.  For comparison, with fixed steps.
+E. L. Wilson, I. Farhoomand, K. J. Bathe, Nonlinear dynamic analysis of complex structures,
+Earthquake Engineering and Structural Dynamics 1 (1973) 241-252.  For comparison, with fixed steps.
 """
 
 from __future__ import annotations

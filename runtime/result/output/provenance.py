@@ -166,7 +166,8 @@ def trajectory(data: Any) -> Trajectory:
     settings = _settings(json.loads(a["settings"]) | {"output_times": times})
     statistics = json.loads(a["statistics"])
     if statistics is not None:
-        known = {"crossings": 0} | statistics  # older files do not tell of them
+        later = ("crossings", "residuals", "tangents", "solves", "iterations")
+        known = dict.fromkeys(later, 0) | statistics  # older files do not tell of them
         statistics = Statistics(**{f.name: _number(known[f.name]) for f in fields(Statistics)})
     status = None if a["status"] == "INTERRUPTED" else Status[a["status"]]
     fail_time = None if np.isnan(a["fail_time"]) else float(a["fail_time"])
