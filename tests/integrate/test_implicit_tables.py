@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from support.rooted_trees import Tree, density, trees
 
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate import steppers
@@ -25,58 +23,6 @@ def of_rosenbrock(name: str) -> Rosenbrock:
     method = get(name)
     assert isinstance(method, Rosenbrock)
     return method
-
-
-class Weights:
-    """Elementary weights of a method's stages: a vertex with one branch takes the matrix with the
-    tangent in it, others the matrix without (Hairer and Wanner II, theorem IV.7.4)."""
-
-    def __init__(self, one: NDArray[np.float64], several: NDArray[np.float64]) -> None:
-        self.one, self.several = one, several
-
-    def of(self, tree: Tree) -> NDArray[np.float64]:
-        """Of the stages, without the root's weight."""
-        matrix = self.one if len(tree) == 1 else self.several
-        product = np.ones(len(matrix))
-        for branch in tree:
-            product = product * (matrix @ self.of(branch))
-        return product
-
-    def worst(self, weights: NDArray[np.float64], order: int, step: bool = True) -> float:
-        """Largest residual of the conditions of one order, of a step or of an error estimate."""
-        return max(
-            abs(float(weights @ self.of(tree)) - (1 / density(tree) if step else 0.0))
-            for tree in trees(order)
-        )
-
-
-def conditions(tableau: Tableau) -> tuple[Weights, NDArray[np.float64], NDArray[np.float64]]:
-    """Weights of the stages, of the step and of the error estimate."""
-    assert tableau.E is not None
-    if isinstance(tableau, Rosenbrock):
-        alpha, gamma = tableau.classical
-        inverse = gamma  # U = Gamma k: weights of U times Gamma are weights of k
-        error = tableau.E[1:-1] @ inverse
-        return Weights(alpha + gamma, alpha), tableau.weights_classical, error
-    return Weights(tableau.A, tableau.A), tableau.B, tableau.E[:-1]
-
-
-@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
-def test_conditions_hold_up_to_the_order_and_no_further(name: str) -> None:
-    tableau = get(name)
-    stages, step, _ = conditions(tableau)
-    for order in range(1, tableau.order + 1):
-        assert stages.worst(step, order) < 3e-12, order
-    assert stages.worst(step, tableau.order + 1) > 1e-6
-
-
-@pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)
-def test_estimates_vanish_to_their_order_and_no_further(name: str) -> None:
-    tableau = get(name)
-    stages, _, error = conditions(tableau)
-    for order in range(1, tableau.error_order + 1):
-        assert stages.worst(error, order, step=False) < 3e-12, order
-    assert stages.worst(error, tableau.error_order + 1, step=False) > 1e-6
 
 
 @pytest.mark.parametrize("name", ROSENBROCK + DIAGONAL)

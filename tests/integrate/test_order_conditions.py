@@ -2,13 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, RK45
-from support.rooted_trees import Tree, density, trees
 
 from mstmm.runtime.integrate.steppers import Tableau, get
+from mstmm.runtime.integrate.steppers.implicit import Rosenbrock
+
+IMPLICIT = ("rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5")
+
+#: A rooted tree is the sorted tuple of its branches.
+Tree = tuple["Tree", ...]
+
+
+@cache
+def trees(order: int) -> tuple[Tree, ...]:
+    """Rooted trees with so many vertices."""
+    return tuple(sorted(set(forests(order - 1, order - 1))))
+
+
+def forests(vertices: int, largest: int) -> Iterator[Tree]:
+    """Multisets of trees with so many vertices in all, none larger than `largest`."""
+    if vertices == 0:
+        yield ()
+    for size in range(1, min(vertices, largest) + 1):
+        for tree in trees(size):
+            for rest in forests(vertices - size, size):
+                yield tuple(sorted((tree, *rest)))
+
+
+@cache
+def density(tree: Tree) -> int:
+    """gamma(t): the product of the sizes of all subtrees."""
+    product = size(tree)
+    for branch in tree:
+        product *= density(branch)
+    return product
+
+
+@cache
+def size(tree: Tree) -> int:
+    return 1 + sum(size(branch) for branch in tree)
 
 
 class Stages:
@@ -91,3 +129,53 @@ def test_coefficients_are_scipys() -> None:
         assert np.array_equal(mine, theirs)
     assert ours.E is not None
     assert np.array_equal(ours.E, RK45.E)
+
+
+class Weights:
+    """Elementary weights of a method's stages: a vertex with one branch takes the matrix with the
+    tangent in it, others the matrix without (Hairer and Wanner II, theorem IV.7.4)."""
+
+    def __init__(self, one: NDArray[np.float64], several: NDArray[np.float64]) -> None:
+        self.one, self.several = one, several
+
+    def of(self, tree: Tree) -> NDArray[np.float64]:
+        """Of the stages, without the root's weight."""
+        matrix = self.one if len(tree) == 1 else self.several
+        product = np.ones(len(matrix))
+        for branch in tree:
+            product = product * (matrix @ self.of(branch))
+        return product
+
+    def worst(self, weights: NDArray[np.float64], order: int, step: bool = True) -> float:
+        """Largest residual of the conditions of one order, of a step or of an error estimate."""
+        return max(
+            abs(float(weights @ self.of(tree)) - (1 / density(tree) if step else 0.0))
+            for tree in trees(order)
+        )
+
+
+def conditions(tableau: Tableau) -> tuple[Weights, NDArray[np.float64], NDArray[np.float64]]:
+    """Weights of the stages, of the step and of the error estimate."""
+    assert tableau.E is not None
+    if isinstance(tableau, Rosenbrock):
+        alpha, gamma = tableau.classical  # U = Gamma k
+        return Weights(alpha + gamma, alpha), tableau.weights_classical, tableau.E[1:-1] @ gamma
+    return Weights(tableau.A, tableau.A), tableau.B, tableau.E[:-1]
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_conditions_of_implicit_methods_hold_up_to_the_order_and_no_further(name: str) -> None:
+    tableau = get(name)
+    stages, step, _ = conditions(tableau)
+    for order in range(1, tableau.order + 1):
+        assert stages.worst(step, order) < 3e-12, order
+    assert stages.worst(step, tableau.order + 1) > 1e-6
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_estimates_of_implicit_methods_vanish_to_their_order_and_no_further(name: str) -> None:
+    tableau = get(name)
+    stages, _, error = conditions(tableau)
+    for order in range(1, tableau.error_order + 1):
+        assert stages.worst(error, order, step=False) < 3e-12, order
+    assert stages.worst(error, tableau.error_order + 1, step=False) > 1e-6
