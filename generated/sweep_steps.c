@@ -2558,6 +2558,10 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
     if (code) return code;
     code = mstmm_pass_laws(state);
     if (code) return code;
+    if (state->balance && model->n_flexible) {
+        code = mstmm_pass_strain(state);
+        if (code) return code;
+    }
     if ((model->needs_pose || model->product)) {
         code = mstmm_pass_poses(state);
         if (code) return code;

@@ -55,6 +55,7 @@ INVERSE_DYNAMICS = Sweep(
         Run(whole=FORWARD),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
+        Run(whole=STRAIN, when="balance flexible"),
         Run(whole=POSES, when="posed"),
         *_APPLIED,
         Run(whole=REQUIRED),

@@ -28,13 +28,13 @@ class Tangent:
     are those of solutions.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
         self.nq, self.nu = engine.nq, engine.nu
         slopes = packed.slopes()
         model = packed.model
-        self.memory = engine.start_memory()
+        self.memory = engine.start_memory() if memory is None else memory
         self.workspace = np.zeros(packed.workspace)
         self.numbers = np.zeros(max(1, engine.lib.mstmm_tangent_lay(model)))
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))

@@ -36,6 +36,8 @@ _WORK_TOLERANCE = 10.0
 def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
     """The integrator at the start of the run."""
     tableau = get(settings.method, settings.radius)
+    if tableau.implicit:
+        system.offer_tangent()
     if settings.step is None and not tableau.adaptive:
         raise SceneError(
             f"method {settings.method!r} takes fixed steps: give step in s, or use dopri5, dop853"

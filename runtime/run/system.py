@@ -14,6 +14,7 @@ from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
+from ..engine.tangent import Tangent
 from ..kernels.fused import FusedLibrary
 from ..kernels.tape import c_tape
 from ..pack.layout import StateNames
@@ -66,6 +67,21 @@ class SceneSystem:
             self._compiled(compiled)
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
+
+    def offer_tangent(self) -> None:
+        """Make what implicit methods ask for: the residual and its tangent, by the looped engine."""
+        engine, run = self.engine, self.run
+        if self.system.implicit:
+            return
+        base = Tangent(engine, self.memory)
+        stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 3 * engine.nu
+        work = np.zeros(engine.lib.mstmm_residual_work(engine.packed.model))
+        known, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
+        stage.workspace, stage.work = run.workspace, engine.pointer(work)
+        run.base, run.stage, run.known = base.record, stage, engine.pointer(known)
+        run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
+        engine.lib.mstmm_scene_implicit(run, self.system)
+        self.kept += [base, stage, work, known, coordinates]
 
     def _compiled(self, code: SceneCode) -> None:
         engine, lib = self.engine, self.engine.lib

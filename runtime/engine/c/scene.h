@@ -5,6 +5,7 @@
 #include "fused.h"
 #include "integrate.h"
 #include "sweep.h"
+#include "tangent.h"
 
 /* cdef begin */
 /* A point of a body with axes of its own, whose motion is wanted. */
@@ -66,7 +67,16 @@ typedef struct {
     const mstmm_fused *fused, *fused_lanes;
     const real *fused_p;
     real *fused_numbers;
+    /* For implicit methods: where the equations are linearised, where a stage's residual is made;
+     * NULL: not prepared */
+    mstmm_tangent *base, *stage;
+    mstmm_implicit implicit;
+    int *coordinates; /* nu: see mstmm_implicit */
+    real *known;      /* nq + 3 nu: scratch */
 } mstmm_scene_run;
+
+/* Lets implicit methods integrate `run`, whose last fields have been given. */
+void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system);
 
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);

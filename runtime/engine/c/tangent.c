@@ -36,7 +36,7 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
 typedef struct {
     real *q, *u, *a, *required, *qdot, *shadow, *d_q, *d_u, *d_a, *d_qdot, *answer, *column;
     real *still, *change;
-    int64_t used;
+    int64_t used, used_by_residual;
 } mstmm_parts;
 
 static mstmm_parts cut(const mstmm_model *model, int64_t slots, real *work)
@@ -50,6 +50,7 @@ static mstmm_parts cut(const mstmm_model *model, int64_t slots, real *work)
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         if (work) *all[i].to = work + at.used;
+        if (all[i].to == &at.shadow) at.used_by_residual = at.used;
         at.used += all[i].count;
     }
     return at;
@@ -58,6 +59,11 @@ static mstmm_parts cut(const mstmm_model *model, int64_t slots, real *work)
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots)
 {
     return cut(model, slots, NULL).used;
+}
+
+int64_t mstmm_residual_work(const mstmm_model *model)
+{
+    return cut(model, 0, NULL).used_by_residual;
 }
 
 static mstmm_parts parts_of(const mstmm_tangent *at)
@@ -74,6 +80,25 @@ static void without_imposed(const mstmm_model *model, const real *memory, real *
         for (int j = 0; j < body->nu; j++)
             if (body->imposed_mask[j]) rows[body->u + j] = 0;
     }
+}
+
+void mstmm_tangent_free(const mstmm_tangent *at, real *entries)
+{
+    without_imposed(at->model, at->memory, entries);
+}
+
+/* Power that drives and holds feed in. */
+static real power_of_imposed(const mstmm_state *state, const real *required)
+{
+    const mstmm_model *model = state->model;
+    real power = 0;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        if (!mstmm_imposed(body, state->memory)) continue;
+        for (int j = body->u; j < body->u + body->nu; j++)
+            if (body->imposed_mask[j - body->u]) power += required[j] * state->u[j];
+    }
+    return power;
 }
 
 static mstmm_state state_of(mstmm_tangent *at, const mstmm_parts *parts)
@@ -99,6 +124,7 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
     mstmm_ground(&state);
     const int code = mstmm_run_inverse_dynamics(&state);
     if (code) return code;
+    if (balance) balance->power += power_of_imposed(&state, parts.required);
     memcpy(r, parts.required, (size_t)model->nu * sizeof(real));
     without_imposed(model, at->memory, r);
     return 0;
@@ -288,6 +314,43 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du)
     return 0;
 }
 
+/* Coordinates and speeds that somebody imposes do not change, and have no rates of their own. */
+static void without_imposed_coordinates(const mstmm_model *model, const real *memory, real *dq)
+{
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        if (!mstmm_imposed(body, memory)) continue;
+        if (body->n_imposed == body->nu)
+            memset(dq + body->q, 0, (size_t)body->nq * sizeof(real));
+        else /* rates are speeds where some of them alone are driven */
+            for (int j = 0; j < body->nu; j++)
+                if (body->imposed_mask[j]) dq[body->q + j] = 0;
+    }
+}
+
+int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    mstmm_state state = state_of(at, &parts);
+    state.q = q;
+    state.u = u;
+    state.qdot = dq;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        if (body->straight) {
+            memcpy(dq + body->q, u + body->u, (size_t)body->nu * sizeof(real));
+        } else {
+            const int code = mstmm_at_hinge_motion(&state, i);
+            if (code) return code;
+        }
+        if (body->modal)
+            memcpy(dq + body->modal->q, u + body->modal->u, (size_t)body->modal->n * sizeof(real));
+    }
+    without_imposed_coordinates(model, at->memory, dq);
+    return 0;
+}
+
 int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq)
 {
     const mstmm_model *model = at->model;
@@ -314,5 +377,6 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
             dq[place] = (du[body->modal->u + j] + step.rho[place]) / at->sq;
         }
     }
+    without_imposed_coordinates(model, at->memory, dq);
     return 0;
 }

@@ -32,8 +32,10 @@ typedef struct {
 /* Lays out the tangent's numbers over the bodies; returns how many there are. */
 int64_t mstmm_tangent_lay(mstmm_model *model);
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots);
+/* Numbers of `work` for one that knows mstmm_residual and mstmm_tangent_rates alone. */
+int64_t mstmm_residual_work(const mstmm_model *model);
 /* R (nu) at a state, which the next calls refer to; zero on speeds that somebody imposes.
- * `balance` may be NULL. */
+ * `balance` may be NULL; its power is that of everything that is not stored. */
 int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
                    mstmm_balance *balance);
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
@@ -44,6 +46,11 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 int mstmm_tangent_factor(mstmm_tangent *at, real s, real sq, real kappa);
 /* du (nu) that makes the change of R equal to r. */
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du);
+/* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
+ * residual, whose workspace this writes to. */
+int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);
+/* Zeros in entries (nu) of speeds that somebody imposes. */
+void mstmm_tangent_free(const mstmm_tangent *at, real *entries);
 /* dq (nq) of a du: sq dq = kappa g_q dq + N du + rho; rho (nq) may be NULL. */
 int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq);
 /* cdef end */

@@ -1,0 +1,130 @@
+/* A scene as implicit methods see it: its residual, and the tangent of it factored. */
+#include <string.h>
+
+#include "scene.h"
+#include "sweep_steps.h"
+
+static int failed(mstmm_scene_run *run, const mstmm_tangent *at, int code)
+{
+    if (code) run->failure = at->failure;
+    return code;
+}
+
+static int residual(void *context, double t, const double *y, const double *a, double *r,
+                    double *work)
+{
+    mstmm_scene_run *run = context;
+    mstmm_balance balance;
+    const int wanted = work && run->with_power;
+    const int code = mstmm_residual(run->stage, t, y, y + run->model->nq, a, r,
+                                    wanted ? &balance : NULL);
+    if (wanted) *work = code ? 0 : balance.power;
+    return failed(run, run->stage, code);
+}
+
+/* The point at which the equations are linearised. */
+static int at_base(mstmm_scene_run *run, double t, const double *y, const double *a)
+{
+    return failed(run, run->base, mstmm_residual(run->base, t, y, y + run->model->nq, a,
+                                                 run->known, NULL));
+}
+
+static int residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_model *model = run->model;
+    real *still = run->known;
+    const int code = at_base(run, t, y, a);
+    if (code) return code;
+    memset(still, 0, (size_t)(model->nq + 2 * model->nu) * sizeof(real));
+    return failed(run, run->base, mstmm_residual_slope(run->base, 1, still, still + model->nq,
+                                                       still + model->nq + model->nu, r_t));
+}
+
+static int rates(void *context, const double *q, const double *u, double *dq)
+{
+    mstmm_scene_run *run = context;
+    return failed(run, run->stage, mstmm_tangent_rates(run->stage, q, u, dq));
+}
+
+static int tangent(void *context, double t, const double *y, const double *a, double s, double sq,
+                   int kappa)
+{
+    mstmm_scene_run *run = context;
+    const int code = at_base(run, t, y, a);
+    return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, s, sq, kappa));
+}
+
+/* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
+static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
+                 double *dq, double *du, double *da)
+{
+    mstmm_scene_run *run = context;
+    const int nq = run->model->nq, nu = run->model->nu;
+    mstmm_tangent *base = run->base;
+    real *known_q = run->known, *known_u = known_q + nq, *known_a = known_u + nu;
+    real *right = known_a + nu;
+    int code = 0;
+    memcpy(right, r, (size_t)nu * sizeof(real));
+    if (rho_q || rho_u) {
+        memset(known_u, 0, (size_t)nu * sizeof(real));
+        for (int j = 0; j < nu; j++) known_a[j] = rho_u ? -rho_u[j] : 0;
+        mstmm_tangent_free(base, known_a);
+        code = mstmm_tangent_coordinates(base, known_u, rho_q, known_q);
+        if (!code) code = mstmm_residual_slope(base, 0, known_q, known_u, known_a, da);
+        for (int j = 0; !code && j < nu; j++) right[j] -= da[j];
+    }
+    if (!code) code = mstmm_tangent_solve(base, right, du);
+    if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
+    for (int j = 0; !code && j < nu; j++) da[j] = base->s * du[j] - (rho_u ? rho_u[j] : 0);
+    if (!code) mstmm_tangent_free(base, da);
+    return failed(run, base, code);
+}
+
+/* What drives prescribe at t, and no acceleration where a hinge is held. */
+static int impose(void *context, double t, double *y, double *a)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_model *model = run->model;
+    mstmm_tangent_free(run->stage, a);
+    if (!model->n_drives) return 0;
+    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t, .q = y,
+                         .u = y + model->nq, .memory = run->memory, .failure = &run->failure};
+    const int code = mstmm_run_given(&state);
+    if (code) return code;
+    memcpy(y, state.q, (size_t)model->nq * sizeof(real));
+    memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
+    for (int k = 0; k < model->n_drives; k++) {
+        const mstmm_drive *drive = &model->drives[k];
+        const mstmm_body *body = &model->bodies[drive->body];
+        if (mstmm_imposed(body, run->memory))
+            a[body->u + drive->speed] = mstmm_drive_values(&state)[3 * k + 2];
+    }
+    return 0;
+}
+
+static int somebody_imposes(const mstmm_model *model)
+{
+    for (int i = 0; i < model->n_bodies; i++)
+        if (model->bodies[i].n_imposed) return 1;
+    return 0;
+}
+
+void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
+{
+    const mstmm_model *model = run->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        for (int j = 0; j < body->nu; j++) /* the vector part of a quaternion stands last */
+            run->coordinates[body->u + j] = body->q + j
+                                            + (j + 3 >= body->nu ? body->nq - body->nu : 0);
+        for (int j = 0; body->modal && j < body->modal->n; j++)
+            run->coordinates[body->modal->u + j] = body->modal->q + j;
+    }
+    run->implicit = (mstmm_implicit){
+        .n_q = model->nq, .n_u = model->nu, .coordinates = run->coordinates, .residual = residual,
+        .residual_rate = residual_rate, .rates = rates, .tangent = tangent, .solve = solve,
+        .impose = somebody_imposes(model) ? impose : NULL,
+    };
+    system->implicit = &run->implicit;
+}
