@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ..schedule.slope import SLOPE, D, Sloped
+from ..schedule.slope import SLOPE, D, Sloped, ports_of
 from ..schedule.steps import (
     Add,
     Along,
@@ -324,15 +324,6 @@ def word_of(slot: str) -> str:
         return f"d_{word_of(slot.removeprefix(D))}"
     owner, _, name = slot.partition(".")
     return name if owner == "local" else f"{owner}_{name}"
-
-
-def ports_of(step: Call) -> dict[str, str]:
-    """port -> slot; a differentiated kernel has ports of derivatives besides."""
-    ports = dict(step.ports)
-    if isinstance(step, Sloped):
-        ports |= {f"d_{port}": D + slot for port, slot in ports.items()}
-        ports |= {f"d_{port}": "zero" for port in step.still}
-    return ports
 
 
 def element_of(step: Call) -> str:

@@ -87,3 +87,12 @@ class Sloped(Call):
     `still` do not move."""
 
     still: tuple[str, ...] = ()
+
+
+def ports_of(step: Call) -> dict[str, str]:
+    """port -> slot; a differentiated kernel has ports of derivatives besides."""
+    ports = dict(step.ports)
+    if isinstance(step, Sloped):
+        ports |= {f"d_{port}": D + slot for port, slot in ports.items()}
+        ports |= {f"d_{port}": "zero" for port in step.still}
+    return ports

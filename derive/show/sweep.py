@@ -10,8 +10,10 @@ from mstmm.errors import ElementError
 
 from ..print.callers import MOST_SPEEDS, POINTED, Specs
 from ..print.sweep import passes, sweep_files
+from ..schedule.slope import ports_of
 from ..schedule.steps import (
     Add,
+    Along,
     ByScrew,
     Call,
     ChooseBias,
@@ -21,6 +23,7 @@ from ..schedule.steps import (
     Evaluate,
     Gather,
     JudgePivots,
+    Move,
     Pass,
     Pick,
     Run,
@@ -37,7 +40,8 @@ from .text import WIDTH
 _SAID = (
     "A sweep runs passes one after the other; a pass meets every body (law, load, ...) in turn and "
     "calls kernels over named slots: port=slot for what a kernel reads, and behind the arrow for "
-    "what it gives (+= where it adds).  Conditions and slots are explained in the end.  The loops "
+    "what it gives (+= where it adds).  Of a slot x the derivative along a direction is the slot "
+    "d:x.  Conditions and slots are explained in the end.  The loops "
     "of the looped engine are printed from this list, the fused engine replays it.  The kernels "
     "are elements: mstmm show sweep_frames, mstmm show pin."
 )
@@ -136,6 +140,8 @@ class _Steps:
         if isinstance(step, EachSpeed):
             which = "every imposed speed k" if step.imposed else "every speed k"
             return [f"{indent}for {which}:", *self.lines(step.steps, depth + 1)]
+        if isinstance(step, Along):
+            return [f"{indent}along {_DIRECTIONS[step.of]}:", *self.lines(step.steps, depth + 1)]
         told = self._call(step) if isinstance(step, Call) else _TOLD[type(step)](step)
         return textwrap.wrap(
             indent + told, WIDTH, subsequent_indent=indent + "    ", break_long_words=False,
@@ -146,7 +152,7 @@ class _Steps:
         element, _, name = step.kernel.partition(".")
         key, name = self._like(element, name)
         kernel = next(k for k in self.specs[key].kernels if k.name == name)
-        ports = dict(step.ports)
+        ports = ports_of(step)
         read = [f"{p.name}={ports[p.name]}" for p in kernel.inputs]
         given = [
             f"{p.name}{'+=' if p.accumulate else '='}{ports[p.name]}"
@@ -167,6 +173,16 @@ class _Steps:
         return ("sweep", element), name
 
 
+#: Directions, each with its number c.
+_DIRECTIONS = {
+    "free": "every free speed c of the hinge, and what changes with it in a step",
+    "rates": "every speed c of the hinge alone",
+    "coordinates": "every coordinate c of the hinge alone",
+    "modes": "every mode c, and what changes with it in a step",
+    "motion": "every entry c of the body's motion",
+}
+
+
 def _do(step: Do) -> str:
     assert step.whole is not None
     return f"pass {_spaced(step.whole.name)}"
@@ -183,6 +199,7 @@ _TOLD: dict[type, Callable[..., str]] = {
     Copy: lambda s: f"{s.to} = {s.source or '0'}",
     Pick: lambda s: f"{s.to} = columns of {s.source} that belong to free speeds",
     Spread: lambda s: f"{s.to} = {s.free} on free speeds, {s.imposed or '0'} on the others",
+    Move: lambda s: f"{s.to} = {s.source}",
     Gather: lambda s: f"{s.to} = expression values at {s.places}",
     Evaluate: lambda s: f"{s.to} = expression {s.expression}",
     ChooseBias: lambda s: (

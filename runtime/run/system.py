@@ -69,7 +69,7 @@ class SceneSystem:
         engine.lib.mstmm_scene_system(run, self.system)
 
     def offer_tangent(self) -> None:
-        """Make what implicit methods ask for: the residual and its tangent, by the looped engine."""
+        """Make what implicit methods ask for: residual and tangent, by the looped engine."""
         engine, run = self.engine, self.run
         if self.system.implicit:
             return
