@@ -1,0 +1,92 @@
+"""The picture of the stiff motions: CPU time against achieved error, a panel per case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+from matplotlib.lines import Line2D
+
+from ..common import style
+from .counting import frontier, milliseconds
+
+#: Explicit methods orange, implicit ones of mstmm in strong colours, peers grey and blue, dashed.
+LOOKS: dict[str, dict[str, Any]] = {
+    "dop853": {"color": "#f4791f", "marker": "s", "lw": 1.3},
+    "dopri5": {"color": "#f6b26b", "marker": "s", "lw": 1.1, "mfc": "white"},
+    "rodas4p2": {"color": "#c1121f", "marker": "o", "lw": 2.0, "zorder": 5},
+    "rodas5p": {"color": "#780000", "marker": "D", "lw": 2.0, "zorder": 5},
+    "rodas4": {"color": "#e5677b", "marker": "o", "lw": 1.1, "mfc": "white"},
+    "ros34pw2": {"color": "#b5838d", "marker": "^", "lw": 1.1, "mfc": "white"},
+    "genalpha": {"color": "#2a9d8f", "marker": "v", "lw": 1.6, "zorder": 4},
+    "dttmm": {"color": "#6a994e", "marker": "v", "lw": 1.1, "mfc": "white"},
+    "esdirk436": {"color": "#8d6a9f", "marker": "P", "lw": 1.3},
+    "kvaerno5": {"color": "#b497c4", "marker": "P", "lw": 1.1, "mfc": "white"},
+    "SciPy Radau": {"color": "#1d3557", "marker": "^", "lw": 1.4, "ls": "--"},
+    "CVODE BDF": {"color": "#457b9d", "marker": "X", "lw": 1.4, "ls": "--"},
+    "Exudyn": {"color": "#7f7f7f", "marker": "h", "lw": 1.4, "ls": "--"},
+}
+ERRORS = (1e-1, 1e-9)  # m, from left to right
+COLUMNS = 3
+
+
+def draw(record: dict[str, Any], path: Path) -> None:
+    """All cases of the record."""
+    results = record["results"]
+    columns = min(COLUMNS, len(results))
+    rows = -(-len(results) // columns)
+    height = 2.7 * rows + 1.2  # inches
+    figure, panels = plt.subplots(
+        rows, columns, figsize=(3.9 * columns + 0.5, height), sharex=True, squeeze=False
+    )
+    figure.subplots_adjust(
+        left=0.055 if columns == COLUMNS else 0.13, right=0.99, top=1 - 0.85 / height,
+        bottom=0.7 / height, wspace=0.17, hspace=0.28,
+    )  # fmt: skip
+    for axes, result in zip(panels.flat, results, strict=False):
+        _panel(axes, result)
+    for axes in panels.flat[len(results) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("CPU ms of one run")
+    for axes in panels.flat[max(0, len(results) - columns) : len(results)]:
+        axes.set_xlabel("error at the end, m (more accurate to the right)")
+        axes.tick_params(labelbottom=True)
+    shown = [t for t in LOOKS if any(c["tool"] == t for r in results for c in r["curves"])]
+    handles = [Line2D([], [], label=tool, **LOOKS[tool]) for tool in shown]
+    figure.legend(handles=handles, loc="upper center", ncol=min(7, len(handles)), fontsize=9)
+    style.footer(
+        figure, record,
+        "Minimum CPU time of warm runs; a point counts if all tighter settings are as accurate.",
+    )  # fmt: skip
+    style.save(figure, path)
+
+
+def _panel(axes: Any, result: dict[str, Any]) -> None:
+    """The cheapest settings of every tool, over all its manners."""
+    for tool, looks in LOOKS.items():
+        curves = [c["points"] for c in result["curves"] if c["tool"] == tool]
+        found = _lowest([
+            (float(p["error_m"]), milliseconds(p)) for points in curves for p in frontier(points)
+        ])  # fmt: skip
+        if found:
+            axes.plot(*zip(*found, strict=True), **looks)
+            first = found[0]  # what is less accurate costs as much: no cheaper setting is known
+            axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
+    axes.set(xscale="log", yscale="log", xlim=ERRORS)
+    axes.xaxis.minorticks_off()
+    axes.set_title(f"{result['case']}: {result['title']}", fontsize=8.5)
+
+
+def _lowest(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """(error, time) that no other point beats in both, within the panel and one beyond it."""
+    kept: list[tuple[float, float]] = []
+    for error, time in sorted(points, reverse=True):
+        while kept and kept[-1][1] >= time:
+            kept.pop()
+        kept.append((error, time))
+    left, right = ERRORS
+    within = [p for p in kept if right <= p[0] < 3 * left]
+    beyond = [(right / 3, time) for error, time in kept if error < right]
+    return within + beyond[:1]
