@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,8 @@ def own(model: mstmm.Model, case: Case, method: str, say: Callable[[str], None])
         return None
     if fixed:
         steps = [case.t_end / count for count in STEPS]
-        return Curve(method, "", [(h, lambda h=h: run(1.0, h)) for h in steps])
-    return Curve(method, "", [(t, lambda t=t: run(t, None)) for t in TOLERANCES])
+        return Curve(method, "", [(h, partial(run, 1.0, h)) for h in steps])
+    return Curve(method, "", [(t, partial(run, t, None)) for t in TOLERANCES])
 
 
 def takes_steps(model: mstmm.Model, method: str) -> bool | None:
@@ -190,7 +191,7 @@ def _slackened(
     run: Callable[[float, float], Outcome],
     slack: float,
 ) -> Curve:
-    settings = [(t, lambda t=t: run(t, slack)) for t in TOLERANCES]
+    settings = [(t, partial(run, t, slack)) for t in TOLERANCES]
     return Curve(tool, f"{manner}, atol of speeds x {slack:g}", settings)
 
 
@@ -213,8 +214,6 @@ def exudyn(case: Case, say: Callable[[str], None]) -> list[Curve]:
     for radius in (0.5, 0.8, 1.0):
         for newton in ("modified", "once a step"):
             manner = Manner(radius, newton)
-            settings = [
-                (case.t_end / n, lambda n=n, m=manner: rods.run(case.t_end, n, m)) for n in STEPS
-            ]
+            settings = [(case.t_end / n, partial(rods.run, case.t_end, n, manner)) for n in STEPS]
             curves.append(Curve("Exudyn", str(manner), settings))
     return curves

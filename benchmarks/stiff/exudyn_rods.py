@@ -102,10 +102,10 @@ class Rods:
         newton.useModifiedNewton = manner.newton != "full"
         newton.modifiedNewtonJacUpdatePerStep = manner.newton == "once a step"
         integration.verboseMode = 0
-        settings.solutionSettings.writeSolutionToFile = False
-        settings.solutionSettings.sensorsWritePeriod = t_end
-        settings.linearSolverType = exu.LinearSolverType.EigenSparse
-        settings.linearSolverSettings.reuseAnalyzedPattern = True
+        settings.solution.file.write = False
+        settings.solution.sensors.active = False
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+        settings.linearSolver.reuseAnalyzedPattern = True
         settings.parallel.numberOfThreads = 1
         solver = exu.MainSolverImplicitSecondOrder()
         if not solver.SolveSystem(self.system, settings):
@@ -117,7 +117,7 @@ class Rods:
 
     def tips(self) -> Array:
         """(n, 3) m, after the last run."""
-        x = self.system.systemData.GetODE2Coordinates().reshape(-1, 3)
+        x = np.asarray(self.system.systemData.GetODE2Coordinates()).reshape(-1, 3)
         center = x[:, 0] + HALF + np.arange(len(x))
         return np.column_stack([
             center + HALF * np.cos(x[:, 2]), x[:, 1] + HALF * np.sin(x[:, 2]), np.zeros(len(x)),

@@ -139,7 +139,7 @@ def rigid_arm() -> Scene:
 
 
 #: Quarter car, from the road to the body: mass (kg) and what carries it (N/m, N s/m).
-QUARTER = {
+QUARTER: dict[str, tuple[float, tuple[float, float]]] = {
     "wheel": (40.0, (2e5, 200.0)), "plate": (1.0, (2e4, 1500.0)), "car": (300.0, (5e6, 1000.0)),
 }  # fmt: skip
 
@@ -176,7 +176,7 @@ def _slide(name: str, inboard: str, **more: Any) -> Scene:
 #: Half car: places of the arms' bushings (m from the mass centre), the way they point, and what
 #: the waves under each wheel lag (s).
 WHEELS = {"front": (1.0, 0.0, 0.0), "rear": (-1.2, math.pi, 0.15)}
-CAR = {
+CAR: dict[str, Any] = {
     "mass": 600.0, "inertia": 900.0,  # kg, kg m2
     "arm": (30.0, 0.35, 0.4, 0.5),  # kg with its wheel, m to the mass centre and the hub, kg m2
     "spring": (4000.0, 250.0, 0.3),  # N m/rad, N m s/rad, rad that the weight takes
