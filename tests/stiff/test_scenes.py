@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import scipy.linalg
 import sympy as sp
 from stiff.lagrange import accelerations, energy, rate, turned
+from stiff.quarter_car import quarter_car_at
 
 import mstmm
 from benchmarks.stiff import references, scenes
@@ -84,35 +84,6 @@ def test_half_car_follows_lagrange(rng: np.random.Generator) -> None:
         assert found[1:] == pytest.approx(expected, abs=1e-11 * np.abs(expected).max())
 
 
-def quarter_car_at(t_end: float) -> Array:
-    """Heights (m) of wheel, plate and body: linear equations, with the road's waves as states of
-    their own, by one matrix exponential."""
-    masses = [mass for mass, _ in scenes.QUARTER.values()]
-    springs = [law for _, law in scenes.QUARTER.values()]
-    waves = [(0.02, 3 * np.pi), (0.001, 24 * np.pi)]
-    one, size = 6, 7 + 2 * len(waves)  # heights, speeds, 1, (cos, sin) of each wave
-    L = np.zeros((size, size))
-    road, road_rate = np.zeros(size), np.zeros(size)
-    for i, (height, w) in enumerate(waves):
-        cosine, sine = 7 + 2 * i, 8 + 2 * i
-        L[cosine, sine], L[sine, cosine] = -w, w
-        road[one] += height
-        road[cosine] -= height
-        road_rate[sine] += height * w
-    places = [road, *np.eye(size)[:3]]
-    speeds = [road_rate, *np.eye(size)[3:6]]
-    L[:3] = speeds[1:]
-    for i, (k, c) in enumerate(springs):
-        force = k * (places[i] - places[i + 1]) + c * (speeds[i] - speeds[i + 1])
-        L[3 + i] += force / masses[i]
-        if i:
-            L[2 + i] -= force / masses[i - 1]
-        L[3 + i, one] -= GRAVITY
-    start = np.zeros(size)
-    start[[one, *range(7, size, 2)]] = 1.0
-    return np.asarray((scipy.linalg.expm(L * t_end) @ start)[:3])
-
-
 def test_quarter_car_is_where_its_linear_equations_say() -> None:
     case = CASES["d-quarter"]
     found, _ = references.load(case)
@@ -132,7 +103,7 @@ def test_stored_rods_are_where_absolute_coordinates_say() -> None:
 def test_rods_in_absolute_coordinates_have_an_exact_jacobian(rng: np.random.Generator) -> None:
     rods = BushedRods(5, 1e6, 0.1)
     y = rods.start + rng.uniform(-0.1, 0.1, len(rods.start))
-    columns = [rods.rates(0.0, y + 1e-30j * unit).imag / 1e-30 for unit in np.eye(len(y))]
+    columns = [np.imag(rods.rates(0.0, y + 1e-30j * unit)) / 1e-30 for unit in np.eye(len(y))]
     assert rods.jacobian(0.0, y).toarray() == pytest.approx(np.array(columns).T, rel=1e-13)
 
 
