@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-PEERS = ("numpy", "scipy", "casadi", "pin", "mujoco", "drake", "exudyn")
+PEERS = ("numpy", "scipy", "casadi", "pin", "mujoco", "drake", "exudyn", "scikit-sundae")
 
 
 def machine() -> dict[str, Any]:

@@ -15,6 +15,7 @@ import json
 import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -29,21 +30,31 @@ HERE = Path(__file__).resolve().parent
 ASKED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 
 
+@cache
+def say(what: str) -> None:
+    """Print it, the first time."""
+    print(what, flush=True)
+
+
 def measured(case: Case, options: Namespace) -> dict[str, Any]:
     """All curves of one case, timed in alternating rounds."""
     exact, apart = references.load(case)
-    curves = contestants.of_case(case, options.methods.split(","), print)
+    curves = contestants.of_case(case, options.methods.split(","), say)
     found = []
     for curve in curves:
         points = list(tried(curve, exact, options))
         found.append({"tool": curve.tool, "manner": curve.manner, "points": points})
         print(case.name, curve.tool, curve.manner, len(points), "settings", flush=True)
+    timed = [
+        (point, dict(curve.settings)[point["tolerance"]])
+        for curve, kept in zip(curves, found, strict=True)
+        for point in kept["points"]
+        if "error_m" in point
+    ]
     for _ in range(options.rounds):
-        for curve, kept in zip(curves, found, strict=True):
-            runs = dict(curve.settings)
-            for point in kept["points"]:
-                if "error_m" in point and sum(point["cpu_ms"]) < 1e3 * options.budget:
-                    point["cpu_ms"].append(once(runs[point["tolerance"]]))
+        for point, run in timed:
+            if sum(point["cpu_ms"]) < 1e3 * options.budget:
+                point["cpu_ms"].append(once(run))
     return {"case": case.name, "title": case.title, "t_end_s": case.t_end,
             "reference_apart_m": apart, "curves": found}  # fmt: skip
 
@@ -51,9 +62,10 @@ def measured(case: Case, options: Namespace) -> dict[str, Any]:
 def tried(
     curve: contestants.Curve, exact: np.ndarray, options: Namespace
 ) -> Iterator[dict[str, Any]]:
-    """One point per setting, until two runs in turn take longer than allowed."""
-    slow = 0
-    for tolerance, run in list(curve.settings)[:: 4 if options.quick else 1]:
+    """One point per setting, up to the first that takes longer than allowed (loose ones may, where
+    they struggle) or the second that nobody asks to be so accurate."""
+    accurate = 0
+    for number, (tolerance, run) in enumerate(list(curve.settings)[:: 4 if options.quick else 1]):
         try:
             box: list[contestants.Outcome] = []
             spent = measure.cpu(lambda run=run, box=box: box.append(run()))
@@ -68,8 +80,8 @@ def tried(
             continue
         yield {"tolerance": tolerance, "error_m": float(f"{error:.4g}"), "counts": counts,
                "cpu_ms": [round(1e3 * spent, 4)]}  # fmt: skip
-        slow = slow + 1 if spent > options.limit else 0
-        if slow == 2:
+        accurate = accurate + 1 if error < min(ASKED) / 10 else 0
+        if accurate == 2 or (number > 1 and spent > options.limit):
             return
 
 
@@ -146,8 +158,8 @@ def main() -> None:
             kept = {r["case"]: r for r in json.loads(options.json.read_text())["results"]}
         for name in names:
             kept[name] = measured(CASES[name], options)
-        results = [kept[name] for name in CASES if name in kept]
-        measure.save(options.json, results, unit="CPU ms of one run")
+            results = [kept[name] for name in CASES if name in kept]
+            measure.save(options.json, results, unit="CPU ms of one run")
     record = json.loads(options.json.read_text())
     text = table(record["results"])
     print(text)

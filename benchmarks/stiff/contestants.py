@@ -66,8 +66,8 @@ def own(model: mstmm.Model, case: Case, method: str, say: Callable[[str], None])
         return lambda: places(result, case), counted(result.statistics)
 
     fixed = takes_steps(model, method)
-    if fixed is None:
-        say(f"{method}: not a method of this mstmm")
+    if isinstance(fixed, str):
+        say(f"left out: {fixed}")
         return None
     if fixed:
         steps = [case.t_end / count for count in STEPS]
@@ -75,15 +75,17 @@ def own(model: mstmm.Model, case: Case, method: str, say: Callable[[str], None])
     return Curve(method, "", [(t, partial(run, t, None)) for t in TOLERANCES])
 
 
-def takes_steps(model: mstmm.Model, method: str) -> bool | None:
-    """Whether a method knows fixed steps alone; None if there is no such method."""
+def takes_steps(model: mstmm.Model, method: str) -> bool | str:
+    """Whether a method knows fixed steps alone; a sentence if this scene cannot be run by it."""
+    refused = ""
     for step in (None, 1.0):
         try:
             model.simulate(0.0, method=method, step=step, output_times=[0.0])
-        except mstmm.SceneError:
-            continue
-        return step is not None
-    return None
+        except mstmm.MstmmError as error:
+            refused = str(error).partition(";")[0]
+        else:
+            return step is not None
+    return refused
 
 
 def counted(statistics: object) -> dict[str, int]:
@@ -157,7 +159,7 @@ def cvode(model: mstmm.Model, case: Case, say: Callable[[str], None]) -> list[Cu
     try:
         from sksundae.cvode import CVODE
     except ImportError:
-        say("CVODE: left out, for want of the package scikit-sundae")
+        say("left out: CVODE, for want of the package scikit-sundae")
         return []
     equations = Equations(model, case)
     calls = {"rates": 0, "jacobians": 0}
@@ -202,7 +204,7 @@ def exudyn(case: Case, say: Callable[[str], None]) -> list[Curve]:
     try:
         from .exudyn_rods import Manner, Rods
     except ImportError:
-        say("Exudyn: left out, for want of the package exudyn")
+        say("left out: Exudyn, for want of the package exudyn")
         return []
     if case.bushings is not None:
         count, *bushing = case.bushings
