@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import exudyn as exu
 import numpy as np
@@ -107,7 +108,7 @@ class Rods:
         settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         settings.linearSolver.reuseAnalyzedPattern = True
         settings.parallel.numberOfThreads = 1
-        solver = exu.MainSolverImplicitSecondOrder()
+        solver: Any = exu.MainSolverImplicitSecondOrder()  # its stubs lack arguments
         if not solver.SolveSystem(self.system, settings):
             raise RuntimeError("Newton's method did not converge")
         found = solver.it
