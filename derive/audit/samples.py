@@ -104,7 +104,7 @@ class Source:
             return [*_uniform(length - 4, numbers), *_unit(4, numbers)]
         if port.shape == (3, 3) and port.name != "F_scale":
             return rotation(numbers)
-        if port.name in ("S", "S_K", "J_I"):
+        if port.name in ("S", "S_K", "J_I") and length <= 21:
             return _definite({21: 6, 6: 3, 1: 1}[length], numbers)
         if port.name in ("M", "J", "F_scale", "b"):
             return [numbers.uniform(0.2, 2.0) for _ in range(length)]

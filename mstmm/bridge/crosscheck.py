@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Largest relative difference between specialised and generic kernels in doubles.
 SPECIALISED = 1e-13
+#: Largest deviation of a derivative from its difference quotient in sixty digits.
+DIFFERENCES = 1e-25
 
 
 # --- what is checked ------------------------------------------------------------------------------
@@ -107,6 +109,7 @@ def _subject(
     compiled: Compiled | None,
 ) -> _Subject:
     from ..derive.audit.samples import Source
+    from ..derive.catalogue.slopes import with_slopes
     from ..derive.equations.hinge import speeds_of
     from ..derive.language.element import Hinge
 
@@ -116,7 +119,8 @@ def _subject(
         nu = int(name.removeprefix("generic"))
     coordinates = hinge.coordinates if hinge else ()
     source = Source(kind, coordinates, element.parameters if element else ())
-    irs = {kernel.name: kernel.ir() for kernel in kernels}
+    group = kind if kind != "sweep" else name.rstrip("0123456789")
+    irs = {ir.name: ir for ir in with_slopes(group, (kernel.ir() for kernel in kernels))}
     derivations = {kernel.name: kernel for kernel in kernels}
     return _Subject(kind, name, nu, source, irs, derivations, compiled)
 
@@ -166,7 +170,7 @@ class _Subject:
                     where = point.label
                 worst = [max(a, b) for a, b in zip(worst, compared, strict=True)]
         return KernelCheck(
-            kernel.name, count, stopped, worst[0] if self.stated else None,
+            kernel.name, count, stopped, worst[0] if kernel.name in self.stated else None,
             worst[1] if c_seen else None, where, tuple(problems), interpreted,
         )  # fmt: skip
 
@@ -185,7 +189,7 @@ class _Subject:
         except GuardFailure as failure:
             code = failure.code
         stated = None
-        if self.stated:
+        if kernel.name in self.stated:
             form = self.stated[kernel.name]
             try:
                 stated = evaluate_equations(form.derivation, inputs, form.guards, n=n)
@@ -255,6 +259,7 @@ class _Subject:
 
     def statements(self) -> Iterator[tuple[str, float, float]]:
         from ..derive.audit import law_properties, properties
+        from ..derive.audit.slopes import slope_errors
 
         found: tuple[Property, ...] = ()
         p = next((port.length() for kernel in self.irs.values() for port in kernel.inputs
@@ -276,6 +281,8 @@ class _Subject:
                 yield f"{kernel}: {each.name}", each.error, each.limit
         for each in found:
             yield each.name, each.error, each.limit
+        for kernel, error in slope_errors(self.irs, self.source):
+            yield f"{kernel} = difference quotient", error, DIFFERENCES
 
     def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
         """The compiled specialised kernels against the compiled generic ones."""

@@ -13,6 +13,7 @@ import mstmm
 from mstmm.cli import stored
 from mstmm.derive.print.callers import POINTED, callees, calls_header
 from mstmm.derive.print.sweep import function_text, passes, sweep_files
+from mstmm.derive.schedule.slope import D, Sloped, ports_of
 from mstmm.derive.schedule.steps import Call, Pass, Step, call, inner
 from mstmm.derive.schedule.sweeps import SWEEPS
 from mstmm.derive.schedule.words import CONSTANTS, ROLES, SLOTS, TRAITS
@@ -46,7 +47,7 @@ def kernel_of(step: Call) -> KernelIR:
 def slots_of(step: Step) -> Iterator[str]:
     """Every slot that a step names."""
     if isinstance(step, Call):
-        yield from (slot for _, slot in step.ports)
+        yield from (slot for port, slot in ports_of(step).items() if port != "n")
     for field in ("to", "source", "free", "imposed", "places", "rotation", "position", "motion",
                   "subspace", "chosen", "pivots", "own", "whole", "expression"):  # fmt: skip
         value = getattr(step, field, "")
@@ -55,7 +56,7 @@ def slots_of(step: Step) -> Iterator[str]:
 
 
 def test_every_slot_is_explained() -> None:
-    used = {slot.partition("[")[0] for step in steps() for slot in slots_of(step)}
+    used = {slot.removeprefix(D).partition("[")[0] for step in steps() for slot in slots_of(step)}
     named = {slot for slot in used if not slot.startswith("local.")}
     fields = {slot for slot in named if slot.startswith(("moments.", "drag."))}
     roles = {slot for slot in named if slot.partition(".")[0] in ROLES}
@@ -76,9 +77,10 @@ def test_every_condition_is_explained() -> None:
 
 def test_every_call_hands_over_every_port() -> None:
     for step in calls():
-        kernel, ports = kernel_of(step), dict(step.ports)
+        kernel, ports = kernel_of(step), ports_of(step)
         names = {port.name for port in (*kernel.inputs, *kernel.outputs)}
-        assert {port.name for port in kernel.inputs} <= ports.keys() <= names | {"work"}, step
+        assert {port.name for port in kernel.inputs} <= ports.keys(), step
+        assert isinstance(step, Sloped) or ports.keys() <= names | {"work", "n"}, step
 
 
 def test_slots_are_as_long_as_the_ports_that_meet_them() -> None:

@@ -247,7 +247,7 @@ def test_nested_sums_are_differentiated() -> None:
     found = vectorized.evaluate(tangent(kernel, ["A", "x"]), inputs, 3)
     assert np.allclose(found["d_f"], d_a @ x + a @ d_x)
     assert np.isclose(found["d_V"], x @ d_a @ x + d_x @ (a + a.T) @ x)
-    with pytest.raises(ValueError, match=r"reads 'Ct', which it has stored.*fixed size"):
+    with pytest.raises(ValueError, match=r"solves with 'right', which it has stored.*fixed size"):
         tangent(KERNEL, ["eta"])
 
 
@@ -277,7 +277,6 @@ def test_what_cannot_be_lowered_says_why() -> None:
         ("must be an input, or an output", [(square, 2 * B), (column, Solve(square, eta, True))],
          (column,)),
         ("must be an input, or an output", [(column, Solve(B, A * eta, True))], (column,)),
-        ("by a symmetric matrix", [(column, Solve(B, eta))], (column,)),
         ("defines an output that", [(column, Solve(B, eta, True)), (number, eta.T * column)],
          (number,)),
         ("not by its entries", [(number, sp.ImmutableDenseMatrix([(eta.T * A * eta)[0, 0]]))],
