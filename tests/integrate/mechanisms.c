@@ -380,6 +380,22 @@ static void inverted(const double *p, number t, const number *q, const number *u
   r[0] = a[0] - p[0] * p[0] * q[0];
 }
 
+/* 1 kg before a stop of stiffness p[0] at 0 */
+static void stop(const double *p, number t, const number *q, const number *u, const number *a,
+                 number *r, number *rest) {
+  (void)t;
+  (void)u;
+  (void)rest;
+  r[0] = a[0] + (creal(q[0]) < 0.0 ? p[0] * q[0] : 0.0);
+}
+
+static int gap(void *context, double t, const double *y, double *g) {
+  (void)context;
+  (void)t;
+  g[0] = y[0];
+  return 0;
+}
+
 static int below(void *context, double t, const double *y, double *g) {
   (void)context;
   (void)t;
@@ -420,6 +436,7 @@ parameters *test_mechanism(mstmm_system *system, const char *name) {
       {"fall", 1, 1, 0, fall, same_one, NULL, 0},
       {"piecewise", 1, 1, 0, piecewise, same_one, NULL, 0},
       {"inverted", 1, 1, 0, inverted, same_one, NULL, 0},
+      {"stop", 1, 1, 0, stop, same_one, NULL, 0},
   };
   mechanism *it = calloc(1, sizeof *it);
   memset(system, 0, sizeof *system);
@@ -443,8 +460,12 @@ parameters *test_mechanism(mstmm_system *system, const char *name) {
 }
 
 void test_use_event(mstmm_system *system, const char *name) {
-  if (strcmp(name, "bounce")) return;
-  system->n_events = 1;
-  system->events = below;
-  system->fire = bounce;
+  if (!strcmp(name, "bounce")) {
+    system->n_events = 1;
+    system->events = below;
+    system->fire = bounce;
+  } else {
+    system->n_switches = 1;
+    system->events = gap;
+  }
 }

@@ -93,6 +93,37 @@ def test_a_falling_body_bounces_when_it_should(lab: Lab, method: str) -> None:
     assert found == pytest.approx(exact, abs=1e-4 if method == "houbolt" else 1e-8)
 
 
+@pytest.mark.parametrize(
+    ("method", "hw"),
+    [("rodas4p2", 1.0), ("rodas5p", 1.0), ("esdirk436", 1.0), ("genalpha", 1.0),
+     ("esdirk436", 3.0), ("genalpha", 3.0)],
+)  # fmt: skip
+def test_a_stop_gives_back_no_more_than_it_took(lab: Lab, method: str, hw: float) -> None:
+    # 1 kg at 1 m/s meets a stop without damping, at ten phases of the step h.
+    # (At h omega = 3 the whole contact fits into a step; dense output of a Rosenbrock step does not
+    # show it then, and its error estimate must.)
+    k, h = 1e6, hw * 1e-3
+    rebounds = []
+    for phase in np.linspace(0.05, 0.95, 10):
+        problem = lab.mechanism("stop", k)
+        lab.lib.test_use_event(problem.system, b"gap")
+        run = problem.solved(method, 20 * h, ((5.0 + phase) * h, -1.0), step=h)
+        assert run.statistics.crossings == 2
+        rebounds.append(run.y[1])
+    assert max(rebounds) < 1.05
+    assert min(rebounds) > 0.95
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_a_stop_is_met_to_the_tolerance(lab: Lab, method: str) -> None:
+    problem = lab.mechanism("stop", 1e4)
+    lab.lib.test_use_event(problem.system, b"gap")
+    tolerance = 1e-6 if get(method).order > 2 else 1e-5
+    run = problem.solved(method, 0.3, (0.1, -1.0), rtol=tolerance, atol=1e-2 * tolerance)
+    # 0.1 s of approach, pi / 100 s of contact
+    assert run.y == pytest.approx([0.2 - math.pi / 100, 1.0], abs=2e-3)
+
+
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_achieved_errors_follow_the_tolerance(lab: Lab, method: str) -> None:
     problem = hanging(lab)

@@ -138,3 +138,13 @@ def test_what_cannot_run_in_lanes_has_no_size(lab: Lab) -> None:
     assert lab.lib.mstmm_group_size(problem.system, tableau) > 0
     lab.lib.test_use_bounce(problem.system, problem.at)
     assert lab.lib.mstmm_group_size(problem.system, tableau) == 0
+
+
+def test_implicit_methods_have_no_lanes(lab: Lab) -> None:
+    problem = lab.mechanism("chain", 4.0)
+    lab.lib.test_use_lanes(problem.system, problem.at, 4)
+    sizes = [
+        lab.lib.mstmm_group_size(problem.system, c_tableau(lab.ffi, get(name)))
+        for name in ("rodas4", "genalpha")
+    ]
+    assert sizes == [0, 0]
