@@ -166,6 +166,32 @@ def test_counts_are_those_of_the_method(lab: Lab) -> None:
     assert problem.solved("dop853", 1.0, start).statistics.residuals == 0
 
 
+def test_fixed_steps_iterate_no_more_than_they_are_worth(lab: Lab) -> None:
+    problem, start = lab.mechanism("pendulum", 3.0, 0.3), (-0.3, 0.1, 0, 0, 0)
+    exact = problem.solved("dop853", 1.0, start, rtol=1e-11, atol=1e-12).y[:2]
+    found = []
+    for method in ("genalpha", "dttmm"):
+        run = problem.solved(method, 1.0, start, step=0.005, rtol=1e-9, atol=1e-12)
+        found.append((np.abs(run.y[:2] - exact).max(), run.statistics))
+    (iterated, many), (once, one) = found
+    assert many.iterations < 2.5 * many.steps
+    assert many.tangents < 0.1 * one.tangents
+    assert iterated == pytest.approx(once, rel=0.1)
+
+
+def test_a_state_that_accept_changes_starts_afresh(lab: Lab) -> None:
+    start = (-0.3, 0.1, 0, 0, 0)
+    for method in ("rodas4p2", "esdirk436", "newmark"):
+        kept = lab.mechanism("pendulum", 3.0, 0.3).solved(method, 1.0, start, step=0.01)
+        problem = lab.mechanism("pendulum", 3.0, 0.3)
+        lab.lib.test_use_accept(problem.system, problem.at)
+        problem.at.p[7] = -1.0  # accept says that the first stage is invalid
+        fresh = problem.solved(method, 1.0, start, step=0.01)
+        assert fresh.statistics.evaluations == fresh.statistics.steps
+        assert kept.statistics.evaluations == 1
+        assert fresh.y == pytest.approx(kept.y, abs=1e-5)
+
+
 def test_a_tangent_that_does_not_change_is_made_once(lab: Lab) -> None:
     # Newton's iteration on linear equations with steps of one length
     problem = lab.mechanism("chain", 100.0, 1.0, 1.0, 2.0)

@@ -202,6 +202,7 @@ int mstmm_try_step(const mstmm_work *work) {
     if (status) return status;
   }
   if (!fixed) mstmm_propose(run, error);
+  if (fixed && work->implicit) run->real.error_previous = error;
   mstmm_count_step(run, error, absolute);
   if (!work->implicit) watch_stability(work);
   run->real.t_scan = run->real.t;

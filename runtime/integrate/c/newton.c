@@ -9,6 +9,7 @@
 #include <string.h>
 
 static const double ENOUGH = 0.02;  /* of the tolerance: what is left of a stage's equations */
+static const double PART = 1e-3;    /* of the error of a step */
 static const double SLOW = 0.05;    /* contraction at which a kept tangent is renewed */
 static const double CHANGED = 0.1;  /* of the step: the same */
 static const double SURE = 1e-2;    /* no contraction is trusted to be better */
@@ -45,9 +46,8 @@ static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   if (run->count.tangent_held) return 0;
   const int code = work->implicit->tangent(
-      work->system->context, run->real.tangent_t, work->base,
-      mstmm_row_a(work, work->base), run->real.tangent_s, run->real.tangent_sq,
-      stage->kappa);
+      work->system->context, run->real.tangent_t, work->base, mstmm_row_a(work, work->base),
+      run->real.tangent_s, run->real.tangent_sq, stage->kappa);
   run->count.tangent_held = !code;
   return code ? mstmm_note(run, MSTMM_TANGENT_FAILED, code, -1, stage->t) : 0;
 }
@@ -68,6 +68,14 @@ static int not_converged(const mstmm_work *work, double t) {
   return mstmm_note(work->run, MSTMM_NOT_CONVERGED, 0, -1, t);
 }
 
+/* What may be left of a stage's equations, in units of the tolerance: with fixed steps of Newmark's
+ * family no more is asked than a small part of the error that the last step made anyway. */
+static double enough(const mstmm_work *work) {
+  const mstmm_run *run = work->run;
+  const int honest = work->tableau->kind == MSTMM_ALPHA && run->fixed_step > 0.0;
+  return fmax(ENOUGH, honest ? PART * run->real.error_previous : 0.0);
+}
+
 /* What is left of the error after an increment of this size */
 static double left(double contraction, double size) {
   const double rate = fmax(contraction, SURE);
@@ -76,6 +84,7 @@ static double left(double contraction, double size) {
 
 static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, int effort) {
   double *contraction = &work->run->real.contraction, size = 0.0, before = 0.0, first = 0.0;
+  const double limit = enough(work);
   for (int i = 0; i < MOST_ITERATIONS; i++) {
     int status = i && effort == EACH ? take(work, stage) : 0;
     if (!status) status = improve(work, stage, &size);
@@ -87,10 +96,10 @@ static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, 
     const int measured = i > 0 && before > 0.0;
     if (measured) {
       *contraction = size / before;
-      if (*contraction >= 1.0 && effort != EACH && left(SURE, size) >= ENOUGH) break;
+      if (*contraction >= 1.0 && effort != EACH && left(SURE, size) >= limit) break;
     }
     const double known = effort == EACH ? fmin(*contraction, 0.5) : *contraction;
-    if (known >= 0.0 && known < 1.0 && left(known, size) < ENOUGH) {
+    if (known >= 0.0 && known < 1.0 && left(known, size) < limit) {
       if (!measured) *contraction *= FORGET;
       return 0;
     }
