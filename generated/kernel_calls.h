@@ -356,20 +356,6 @@ static inline int mstmm_frames_tangent_moved_by(struct mstmm_frames_tangent_move
 }
 #define mstmm_frames_tangent_moved(...) mstmm_frames_tangent_moved_by((struct mstmm_frames_tangent_moved){__VA_ARGS__})
 
-struct mstmm_frames_tangent_turned {
-    const real *Rc;
-    const real *d_Rc;
-    const real *d_r;
-    const real *f;
-    real *G;
-};
-static inline int mstmm_frames_tangent_turned_by(struct mstmm_frames_tangent_turned to)
-{
-    return mstmm_sweep_frames_tangent_turned(
-        to.Rc, to.d_Rc, to.d_r, to.f, to.G);
-}
-#define mstmm_frames_tangent_turned(...) mstmm_frames_tangent_turned_by((struct mstmm_frames_tangent_turned){__VA_ARGS__})
-
 struct mstmm_frames_pose_slope {
     const real *A_I;
     const real *x_I;
@@ -1573,6 +1559,41 @@ static inline int mstmm_generic_effort_slope_by(int speeds, struct mstmm_generic
         to.H, to.f, to.d_H, to.d_f, to.d_tau);
 }
 #define mstmm_generic_effort_slope(speeds, ...) mstmm_generic_effort_slope_by(speeds, (struct mstmm_generic_effort_slope){__VA_ARGS__})
+
+struct mstmm_generic_tangent_column {
+    const real *R;
+    const real *H;
+    const real *s;
+    const real *v;
+    const real *w;
+    const real *c;
+    const real *motion;
+    const real *f;
+    const real *d_R;
+    const real *d_d;
+    const real *d_H;
+    const real *d_v;
+    const real *d_w;
+    const real *d_c;
+    const real *d_s;
+    real *B;
+    real *G;
+    real *d_tau;
+};
+typedef int mstmm_generic_tangent_column_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict, real *restrict);
+extern mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[];
+static inline int mstmm_generic_tangent_column_by(int speeds, struct mstmm_generic_tangent_column to)
+{
+    return mstmm_generic_tangent_column_table[speeds](
+        to.R, to.H, to.s, to.v, to.w, to.c, to.motion, to.f, to.d_R, to.d_d, to.d_H, to.d_v,
+        to.d_w, to.d_c, to.d_s, to.B, to.G, to.d_tau);
+}
+#define mstmm_generic_tangent_column(speeds, ...) mstmm_generic_tangent_column_by(speeds, (struct mstmm_generic_tangent_column){__VA_ARGS__})
 
 struct mstmm_hinge_hinge {
     const real *p;

@@ -62,8 +62,6 @@ int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restri
 int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z);
-int mstmm_sweep_frames_tangent_turned(const real *restrict Rc, const real *restrict d_Rc,
-    const real *restrict d_r, const real *restrict f, real *restrict G);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -3301,146 +3299,6 @@ static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* change of a load by the hinge that carries it
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  d_Rc[3][3] slope of Rc
- * in  d_r[3] (m) slope of r
- * in  f[6] (N, N*m) load at P, body axes
- * out G[6] column of G
- */
-int mstmm_sweep_frames_tangent_turned(const real *restrict Rc, const real *restrict d_Rc,
-    const real *restrict d_r, const real *restrict f, real *restrict G)
-{
-    const real t0 = Rc[0] * d_Rc[0];
-    const real t1 = Rc[3] * d_Rc[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * d_Rc[6];
-    const real t4 = t2 + t3;
-    const real t5 = f[0] * t4;
-    const real t6 = Rc[0] * d_Rc[1];
-    const real t7 = Rc[3] * d_Rc[4];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[6] * d_Rc[7];
-    const real t10 = t8 + t9;
-    const real t11 = f[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[0] * d_Rc[2];
-    const real t14 = Rc[3] * d_Rc[5];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[6] * d_Rc[8];
-    const real t17 = t15 + t16;
-    const real t18 = f[2] * t17;
-    const real t19 = t12 + t18;
-    G[0] = t19;
-    const real t20 = Rc[1] * d_Rc[0];
-    const real t21 = Rc[4] * d_Rc[3];
-    const real t22 = t20 + t21;
-    const real t23 = Rc[7] * d_Rc[6];
-    const real t24 = t22 + t23;
-    const real t25 = f[0] * t24;
-    const real t26 = Rc[1] * d_Rc[1];
-    const real t27 = Rc[4] * d_Rc[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[7] * d_Rc[7];
-    const real t30 = t28 + t29;
-    const real t31 = f[1] * t30;
-    const real t32 = t25 + t31;
-    const real t33 = Rc[1] * d_Rc[2];
-    const real t34 = Rc[4] * d_Rc[5];
-    const real t35 = t33 + t34;
-    const real t36 = Rc[7] * d_Rc[8];
-    const real t37 = t35 + t36;
-    const real t38 = f[2] * t37;
-    const real t39 = t32 + t38;
-    G[1] = t39;
-    const real t40 = Rc[2] * d_Rc[0];
-    const real t41 = Rc[5] * d_Rc[3];
-    const real t42 = t40 + t41;
-    const real t43 = Rc[8] * d_Rc[6];
-    const real t44 = t42 + t43;
-    const real t45 = f[0] * t44;
-    const real t46 = Rc[2] * d_Rc[1];
-    const real t47 = Rc[5] * d_Rc[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * d_Rc[7];
-    const real t50 = t48 + t49;
-    const real t51 = f[1] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = Rc[2] * d_Rc[2];
-    const real t54 = Rc[5] * d_Rc[5];
-    const real t55 = t53 + t54;
-    const real t56 = Rc[8] * d_Rc[8];
-    const real t57 = t55 + t56;
-    const real t58 = f[2] * t57;
-    const real t59 = t52 + t58;
-    G[2] = t59;
-    const real t60 = f[3] * t4;
-    const real t61 = f[4] * t10;
-    const real t62 = t60 + t61;
-    const real t63 = f[5] * t17;
-    const real t64 = t62 + t63;
-    const real t65 = Rc[1] * d_r[0];
-    const real t66 = Rc[4] * d_r[1];
-    const real t67 = t65 + t66;
-    const real t68 = Rc[7] * d_r[2];
-    const real t69 = t67 + t68;
-    const real t70 = f[2] * t69;
-    const real t71 = Rc[2] * d_r[0];
-    const real t72 = Rc[5] * d_r[1];
-    const real t73 = t71 + t72;
-    const real t74 = Rc[8] * d_r[2];
-    const real t75 = t73 + t74;
-    const real t76 = f[1] * t75;
-    const real t77 = t70 - t76;
-    const real t78 = t64 + t77;
-    G[3] = t78;
-    const real t79 = f[3] * t24;
-    const real t80 = f[4] * t30;
-    const real t81 = t79 + t80;
-    const real t82 = f[5] * t37;
-    const real t83 = t81 + t82;
-    const real t84 = f[0] * t75;
-    const real t85 = Rc[0] * d_r[0];
-    const real t86 = Rc[3] * d_r[1];
-    const real t87 = t85 + t86;
-    const real t88 = Rc[6] * d_r[2];
-    const real t89 = t87 + t88;
-    const real t90 = f[2] * t89;
-    const real t91 = t84 - t90;
-    const real t92 = t83 + t91;
-    G[4] = t92;
-    const real t93 = f[3] * t44;
-    const real t94 = f[4] * t50;
-    const real t95 = t93 + t94;
-    const real t96 = f[5] * t57;
-    const real t97 = t95 + t96;
-    const real t98 = f[1] * t89;
-    const real t99 = f[0] * t69;
-    const real t100 = t98 - t99;
-    const real t101 = t97 + t100;
-    G[5] = t101;
-    return 0;
-}
-
-static int mstmm_sweep_frames_tangent_turned_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_tangent_turned(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_tangent_turned_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
-    {"G", 6, "", 0, 0},
-};
-
 /* pose and its derivative along a direction
  * in  A_I[3][3] rotation, parent axes to inertial axes
  * in  x_I[3] (m) P of the parent, inertial axes
@@ -4965,18 +4823,6 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turned",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_turned,
-        .call = mstmm_sweep_frames_tangent_turned_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_tangent_turned_inputs,
-        .outputs = mstmm_sweep_frames_tangent_turned_outputs,
-        .ir_hash = "1ce7050087ae6c408a32d5b0cf07cb3a8e6b8d7fe7589d83d8fdb72c2cd153e5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
         .name = "pose_slope",
         .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
         .call = mstmm_sweep_frames_pose_slope_call,
@@ -5102,7 +4948,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "bc9dc16bbc371a6cf24b88e8adaa392fea1a6421cb0ac5c0390f1dde25086c75",
+    .hash = "2b576f506280dc0c8924d6b908cf4e14b26d757e5f8863ac2f5020837d06eea0",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5112,6 +4958,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 35,
+    .n_kernels = 34,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -34,6 +34,12 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1608,6 +1614,422 @@ static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* a direction of a hinge with 1 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  R[3][3]
+ * in  H[6]
+ * in  s[1]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  motion[9]
+ * in  f[6]
+ * in  d_R[3][3]
+ * in  d_d[3]
+ * in  d_H[6]
+ * in  d_v[3]
+ * in  d_w[3]
+ * in  d_c[6]
+ * in  d_s[1]
+ * out B[9]
+ * out G[6]
+ * out d_tau[1]
+ */
+int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau)
+{
+    const real t0 = R[0] * d_R[0];
+    const real t1 = R[3] * d_R[3];
+    const real t2 = t0 + t1;
+    const real t3 = R[6] * d_R[6];
+    const real t4 = t2 + t3;
+    const real t5 = motion[0] - w[0];
+    const real t6 = t4 * t5;
+    const real t7 = R[0] * d_R[1];
+    const real t8 = R[3] * d_R[4];
+    const real t9 = t7 + t8;
+    const real t10 = R[6] * d_R[7];
+    const real t11 = t9 + t10;
+    const real t12 = motion[1] - w[1];
+    const real t13 = t11 * t12;
+    const real t14 = t6 + t13;
+    const real t15 = R[0] * d_R[2];
+    const real t16 = R[3] * d_R[5];
+    const real t17 = t15 + t16;
+    const real t18 = R[6] * d_R[8];
+    const real t19 = t17 + t18;
+    const real t20 = motion[2] - w[2];
+    const real t21 = t19 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = d_w[0] - t22;
+    B[0] = t23;
+    const real t24 = R[1] * d_R[0];
+    const real t25 = R[4] * d_R[3];
+    const real t26 = t24 + t25;
+    const real t27 = R[7] * d_R[6];
+    const real t28 = t26 + t27;
+    const real t29 = t28 * t5;
+    const real t30 = R[1] * d_R[1];
+    const real t31 = R[4] * d_R[4];
+    const real t32 = t30 + t31;
+    const real t33 = R[7] * d_R[7];
+    const real t34 = t32 + t33;
+    const real t35 = t34 * t12;
+    const real t36 = t29 + t35;
+    const real t37 = R[1] * d_R[2];
+    const real t38 = R[4] * d_R[5];
+    const real t39 = t37 + t38;
+    const real t40 = R[7] * d_R[8];
+    const real t41 = t39 + t40;
+    const real t42 = t41 * t20;
+    const real t43 = t36 + t42;
+    const real t44 = d_w[1] - t43;
+    B[1] = t44;
+    const real t45 = R[2] * d_R[0];
+    const real t46 = R[5] * d_R[3];
+    const real t47 = t45 + t46;
+    const real t48 = R[8] * d_R[6];
+    const real t49 = t47 + t48;
+    const real t50 = t49 * t5;
+    const real t51 = R[2] * d_R[1];
+    const real t52 = R[5] * d_R[4];
+    const real t53 = t51 + t52;
+    const real t54 = R[8] * d_R[7];
+    const real t55 = t53 + t54;
+    const real t56 = t55 * t12;
+    const real t57 = t50 + t56;
+    const real t58 = R[2] * d_R[2];
+    const real t59 = R[5] * d_R[5];
+    const real t60 = t58 + t59;
+    const real t61 = R[8] * d_R[8];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t20;
+    const real t64 = t57 + t63;
+    const real t65 = d_w[2] - t64;
+    B[2] = t65;
+    const real t66 = H[3] * d_s[0];
+    const real t67 = s[0] * d_H[3];
+    const real t68 = t66 + t67;
+    const real t69 = d_c[3] + t68;
+    const real t70 = d_w[2] * t12;
+    const real t71 = d_w[1] * t20;
+    const real t72 = t70 - t71;
+    const real t73 = t69 + t72;
+    const real t74 = w[1] * t64;
+    const real t75 = w[2] * t43;
+    const real t76 = t74 - t75;
+    const real t77 = w[1] * t20;
+    const real t78 = w[2] * t12;
+    const real t79 = t77 - t78;
+    const real t80 = H[3] * s[0];
+    const real t81 = c[3] + t80;
+    const real t82 = t79 - t81;
+    const real t83 = motion[3] + t82;
+    const real t84 = t4 * t83;
+    const real t85 = w[2] * t5;
+    const real t86 = w[0] * t20;
+    const real t87 = t85 - t86;
+    const real t88 = H[4] * s[0];
+    const real t89 = c[4] + t88;
+    const real t90 = t87 - t89;
+    const real t91 = motion[4] + t90;
+    const real t92 = t11 * t91;
+    const real t93 = t84 + t92;
+    const real t94 = w[0] * t12;
+    const real t95 = w[1] * t5;
+    const real t96 = t94 - t95;
+    const real t97 = H[5] * s[0];
+    const real t98 = c[5] + t97;
+    const real t99 = t96 - t98;
+    const real t100 = motion[5] + t99;
+    const real t101 = t19 * t100;
+    const real t102 = t93 + t101;
+    const real t103 = t76 - t102;
+    const real t104 = t73 + t103;
+    B[3] = t104;
+    const real t105 = H[4] * d_s[0];
+    const real t106 = s[0] * d_H[4];
+    const real t107 = t105 + t106;
+    const real t108 = d_c[4] + t107;
+    const real t109 = d_w[0] * t20;
+    const real t110 = d_w[2] * t5;
+    const real t111 = t109 - t110;
+    const real t112 = t108 + t111;
+    const real t113 = w[2] * t22;
+    const real t114 = w[0] * t64;
+    const real t115 = t113 - t114;
+    const real t116 = t28 * t83;
+    const real t117 = t34 * t91;
+    const real t118 = t116 + t117;
+    const real t119 = t41 * t100;
+    const real t120 = t118 + t119;
+    const real t121 = t115 - t120;
+    const real t122 = t112 + t121;
+    B[4] = t122;
+    const real t123 = H[5] * d_s[0];
+    const real t124 = s[0] * d_H[5];
+    const real t125 = t123 + t124;
+    const real t126 = d_c[5] + t125;
+    const real t127 = d_w[1] * t5;
+    const real t128 = d_w[0] * t12;
+    const real t129 = t127 - t128;
+    const real t130 = t126 + t129;
+    const real t131 = w[0] * t43;
+    const real t132 = w[1] * t22;
+    const real t133 = t131 - t132;
+    const real t134 = t49 * t83;
+    const real t135 = t55 * t91;
+    const real t136 = t134 + t135;
+    const real t137 = t62 * t100;
+    const real t138 = t136 + t137;
+    const real t139 = t133 - t138;
+    const real t140 = t130 + t139;
+    B[5] = t140;
+    const real t141 = H[0] * d_s[0];
+    const real t142 = s[0] * d_H[0];
+    const real t143 = t141 + t142;
+    const real t144 = d_c[0] + t143;
+    const real t145 = d_v[2] * t12;
+    const real t146 = 2.0 * t145;
+    const real t147 = d_v[1] * t20;
+    const real t148 = 2.0 * t147;
+    const real t149 = t146 - t148;
+    const real t150 = t144 + t149;
+    const real t151 = R[1] * d_d[0];
+    const real t152 = R[4] * d_d[1];
+    const real t153 = t151 + t152;
+    const real t154 = R[7] * d_d[2];
+    const real t155 = t153 + t154;
+    const real t156 = t5 * t12;
+    const real t157 = t155 * t156;
+    const real t158 = R[0] * d_d[0];
+    const real t159 = R[3] * d_d[1];
+    const real t160 = t158 + t159;
+    const real t161 = R[6] * d_d[2];
+    const real t162 = t160 + t161;
+    const real t163 = t12 * t12;
+    const real t164 = t20 * t20;
+    const real t165 = t163 + t164;
+    const real t166 = t162 * t165;
+    const real t167 = t157 - t166;
+    const real t168 = R[2] * d_d[0];
+    const real t169 = R[5] * d_d[1];
+    const real t170 = t168 + t169;
+    const real t171 = R[8] * d_d[2];
+    const real t172 = t170 + t171;
+    const real t173 = t5 * t20;
+    const real t174 = t172 * t173;
+    const real t175 = t167 + t174;
+    const real t176 = v[1] * 2.0;
+    const real t177 = t64 * t176;
+    const real t178 = v[2] * 2.0;
+    const real t179 = t43 * t178;
+    const real t180 = t177 - t179;
+    const real t181 = t172 * t91;
+    const real t182 = t155 * t100;
+    const real t183 = t181 - t182;
+    const real t184 = t180 + t183;
+    const real t185 = t175 + t184;
+    const real t186 = v[1] * t20;
+    const real t187 = t186 * 2.0;
+    const real t188 = v[2] * t12;
+    const real t189 = 2.0 * t188;
+    const real t190 = t187 - t189;
+    const real t191 = H[0] * s[0];
+    const real t192 = c[0] + t191;
+    const real t193 = t190 - t192;
+    const real t194 = motion[6] + t193;
+    const real t195 = t4 * t194;
+    const real t196 = v[2] * t5;
+    const real t197 = 2.0 * t196;
+    const real t198 = v[0] * t20;
+    const real t199 = 2.0 * t198;
+    const real t200 = t197 - t199;
+    const real t201 = H[1] * s[0];
+    const real t202 = c[1] + t201;
+    const real t203 = t200 - t202;
+    const real t204 = motion[7] + t203;
+    const real t205 = t11 * t204;
+    const real t206 = t195 + t205;
+    const real t207 = v[0] * t12;
+    const real t208 = 2.0 * t207;
+    const real t209 = v[1] * t5;
+    const real t210 = 2.0 * t209;
+    const real t211 = t208 - t210;
+    const real t212 = H[2] * s[0];
+    const real t213 = c[2] + t212;
+    const real t214 = t211 - t213;
+    const real t215 = motion[8] + t214;
+    const real t216 = t19 * t215;
+    const real t217 = t206 + t216;
+    const real t218 = t185 - t217;
+    const real t219 = t150 + t218;
+    B[6] = t219;
+    const real t220 = H[1] * d_s[0];
+    const real t221 = s[0] * d_H[1];
+    const real t222 = t220 + t221;
+    const real t223 = d_c[1] + t222;
+    const real t224 = d_v[0] * t20;
+    const real t225 = 2.0 * t224;
+    const real t226 = d_v[2] * t5;
+    const real t227 = 2.0 * t226;
+    const real t228 = t225 - t227;
+    const real t229 = t223 + t228;
+    const real t230 = t162 * t156;
+    const real t231 = t5 * t5;
+    const real t232 = t164 + t231;
+    const real t233 = t155 * t232;
+    const real t234 = t230 - t233;
+    const real t235 = t12 * t20;
+    const real t236 = t172 * t235;
+    const real t237 = t234 + t236;
+    const real t238 = t22 * t178;
+    const real t239 = v[0] * 2.0;
+    const real t240 = t64 * t239;
+    const real t241 = t238 - t240;
+    const real t242 = t162 * t100;
+    const real t243 = t172 * t83;
+    const real t244 = t242 - t243;
+    const real t245 = t241 + t244;
+    const real t246 = t237 + t245;
+    const real t247 = t28 * t194;
+    const real t248 = t34 * t204;
+    const real t249 = t247 + t248;
+    const real t250 = t41 * t215;
+    const real t251 = t249 + t250;
+    const real t252 = t246 - t251;
+    const real t253 = t229 + t252;
+    B[7] = t253;
+    const real t254 = H[2] * d_s[0];
+    const real t255 = s[0] * d_H[2];
+    const real t256 = t254 + t255;
+    const real t257 = d_c[2] + t256;
+    const real t258 = d_v[1] * t5;
+    const real t259 = 2.0 * t258;
+    const real t260 = d_v[0] * t12;
+    const real t261 = 2.0 * t260;
+    const real t262 = t259 - t261;
+    const real t263 = t257 + t262;
+    const real t264 = t162 * t173;
+    const real t265 = t155 * t235;
+    const real t266 = t264 + t265;
+    const real t267 = t163 + t231;
+    const real t268 = t172 * t267;
+    const real t269 = t266 - t268;
+    const real t270 = t43 * t239;
+    const real t271 = t22 * t176;
+    const real t272 = t270 - t271;
+    const real t273 = t155 * t83;
+    const real t274 = t162 * t91;
+    const real t275 = t273 - t274;
+    const real t276 = t272 + t275;
+    const real t277 = t269 + t276;
+    const real t278 = t49 * t194;
+    const real t279 = t55 * t204;
+    const real t280 = t278 + t279;
+    const real t281 = t62 * t215;
+    const real t282 = t280 + t281;
+    const real t283 = t277 - t282;
+    const real t284 = t263 + t283;
+    B[8] = t284;
+    const real t285 = f[0] * t4;
+    const real t286 = f[1] * t11;
+    const real t287 = t285 + t286;
+    const real t288 = f[2] * t19;
+    const real t289 = t287 + t288;
+    G[0] = t289;
+    const real t290 = f[0] * t28;
+    const real t291 = f[1] * t34;
+    const real t292 = t290 + t291;
+    const real t293 = f[2] * t41;
+    const real t294 = t292 + t293;
+    G[1] = t294;
+    const real t295 = f[0] * t49;
+    const real t296 = f[1] * t55;
+    const real t297 = t295 + t296;
+    const real t298 = f[2] * t62;
+    const real t299 = t297 + t298;
+    G[2] = t299;
+    const real t300 = f[3] * t4;
+    const real t301 = f[4] * t11;
+    const real t302 = t300 + t301;
+    const real t303 = f[5] * t19;
+    const real t304 = t302 + t303;
+    const real t305 = f[2] * t155;
+    const real t306 = f[1] * t172;
+    const real t307 = t305 - t306;
+    const real t308 = t304 + t307;
+    G[3] = t308;
+    const real t309 = f[3] * t28;
+    const real t310 = f[4] * t34;
+    const real t311 = t309 + t310;
+    const real t312 = f[5] * t41;
+    const real t313 = t311 + t312;
+    const real t314 = f[0] * t172;
+    const real t315 = f[2] * t162;
+    const real t316 = t314 - t315;
+    const real t317 = t313 + t316;
+    G[4] = t317;
+    const real t318 = f[3] * t49;
+    const real t319 = f[4] * t55;
+    const real t320 = t318 + t319;
+    const real t321 = f[5] * t62;
+    const real t322 = t320 + t321;
+    const real t323 = f[1] * t162;
+    const real t324 = f[0] * t155;
+    const real t325 = t323 - t324;
+    const real t326 = t322 + t325;
+    G[5] = t326;
+    const real t327 = f[0] * d_H[0];
+    const real t328 = f[1] * d_H[1];
+    const real t329 = t327 + t328;
+    const real t330 = f[2] * d_H[2];
+    const real t331 = t329 + t330;
+    const real t332 = f[3] * d_H[3];
+    const real t333 = t331 + t332;
+    const real t334 = f[4] * d_H[4];
+    const real t335 = t333 + t334;
+    const real t336 = f[5] * d_H[5];
+    const real t337 = t335 + t336;
+    d_tau[0] = t337;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_column_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_column_inputs[] = {
+    {"R", 9, "", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"d_tau", 1, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -2268,6 +2690,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_column",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_column,
+        .call = mstmm_sweep_generic1_tangent_column_call,
+        .n_inputs = 15,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic1_tangent_column_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_column_outputs,
+        .ir_hash = "1741cb408391c78394e194e5e7fd4eba77d55142e772df6dc6a594e04ed76b9e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
         .call = mstmm_sweep_generic1_forward_slope_call,
@@ -2297,7 +2731,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "d2b24162604ac606bf557eacaa54592f98b04052ee31e2f4f6a64749e10b658d",
+    .hash = "a5882223aaee1b7bbf4ba133b9718e59f02435fe62bb0da937bda31d64728bff",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2307,6 +2741,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 10,
+    .n_kernels = 11,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -34,6 +34,12 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -2082,6 +2088,470 @@ static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* a direction of a hinge with 2 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  R[3][3]
+ * in  H[6][2]
+ * in  s[2]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  motion[9]
+ * in  f[6]
+ * in  d_R[3][3]
+ * in  d_d[3]
+ * in  d_H[6][2]
+ * in  d_v[3]
+ * in  d_w[3]
+ * in  d_c[6]
+ * in  d_s[2]
+ * out B[9]
+ * out G[6]
+ * out d_tau[2]
+ */
+int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau)
+{
+    const real t0 = R[0] * d_R[0];
+    const real t1 = R[3] * d_R[3];
+    const real t2 = t0 + t1;
+    const real t3 = R[6] * d_R[6];
+    const real t4 = t2 + t3;
+    const real t5 = motion[0] - w[0];
+    const real t6 = t4 * t5;
+    const real t7 = R[0] * d_R[1];
+    const real t8 = R[3] * d_R[4];
+    const real t9 = t7 + t8;
+    const real t10 = R[6] * d_R[7];
+    const real t11 = t9 + t10;
+    const real t12 = motion[1] - w[1];
+    const real t13 = t11 * t12;
+    const real t14 = t6 + t13;
+    const real t15 = R[0] * d_R[2];
+    const real t16 = R[3] * d_R[5];
+    const real t17 = t15 + t16;
+    const real t18 = R[6] * d_R[8];
+    const real t19 = t17 + t18;
+    const real t20 = motion[2] - w[2];
+    const real t21 = t19 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = d_w[0] - t22;
+    B[0] = t23;
+    const real t24 = R[1] * d_R[0];
+    const real t25 = R[4] * d_R[3];
+    const real t26 = t24 + t25;
+    const real t27 = R[7] * d_R[6];
+    const real t28 = t26 + t27;
+    const real t29 = t28 * t5;
+    const real t30 = R[1] * d_R[1];
+    const real t31 = R[4] * d_R[4];
+    const real t32 = t30 + t31;
+    const real t33 = R[7] * d_R[7];
+    const real t34 = t32 + t33;
+    const real t35 = t34 * t12;
+    const real t36 = t29 + t35;
+    const real t37 = R[1] * d_R[2];
+    const real t38 = R[4] * d_R[5];
+    const real t39 = t37 + t38;
+    const real t40 = R[7] * d_R[8];
+    const real t41 = t39 + t40;
+    const real t42 = t41 * t20;
+    const real t43 = t36 + t42;
+    const real t44 = d_w[1] - t43;
+    B[1] = t44;
+    const real t45 = R[2] * d_R[0];
+    const real t46 = R[5] * d_R[3];
+    const real t47 = t45 + t46;
+    const real t48 = R[8] * d_R[6];
+    const real t49 = t47 + t48;
+    const real t50 = t49 * t5;
+    const real t51 = R[2] * d_R[1];
+    const real t52 = R[5] * d_R[4];
+    const real t53 = t51 + t52;
+    const real t54 = R[8] * d_R[7];
+    const real t55 = t53 + t54;
+    const real t56 = t55 * t12;
+    const real t57 = t50 + t56;
+    const real t58 = R[2] * d_R[2];
+    const real t59 = R[5] * d_R[5];
+    const real t60 = t58 + t59;
+    const real t61 = R[8] * d_R[8];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t20;
+    const real t64 = t57 + t63;
+    const real t65 = d_w[2] - t64;
+    B[2] = t65;
+    const real t66 = H[6] * d_s[0];
+    const real t67 = H[7] * d_s[1];
+    const real t68 = t66 + t67;
+    const real t69 = s[0] * d_H[6];
+    const real t70 = s[1] * d_H[7];
+    const real t71 = t69 + t70;
+    const real t72 = t68 + t71;
+    const real t73 = d_c[3] + t72;
+    const real t74 = d_w[2] * t12;
+    const real t75 = d_w[1] * t20;
+    const real t76 = t74 - t75;
+    const real t77 = t73 + t76;
+    const real t78 = w[1] * t64;
+    const real t79 = w[2] * t43;
+    const real t80 = t78 - t79;
+    const real t81 = w[1] * t20;
+    const real t82 = w[2] * t12;
+    const real t83 = t81 - t82;
+    const real t84 = H[6] * s[0];
+    const real t85 = H[7] * s[1];
+    const real t86 = t84 + t85;
+    const real t87 = c[3] + t86;
+    const real t88 = t83 - t87;
+    const real t89 = motion[3] + t88;
+    const real t90 = t4 * t89;
+    const real t91 = w[2] * t5;
+    const real t92 = w[0] * t20;
+    const real t93 = t91 - t92;
+    const real t94 = H[8] * s[0];
+    const real t95 = H[9] * s[1];
+    const real t96 = t94 + t95;
+    const real t97 = c[4] + t96;
+    const real t98 = t93 - t97;
+    const real t99 = motion[4] + t98;
+    const real t100 = t11 * t99;
+    const real t101 = t90 + t100;
+    const real t102 = w[0] * t12;
+    const real t103 = w[1] * t5;
+    const real t104 = t102 - t103;
+    const real t105 = H[10] * s[0];
+    const real t106 = H[11] * s[1];
+    const real t107 = t105 + t106;
+    const real t108 = c[5] + t107;
+    const real t109 = t104 - t108;
+    const real t110 = motion[5] + t109;
+    const real t111 = t19 * t110;
+    const real t112 = t101 + t111;
+    const real t113 = t80 - t112;
+    const real t114 = t77 + t113;
+    B[3] = t114;
+    const real t115 = H[8] * d_s[0];
+    const real t116 = H[9] * d_s[1];
+    const real t117 = t115 + t116;
+    const real t118 = s[0] * d_H[8];
+    const real t119 = s[1] * d_H[9];
+    const real t120 = t118 + t119;
+    const real t121 = t117 + t120;
+    const real t122 = d_c[4] + t121;
+    const real t123 = d_w[0] * t20;
+    const real t124 = d_w[2] * t5;
+    const real t125 = t123 - t124;
+    const real t126 = t122 + t125;
+    const real t127 = w[2] * t22;
+    const real t128 = w[0] * t64;
+    const real t129 = t127 - t128;
+    const real t130 = t28 * t89;
+    const real t131 = t34 * t99;
+    const real t132 = t130 + t131;
+    const real t133 = t41 * t110;
+    const real t134 = t132 + t133;
+    const real t135 = t129 - t134;
+    const real t136 = t126 + t135;
+    B[4] = t136;
+    const real t137 = H[10] * d_s[0];
+    const real t138 = H[11] * d_s[1];
+    const real t139 = t137 + t138;
+    const real t140 = s[0] * d_H[10];
+    const real t141 = s[1] * d_H[11];
+    const real t142 = t140 + t141;
+    const real t143 = t139 + t142;
+    const real t144 = d_c[5] + t143;
+    const real t145 = d_w[1] * t5;
+    const real t146 = d_w[0] * t12;
+    const real t147 = t145 - t146;
+    const real t148 = t144 + t147;
+    const real t149 = w[0] * t43;
+    const real t150 = w[1] * t22;
+    const real t151 = t149 - t150;
+    const real t152 = t49 * t89;
+    const real t153 = t55 * t99;
+    const real t154 = t152 + t153;
+    const real t155 = t62 * t110;
+    const real t156 = t154 + t155;
+    const real t157 = t151 - t156;
+    const real t158 = t148 + t157;
+    B[5] = t158;
+    const real t159 = H[0] * d_s[0];
+    const real t160 = H[1] * d_s[1];
+    const real t161 = t159 + t160;
+    const real t162 = s[0] * d_H[0];
+    const real t163 = s[1] * d_H[1];
+    const real t164 = t162 + t163;
+    const real t165 = t161 + t164;
+    const real t166 = d_c[0] + t165;
+    const real t167 = d_v[2] * t12;
+    const real t168 = 2.0 * t167;
+    const real t169 = d_v[1] * t20;
+    const real t170 = 2.0 * t169;
+    const real t171 = t168 - t170;
+    const real t172 = t166 + t171;
+    const real t173 = R[1] * d_d[0];
+    const real t174 = R[4] * d_d[1];
+    const real t175 = t173 + t174;
+    const real t176 = R[7] * d_d[2];
+    const real t177 = t175 + t176;
+    const real t178 = t5 * t12;
+    const real t179 = t177 * t178;
+    const real t180 = R[0] * d_d[0];
+    const real t181 = R[3] * d_d[1];
+    const real t182 = t180 + t181;
+    const real t183 = R[6] * d_d[2];
+    const real t184 = t182 + t183;
+    const real t185 = t12 * t12;
+    const real t186 = t20 * t20;
+    const real t187 = t185 + t186;
+    const real t188 = t184 * t187;
+    const real t189 = t179 - t188;
+    const real t190 = R[2] * d_d[0];
+    const real t191 = R[5] * d_d[1];
+    const real t192 = t190 + t191;
+    const real t193 = R[8] * d_d[2];
+    const real t194 = t192 + t193;
+    const real t195 = t5 * t20;
+    const real t196 = t194 * t195;
+    const real t197 = t189 + t196;
+    const real t198 = v[1] * 2.0;
+    const real t199 = t64 * t198;
+    const real t200 = v[2] * 2.0;
+    const real t201 = t43 * t200;
+    const real t202 = t199 - t201;
+    const real t203 = t194 * t99;
+    const real t204 = t177 * t110;
+    const real t205 = t203 - t204;
+    const real t206 = t202 + t205;
+    const real t207 = t197 + t206;
+    const real t208 = v[1] * t20;
+    const real t209 = t208 * 2.0;
+    const real t210 = v[2] * t12;
+    const real t211 = 2.0 * t210;
+    const real t212 = t209 - t211;
+    const real t213 = H[0] * s[0];
+    const real t214 = H[1] * s[1];
+    const real t215 = t213 + t214;
+    const real t216 = c[0] + t215;
+    const real t217 = t212 - t216;
+    const real t218 = motion[6] + t217;
+    const real t219 = t4 * t218;
+    const real t220 = v[2] * t5;
+    const real t221 = 2.0 * t220;
+    const real t222 = v[0] * t20;
+    const real t223 = 2.0 * t222;
+    const real t224 = t221 - t223;
+    const real t225 = H[2] * s[0];
+    const real t226 = H[3] * s[1];
+    const real t227 = t225 + t226;
+    const real t228 = c[1] + t227;
+    const real t229 = t224 - t228;
+    const real t230 = motion[7] + t229;
+    const real t231 = t11 * t230;
+    const real t232 = t219 + t231;
+    const real t233 = v[0] * t12;
+    const real t234 = 2.0 * t233;
+    const real t235 = v[1] * t5;
+    const real t236 = 2.0 * t235;
+    const real t237 = t234 - t236;
+    const real t238 = H[4] * s[0];
+    const real t239 = H[5] * s[1];
+    const real t240 = t238 + t239;
+    const real t241 = c[2] + t240;
+    const real t242 = t237 - t241;
+    const real t243 = motion[8] + t242;
+    const real t244 = t19 * t243;
+    const real t245 = t232 + t244;
+    const real t246 = t207 - t245;
+    const real t247 = t172 + t246;
+    B[6] = t247;
+    const real t248 = H[2] * d_s[0];
+    const real t249 = H[3] * d_s[1];
+    const real t250 = t248 + t249;
+    const real t251 = s[0] * d_H[2];
+    const real t252 = s[1] * d_H[3];
+    const real t253 = t251 + t252;
+    const real t254 = t250 + t253;
+    const real t255 = d_c[1] + t254;
+    const real t256 = d_v[0] * t20;
+    const real t257 = 2.0 * t256;
+    const real t258 = d_v[2] * t5;
+    const real t259 = 2.0 * t258;
+    const real t260 = t257 - t259;
+    const real t261 = t255 + t260;
+    const real t262 = t184 * t178;
+    const real t263 = t5 * t5;
+    const real t264 = t186 + t263;
+    const real t265 = t177 * t264;
+    const real t266 = t262 - t265;
+    const real t267 = t12 * t20;
+    const real t268 = t194 * t267;
+    const real t269 = t266 + t268;
+    const real t270 = t22 * t200;
+    const real t271 = v[0] * 2.0;
+    const real t272 = t64 * t271;
+    const real t273 = t270 - t272;
+    const real t274 = t184 * t110;
+    const real t275 = t194 * t89;
+    const real t276 = t274 - t275;
+    const real t277 = t273 + t276;
+    const real t278 = t269 + t277;
+    const real t279 = t28 * t218;
+    const real t280 = t34 * t230;
+    const real t281 = t279 + t280;
+    const real t282 = t41 * t243;
+    const real t283 = t281 + t282;
+    const real t284 = t278 - t283;
+    const real t285 = t261 + t284;
+    B[7] = t285;
+    const real t286 = H[4] * d_s[0];
+    const real t287 = H[5] * d_s[1];
+    const real t288 = t286 + t287;
+    const real t289 = s[0] * d_H[4];
+    const real t290 = s[1] * d_H[5];
+    const real t291 = t289 + t290;
+    const real t292 = t288 + t291;
+    const real t293 = d_c[2] + t292;
+    const real t294 = d_v[1] * t5;
+    const real t295 = 2.0 * t294;
+    const real t296 = d_v[0] * t12;
+    const real t297 = 2.0 * t296;
+    const real t298 = t295 - t297;
+    const real t299 = t293 + t298;
+    const real t300 = t184 * t195;
+    const real t301 = t177 * t267;
+    const real t302 = t300 + t301;
+    const real t303 = t185 + t263;
+    const real t304 = t194 * t303;
+    const real t305 = t302 - t304;
+    const real t306 = t43 * t271;
+    const real t307 = t22 * t198;
+    const real t308 = t306 - t307;
+    const real t309 = t177 * t89;
+    const real t310 = t184 * t99;
+    const real t311 = t309 - t310;
+    const real t312 = t308 + t311;
+    const real t313 = t305 + t312;
+    const real t314 = t49 * t218;
+    const real t315 = t55 * t230;
+    const real t316 = t314 + t315;
+    const real t317 = t62 * t243;
+    const real t318 = t316 + t317;
+    const real t319 = t313 - t318;
+    const real t320 = t299 + t319;
+    B[8] = t320;
+    const real t321 = f[0] * t4;
+    const real t322 = f[1] * t11;
+    const real t323 = t321 + t322;
+    const real t324 = f[2] * t19;
+    const real t325 = t323 + t324;
+    G[0] = t325;
+    const real t326 = f[0] * t28;
+    const real t327 = f[1] * t34;
+    const real t328 = t326 + t327;
+    const real t329 = f[2] * t41;
+    const real t330 = t328 + t329;
+    G[1] = t330;
+    const real t331 = f[0] * t49;
+    const real t332 = f[1] * t55;
+    const real t333 = t331 + t332;
+    const real t334 = f[2] * t62;
+    const real t335 = t333 + t334;
+    G[2] = t335;
+    const real t336 = f[3] * t4;
+    const real t337 = f[4] * t11;
+    const real t338 = t336 + t337;
+    const real t339 = f[5] * t19;
+    const real t340 = t338 + t339;
+    const real t341 = f[2] * t177;
+    const real t342 = f[1] * t194;
+    const real t343 = t341 - t342;
+    const real t344 = t340 + t343;
+    G[3] = t344;
+    const real t345 = f[3] * t28;
+    const real t346 = f[4] * t34;
+    const real t347 = t345 + t346;
+    const real t348 = f[5] * t41;
+    const real t349 = t347 + t348;
+    const real t350 = f[0] * t194;
+    const real t351 = f[2] * t184;
+    const real t352 = t350 - t351;
+    const real t353 = t349 + t352;
+    G[4] = t353;
+    const real t354 = f[3] * t49;
+    const real t355 = f[4] * t55;
+    const real t356 = t354 + t355;
+    const real t357 = f[5] * t62;
+    const real t358 = t356 + t357;
+    const real t359 = f[1] * t184;
+    const real t360 = f[0] * t177;
+    const real t361 = t359 - t360;
+    const real t362 = t358 + t361;
+    G[5] = t362;
+    const real t363 = f[0] * d_H[0];
+    const real t364 = f[1] * d_H[2];
+    const real t365 = t363 + t364;
+    const real t366 = f[2] * d_H[4];
+    const real t367 = t365 + t366;
+    const real t368 = f[3] * d_H[6];
+    const real t369 = t367 + t368;
+    const real t370 = f[4] * d_H[8];
+    const real t371 = t369 + t370;
+    const real t372 = f[5] * d_H[10];
+    const real t373 = t371 + t372;
+    d_tau[0] = t373;
+    const real t374 = f[0] * d_H[1];
+    const real t375 = f[1] * d_H[3];
+    const real t376 = t374 + t375;
+    const real t377 = f[2] * d_H[5];
+    const real t378 = t376 + t377;
+    const real t379 = f[3] * d_H[7];
+    const real t380 = t378 + t379;
+    const real t381 = f[4] * d_H[9];
+    const real t382 = t380 + t381;
+    const real t383 = f[5] * d_H[11];
+    const real t384 = t382 + t383;
+    d_tau[1] = t384;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_column_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_column_inputs[] = {
+    {"R", 9, "", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 12, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"d_tau", 2, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -2790,6 +3260,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_column",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_column,
+        .call = mstmm_sweep_generic2_tangent_column_call,
+        .n_inputs = 15,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic2_tangent_column_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_column_outputs,
+        .ir_hash = "a778dc4ef6bed2ac484be00e0cbdf2640671c73181f089a85590297167b50dec",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
         .call = mstmm_sweep_generic2_forward_slope_call,
@@ -2819,7 +3301,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "deada13699595414a1bb0c5f59a61846bc456d0b513538b90d2beef5efb98113",
+    .hash = "03a43e2fbaadbb4d153534d9cf77d92fe6d163f9cbeff0c4fb417a4b36384451",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2829,6 +3311,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 10,
+    .n_kernels = 11,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -34,6 +34,12 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -2642,6 +2648,518 @@ static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* a direction of a hinge with 3 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  R[3][3]
+ * in  H[6][3]
+ * in  s[3]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  motion[9]
+ * in  f[6]
+ * in  d_R[3][3]
+ * in  d_d[3]
+ * in  d_H[6][3]
+ * in  d_v[3]
+ * in  d_w[3]
+ * in  d_c[6]
+ * in  d_s[3]
+ * out B[9]
+ * out G[6]
+ * out d_tau[3]
+ */
+int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau)
+{
+    const real t0 = R[0] * d_R[0];
+    const real t1 = R[3] * d_R[3];
+    const real t2 = t0 + t1;
+    const real t3 = R[6] * d_R[6];
+    const real t4 = t2 + t3;
+    const real t5 = motion[0] - w[0];
+    const real t6 = t4 * t5;
+    const real t7 = R[0] * d_R[1];
+    const real t8 = R[3] * d_R[4];
+    const real t9 = t7 + t8;
+    const real t10 = R[6] * d_R[7];
+    const real t11 = t9 + t10;
+    const real t12 = motion[1] - w[1];
+    const real t13 = t11 * t12;
+    const real t14 = t6 + t13;
+    const real t15 = R[0] * d_R[2];
+    const real t16 = R[3] * d_R[5];
+    const real t17 = t15 + t16;
+    const real t18 = R[6] * d_R[8];
+    const real t19 = t17 + t18;
+    const real t20 = motion[2] - w[2];
+    const real t21 = t19 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = d_w[0] - t22;
+    B[0] = t23;
+    const real t24 = R[1] * d_R[0];
+    const real t25 = R[4] * d_R[3];
+    const real t26 = t24 + t25;
+    const real t27 = R[7] * d_R[6];
+    const real t28 = t26 + t27;
+    const real t29 = t28 * t5;
+    const real t30 = R[1] * d_R[1];
+    const real t31 = R[4] * d_R[4];
+    const real t32 = t30 + t31;
+    const real t33 = R[7] * d_R[7];
+    const real t34 = t32 + t33;
+    const real t35 = t34 * t12;
+    const real t36 = t29 + t35;
+    const real t37 = R[1] * d_R[2];
+    const real t38 = R[4] * d_R[5];
+    const real t39 = t37 + t38;
+    const real t40 = R[7] * d_R[8];
+    const real t41 = t39 + t40;
+    const real t42 = t41 * t20;
+    const real t43 = t36 + t42;
+    const real t44 = d_w[1] - t43;
+    B[1] = t44;
+    const real t45 = R[2] * d_R[0];
+    const real t46 = R[5] * d_R[3];
+    const real t47 = t45 + t46;
+    const real t48 = R[8] * d_R[6];
+    const real t49 = t47 + t48;
+    const real t50 = t49 * t5;
+    const real t51 = R[2] * d_R[1];
+    const real t52 = R[5] * d_R[4];
+    const real t53 = t51 + t52;
+    const real t54 = R[8] * d_R[7];
+    const real t55 = t53 + t54;
+    const real t56 = t55 * t12;
+    const real t57 = t50 + t56;
+    const real t58 = R[2] * d_R[2];
+    const real t59 = R[5] * d_R[5];
+    const real t60 = t58 + t59;
+    const real t61 = R[8] * d_R[8];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t20;
+    const real t64 = t57 + t63;
+    const real t65 = d_w[2] - t64;
+    B[2] = t65;
+    const real t66 = H[9] * d_s[0];
+    const real t67 = H[10] * d_s[1];
+    const real t68 = t66 + t67;
+    const real t69 = H[11] * d_s[2];
+    const real t70 = t68 + t69;
+    const real t71 = s[0] * d_H[9];
+    const real t72 = s[1] * d_H[10];
+    const real t73 = t71 + t72;
+    const real t74 = s[2] * d_H[11];
+    const real t75 = t73 + t74;
+    const real t76 = t70 + t75;
+    const real t77 = d_c[3] + t76;
+    const real t78 = d_w[2] * t12;
+    const real t79 = d_w[1] * t20;
+    const real t80 = t78 - t79;
+    const real t81 = t77 + t80;
+    const real t82 = w[1] * t64;
+    const real t83 = w[2] * t43;
+    const real t84 = t82 - t83;
+    const real t85 = w[1] * t20;
+    const real t86 = w[2] * t12;
+    const real t87 = t85 - t86;
+    const real t88 = H[9] * s[0];
+    const real t89 = H[10] * s[1];
+    const real t90 = t88 + t89;
+    const real t91 = H[11] * s[2];
+    const real t92 = t90 + t91;
+    const real t93 = c[3] + t92;
+    const real t94 = t87 - t93;
+    const real t95 = motion[3] + t94;
+    const real t96 = t4 * t95;
+    const real t97 = w[2] * t5;
+    const real t98 = w[0] * t20;
+    const real t99 = t97 - t98;
+    const real t100 = H[12] * s[0];
+    const real t101 = H[13] * s[1];
+    const real t102 = t100 + t101;
+    const real t103 = H[14] * s[2];
+    const real t104 = t102 + t103;
+    const real t105 = c[4] + t104;
+    const real t106 = t99 - t105;
+    const real t107 = motion[4] + t106;
+    const real t108 = t11 * t107;
+    const real t109 = t96 + t108;
+    const real t110 = w[0] * t12;
+    const real t111 = w[1] * t5;
+    const real t112 = t110 - t111;
+    const real t113 = H[15] * s[0];
+    const real t114 = H[16] * s[1];
+    const real t115 = t113 + t114;
+    const real t116 = H[17] * s[2];
+    const real t117 = t115 + t116;
+    const real t118 = c[5] + t117;
+    const real t119 = t112 - t118;
+    const real t120 = motion[5] + t119;
+    const real t121 = t19 * t120;
+    const real t122 = t109 + t121;
+    const real t123 = t84 - t122;
+    const real t124 = t81 + t123;
+    B[3] = t124;
+    const real t125 = H[12] * d_s[0];
+    const real t126 = H[13] * d_s[1];
+    const real t127 = t125 + t126;
+    const real t128 = H[14] * d_s[2];
+    const real t129 = t127 + t128;
+    const real t130 = s[0] * d_H[12];
+    const real t131 = s[1] * d_H[13];
+    const real t132 = t130 + t131;
+    const real t133 = s[2] * d_H[14];
+    const real t134 = t132 + t133;
+    const real t135 = t129 + t134;
+    const real t136 = d_c[4] + t135;
+    const real t137 = d_w[0] * t20;
+    const real t138 = d_w[2] * t5;
+    const real t139 = t137 - t138;
+    const real t140 = t136 + t139;
+    const real t141 = w[2] * t22;
+    const real t142 = w[0] * t64;
+    const real t143 = t141 - t142;
+    const real t144 = t28 * t95;
+    const real t145 = t34 * t107;
+    const real t146 = t144 + t145;
+    const real t147 = t41 * t120;
+    const real t148 = t146 + t147;
+    const real t149 = t143 - t148;
+    const real t150 = t140 + t149;
+    B[4] = t150;
+    const real t151 = H[15] * d_s[0];
+    const real t152 = H[16] * d_s[1];
+    const real t153 = t151 + t152;
+    const real t154 = H[17] * d_s[2];
+    const real t155 = t153 + t154;
+    const real t156 = s[0] * d_H[15];
+    const real t157 = s[1] * d_H[16];
+    const real t158 = t156 + t157;
+    const real t159 = s[2] * d_H[17];
+    const real t160 = t158 + t159;
+    const real t161 = t155 + t160;
+    const real t162 = d_c[5] + t161;
+    const real t163 = d_w[1] * t5;
+    const real t164 = d_w[0] * t12;
+    const real t165 = t163 - t164;
+    const real t166 = t162 + t165;
+    const real t167 = w[0] * t43;
+    const real t168 = w[1] * t22;
+    const real t169 = t167 - t168;
+    const real t170 = t49 * t95;
+    const real t171 = t55 * t107;
+    const real t172 = t170 + t171;
+    const real t173 = t62 * t120;
+    const real t174 = t172 + t173;
+    const real t175 = t169 - t174;
+    const real t176 = t166 + t175;
+    B[5] = t176;
+    const real t177 = H[0] * d_s[0];
+    const real t178 = H[1] * d_s[1];
+    const real t179 = t177 + t178;
+    const real t180 = H[2] * d_s[2];
+    const real t181 = t179 + t180;
+    const real t182 = s[0] * d_H[0];
+    const real t183 = s[1] * d_H[1];
+    const real t184 = t182 + t183;
+    const real t185 = s[2] * d_H[2];
+    const real t186 = t184 + t185;
+    const real t187 = t181 + t186;
+    const real t188 = d_c[0] + t187;
+    const real t189 = d_v[2] * t12;
+    const real t190 = 2.0 * t189;
+    const real t191 = d_v[1] * t20;
+    const real t192 = 2.0 * t191;
+    const real t193 = t190 - t192;
+    const real t194 = t188 + t193;
+    const real t195 = R[1] * d_d[0];
+    const real t196 = R[4] * d_d[1];
+    const real t197 = t195 + t196;
+    const real t198 = R[7] * d_d[2];
+    const real t199 = t197 + t198;
+    const real t200 = t5 * t12;
+    const real t201 = t199 * t200;
+    const real t202 = R[0] * d_d[0];
+    const real t203 = R[3] * d_d[1];
+    const real t204 = t202 + t203;
+    const real t205 = R[6] * d_d[2];
+    const real t206 = t204 + t205;
+    const real t207 = t12 * t12;
+    const real t208 = t20 * t20;
+    const real t209 = t207 + t208;
+    const real t210 = t206 * t209;
+    const real t211 = t201 - t210;
+    const real t212 = R[2] * d_d[0];
+    const real t213 = R[5] * d_d[1];
+    const real t214 = t212 + t213;
+    const real t215 = R[8] * d_d[2];
+    const real t216 = t214 + t215;
+    const real t217 = t5 * t20;
+    const real t218 = t216 * t217;
+    const real t219 = t211 + t218;
+    const real t220 = v[1] * 2.0;
+    const real t221 = t64 * t220;
+    const real t222 = v[2] * 2.0;
+    const real t223 = t43 * t222;
+    const real t224 = t221 - t223;
+    const real t225 = t216 * t107;
+    const real t226 = t199 * t120;
+    const real t227 = t225 - t226;
+    const real t228 = t224 + t227;
+    const real t229 = t219 + t228;
+    const real t230 = v[1] * t20;
+    const real t231 = t230 * 2.0;
+    const real t232 = v[2] * t12;
+    const real t233 = 2.0 * t232;
+    const real t234 = t231 - t233;
+    const real t235 = H[0] * s[0];
+    const real t236 = H[1] * s[1];
+    const real t237 = t235 + t236;
+    const real t238 = H[2] * s[2];
+    const real t239 = t237 + t238;
+    const real t240 = c[0] + t239;
+    const real t241 = t234 - t240;
+    const real t242 = motion[6] + t241;
+    const real t243 = t4 * t242;
+    const real t244 = v[2] * t5;
+    const real t245 = 2.0 * t244;
+    const real t246 = v[0] * t20;
+    const real t247 = 2.0 * t246;
+    const real t248 = t245 - t247;
+    const real t249 = H[3] * s[0];
+    const real t250 = H[4] * s[1];
+    const real t251 = t249 + t250;
+    const real t252 = H[5] * s[2];
+    const real t253 = t251 + t252;
+    const real t254 = c[1] + t253;
+    const real t255 = t248 - t254;
+    const real t256 = motion[7] + t255;
+    const real t257 = t11 * t256;
+    const real t258 = t243 + t257;
+    const real t259 = v[0] * t12;
+    const real t260 = 2.0 * t259;
+    const real t261 = v[1] * t5;
+    const real t262 = 2.0 * t261;
+    const real t263 = t260 - t262;
+    const real t264 = H[6] * s[0];
+    const real t265 = H[7] * s[1];
+    const real t266 = t264 + t265;
+    const real t267 = H[8] * s[2];
+    const real t268 = t266 + t267;
+    const real t269 = c[2] + t268;
+    const real t270 = t263 - t269;
+    const real t271 = motion[8] + t270;
+    const real t272 = t19 * t271;
+    const real t273 = t258 + t272;
+    const real t274 = t229 - t273;
+    const real t275 = t194 + t274;
+    B[6] = t275;
+    const real t276 = H[3] * d_s[0];
+    const real t277 = H[4] * d_s[1];
+    const real t278 = t276 + t277;
+    const real t279 = H[5] * d_s[2];
+    const real t280 = t278 + t279;
+    const real t281 = s[0] * d_H[3];
+    const real t282 = s[1] * d_H[4];
+    const real t283 = t281 + t282;
+    const real t284 = s[2] * d_H[5];
+    const real t285 = t283 + t284;
+    const real t286 = t280 + t285;
+    const real t287 = d_c[1] + t286;
+    const real t288 = d_v[0] * t20;
+    const real t289 = 2.0 * t288;
+    const real t290 = d_v[2] * t5;
+    const real t291 = 2.0 * t290;
+    const real t292 = t289 - t291;
+    const real t293 = t287 + t292;
+    const real t294 = t206 * t200;
+    const real t295 = t5 * t5;
+    const real t296 = t208 + t295;
+    const real t297 = t199 * t296;
+    const real t298 = t294 - t297;
+    const real t299 = t12 * t20;
+    const real t300 = t216 * t299;
+    const real t301 = t298 + t300;
+    const real t302 = t22 * t222;
+    const real t303 = v[0] * 2.0;
+    const real t304 = t64 * t303;
+    const real t305 = t302 - t304;
+    const real t306 = t206 * t120;
+    const real t307 = t216 * t95;
+    const real t308 = t306 - t307;
+    const real t309 = t305 + t308;
+    const real t310 = t301 + t309;
+    const real t311 = t28 * t242;
+    const real t312 = t34 * t256;
+    const real t313 = t311 + t312;
+    const real t314 = t41 * t271;
+    const real t315 = t313 + t314;
+    const real t316 = t310 - t315;
+    const real t317 = t293 + t316;
+    B[7] = t317;
+    const real t318 = H[6] * d_s[0];
+    const real t319 = H[7] * d_s[1];
+    const real t320 = t318 + t319;
+    const real t321 = H[8] * d_s[2];
+    const real t322 = t320 + t321;
+    const real t323 = s[0] * d_H[6];
+    const real t324 = s[1] * d_H[7];
+    const real t325 = t323 + t324;
+    const real t326 = s[2] * d_H[8];
+    const real t327 = t325 + t326;
+    const real t328 = t322 + t327;
+    const real t329 = d_c[2] + t328;
+    const real t330 = d_v[1] * t5;
+    const real t331 = 2.0 * t330;
+    const real t332 = d_v[0] * t12;
+    const real t333 = 2.0 * t332;
+    const real t334 = t331 - t333;
+    const real t335 = t329 + t334;
+    const real t336 = t206 * t217;
+    const real t337 = t199 * t299;
+    const real t338 = t336 + t337;
+    const real t339 = t207 + t295;
+    const real t340 = t216 * t339;
+    const real t341 = t338 - t340;
+    const real t342 = t43 * t303;
+    const real t343 = t22 * t220;
+    const real t344 = t342 - t343;
+    const real t345 = t199 * t95;
+    const real t346 = t206 * t107;
+    const real t347 = t345 - t346;
+    const real t348 = t344 + t347;
+    const real t349 = t341 + t348;
+    const real t350 = t49 * t242;
+    const real t351 = t55 * t256;
+    const real t352 = t350 + t351;
+    const real t353 = t62 * t271;
+    const real t354 = t352 + t353;
+    const real t355 = t349 - t354;
+    const real t356 = t335 + t355;
+    B[8] = t356;
+    const real t357 = f[0] * t4;
+    const real t358 = f[1] * t11;
+    const real t359 = t357 + t358;
+    const real t360 = f[2] * t19;
+    const real t361 = t359 + t360;
+    G[0] = t361;
+    const real t362 = f[0] * t28;
+    const real t363 = f[1] * t34;
+    const real t364 = t362 + t363;
+    const real t365 = f[2] * t41;
+    const real t366 = t364 + t365;
+    G[1] = t366;
+    const real t367 = f[0] * t49;
+    const real t368 = f[1] * t55;
+    const real t369 = t367 + t368;
+    const real t370 = f[2] * t62;
+    const real t371 = t369 + t370;
+    G[2] = t371;
+    const real t372 = f[3] * t4;
+    const real t373 = f[4] * t11;
+    const real t374 = t372 + t373;
+    const real t375 = f[5] * t19;
+    const real t376 = t374 + t375;
+    const real t377 = f[2] * t199;
+    const real t378 = f[1] * t216;
+    const real t379 = t377 - t378;
+    const real t380 = t376 + t379;
+    G[3] = t380;
+    const real t381 = f[3] * t28;
+    const real t382 = f[4] * t34;
+    const real t383 = t381 + t382;
+    const real t384 = f[5] * t41;
+    const real t385 = t383 + t384;
+    const real t386 = f[0] * t216;
+    const real t387 = f[2] * t206;
+    const real t388 = t386 - t387;
+    const real t389 = t385 + t388;
+    G[4] = t389;
+    const real t390 = f[3] * t49;
+    const real t391 = f[4] * t55;
+    const real t392 = t390 + t391;
+    const real t393 = f[5] * t62;
+    const real t394 = t392 + t393;
+    const real t395 = f[1] * t206;
+    const real t396 = f[0] * t199;
+    const real t397 = t395 - t396;
+    const real t398 = t394 + t397;
+    G[5] = t398;
+    const real t399 = f[0] * d_H[0];
+    const real t400 = f[1] * d_H[3];
+    const real t401 = t399 + t400;
+    const real t402 = f[2] * d_H[6];
+    const real t403 = t401 + t402;
+    const real t404 = f[3] * d_H[9];
+    const real t405 = t403 + t404;
+    const real t406 = f[4] * d_H[12];
+    const real t407 = t405 + t406;
+    const real t408 = f[5] * d_H[15];
+    const real t409 = t407 + t408;
+    d_tau[0] = t409;
+    const real t410 = f[0] * d_H[1];
+    const real t411 = f[1] * d_H[4];
+    const real t412 = t410 + t411;
+    const real t413 = f[2] * d_H[7];
+    const real t414 = t412 + t413;
+    const real t415 = f[3] * d_H[10];
+    const real t416 = t414 + t415;
+    const real t417 = f[4] * d_H[13];
+    const real t418 = t416 + t417;
+    const real t419 = f[5] * d_H[16];
+    const real t420 = t418 + t419;
+    d_tau[1] = t420;
+    const real t421 = f[0] * d_H[2];
+    const real t422 = f[1] * d_H[5];
+    const real t423 = t421 + t422;
+    const real t424 = f[2] * d_H[8];
+    const real t425 = t423 + t424;
+    const real t426 = f[3] * d_H[11];
+    const real t427 = t425 + t426;
+    const real t428 = f[4] * d_H[14];
+    const real t429 = t427 + t428;
+    const real t430 = f[5] * d_H[17];
+    const real t431 = t429 + t430;
+    d_tau[2] = t431;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_column_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_column_inputs[] = {
+    {"R", 9, "", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"d_tau", 3, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -3398,6 +3916,18 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_column",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_column,
+        .call = mstmm_sweep_generic3_tangent_column_call,
+        .n_inputs = 15,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic3_tangent_column_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_column_outputs,
+        .ir_hash = "1a67c01c304b1b999d48fbe4539614cd722dd373ee72c2193c50ef3812a73b13",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
         .call = mstmm_sweep_generic3_forward_slope_call,
@@ -3427,7 +3957,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "2bdbcfddf8e3f4b8b1f5d3992ec10621a54ece66e5dc01cc594cb510753e17ba",
+    .hash = "9f672a513e1287eba8aefd0d8b802c1bbab0f6763d756b1edb8bca5128d1b4a0",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3437,6 +3967,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 10,
+    .n_kernels = 11,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -34,6 +34,12 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -3294,6 +3300,566 @@ static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* a direction of a hinge with 4 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  R[3][3]
+ * in  H[6][4]
+ * in  s[4]
+ * in  v[3]
+ * in  w[3]
+ * in  c[6]
+ * in  motion[9]
+ * in  f[6]
+ * in  d_R[3][3]
+ * in  d_d[3]
+ * in  d_H[6][4]
+ * in  d_v[3]
+ * in  d_w[3]
+ * in  d_c[6]
+ * in  d_s[4]
+ * out B[9]
+ * out G[6]
+ * out d_tau[4]
+ */
+int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *restrict H,
+    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, const real *restrict f, const real *restrict d_R,
+    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
+    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
+    real *restrict G, real *restrict d_tau)
+{
+    const real t0 = R[0] * d_R[0];
+    const real t1 = R[3] * d_R[3];
+    const real t2 = t0 + t1;
+    const real t3 = R[6] * d_R[6];
+    const real t4 = t2 + t3;
+    const real t5 = motion[0] - w[0];
+    const real t6 = t4 * t5;
+    const real t7 = R[0] * d_R[1];
+    const real t8 = R[3] * d_R[4];
+    const real t9 = t7 + t8;
+    const real t10 = R[6] * d_R[7];
+    const real t11 = t9 + t10;
+    const real t12 = motion[1] - w[1];
+    const real t13 = t11 * t12;
+    const real t14 = t6 + t13;
+    const real t15 = R[0] * d_R[2];
+    const real t16 = R[3] * d_R[5];
+    const real t17 = t15 + t16;
+    const real t18 = R[6] * d_R[8];
+    const real t19 = t17 + t18;
+    const real t20 = motion[2] - w[2];
+    const real t21 = t19 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = d_w[0] - t22;
+    B[0] = t23;
+    const real t24 = R[1] * d_R[0];
+    const real t25 = R[4] * d_R[3];
+    const real t26 = t24 + t25;
+    const real t27 = R[7] * d_R[6];
+    const real t28 = t26 + t27;
+    const real t29 = t28 * t5;
+    const real t30 = R[1] * d_R[1];
+    const real t31 = R[4] * d_R[4];
+    const real t32 = t30 + t31;
+    const real t33 = R[7] * d_R[7];
+    const real t34 = t32 + t33;
+    const real t35 = t34 * t12;
+    const real t36 = t29 + t35;
+    const real t37 = R[1] * d_R[2];
+    const real t38 = R[4] * d_R[5];
+    const real t39 = t37 + t38;
+    const real t40 = R[7] * d_R[8];
+    const real t41 = t39 + t40;
+    const real t42 = t41 * t20;
+    const real t43 = t36 + t42;
+    const real t44 = d_w[1] - t43;
+    B[1] = t44;
+    const real t45 = R[2] * d_R[0];
+    const real t46 = R[5] * d_R[3];
+    const real t47 = t45 + t46;
+    const real t48 = R[8] * d_R[6];
+    const real t49 = t47 + t48;
+    const real t50 = t49 * t5;
+    const real t51 = R[2] * d_R[1];
+    const real t52 = R[5] * d_R[4];
+    const real t53 = t51 + t52;
+    const real t54 = R[8] * d_R[7];
+    const real t55 = t53 + t54;
+    const real t56 = t55 * t12;
+    const real t57 = t50 + t56;
+    const real t58 = R[2] * d_R[2];
+    const real t59 = R[5] * d_R[5];
+    const real t60 = t58 + t59;
+    const real t61 = R[8] * d_R[8];
+    const real t62 = t60 + t61;
+    const real t63 = t62 * t20;
+    const real t64 = t57 + t63;
+    const real t65 = d_w[2] - t64;
+    B[2] = t65;
+    const real t66 = H[12] * d_s[0];
+    const real t67 = H[13] * d_s[1];
+    const real t68 = t66 + t67;
+    const real t69 = H[14] * d_s[2];
+    const real t70 = t68 + t69;
+    const real t71 = H[15] * d_s[3];
+    const real t72 = t70 + t71;
+    const real t73 = s[0] * d_H[12];
+    const real t74 = s[1] * d_H[13];
+    const real t75 = t73 + t74;
+    const real t76 = s[2] * d_H[14];
+    const real t77 = t75 + t76;
+    const real t78 = s[3] * d_H[15];
+    const real t79 = t77 + t78;
+    const real t80 = t72 + t79;
+    const real t81 = d_c[3] + t80;
+    const real t82 = d_w[2] * t12;
+    const real t83 = d_w[1] * t20;
+    const real t84 = t82 - t83;
+    const real t85 = t81 + t84;
+    const real t86 = w[1] * t64;
+    const real t87 = w[2] * t43;
+    const real t88 = t86 - t87;
+    const real t89 = w[1] * t20;
+    const real t90 = w[2] * t12;
+    const real t91 = t89 - t90;
+    const real t92 = H[12] * s[0];
+    const real t93 = H[13] * s[1];
+    const real t94 = t92 + t93;
+    const real t95 = H[14] * s[2];
+    const real t96 = t94 + t95;
+    const real t97 = H[15] * s[3];
+    const real t98 = t96 + t97;
+    const real t99 = c[3] + t98;
+    const real t100 = t91 - t99;
+    const real t101 = motion[3] + t100;
+    const real t102 = t4 * t101;
+    const real t103 = w[2] * t5;
+    const real t104 = w[0] * t20;
+    const real t105 = t103 - t104;
+    const real t106 = H[16] * s[0];
+    const real t107 = H[17] * s[1];
+    const real t108 = t106 + t107;
+    const real t109 = H[18] * s[2];
+    const real t110 = t108 + t109;
+    const real t111 = H[19] * s[3];
+    const real t112 = t110 + t111;
+    const real t113 = c[4] + t112;
+    const real t114 = t105 - t113;
+    const real t115 = motion[4] + t114;
+    const real t116 = t11 * t115;
+    const real t117 = t102 + t116;
+    const real t118 = w[0] * t12;
+    const real t119 = w[1] * t5;
+    const real t120 = t118 - t119;
+    const real t121 = H[20] * s[0];
+    const real t122 = H[21] * s[1];
+    const real t123 = t121 + t122;
+    const real t124 = H[22] * s[2];
+    const real t125 = t123 + t124;
+    const real t126 = H[23] * s[3];
+    const real t127 = t125 + t126;
+    const real t128 = c[5] + t127;
+    const real t129 = t120 - t128;
+    const real t130 = motion[5] + t129;
+    const real t131 = t19 * t130;
+    const real t132 = t117 + t131;
+    const real t133 = t88 - t132;
+    const real t134 = t85 + t133;
+    B[3] = t134;
+    const real t135 = H[16] * d_s[0];
+    const real t136 = H[17] * d_s[1];
+    const real t137 = t135 + t136;
+    const real t138 = H[18] * d_s[2];
+    const real t139 = t137 + t138;
+    const real t140 = H[19] * d_s[3];
+    const real t141 = t139 + t140;
+    const real t142 = s[0] * d_H[16];
+    const real t143 = s[1] * d_H[17];
+    const real t144 = t142 + t143;
+    const real t145 = s[2] * d_H[18];
+    const real t146 = t144 + t145;
+    const real t147 = s[3] * d_H[19];
+    const real t148 = t146 + t147;
+    const real t149 = t141 + t148;
+    const real t150 = d_c[4] + t149;
+    const real t151 = d_w[0] * t20;
+    const real t152 = d_w[2] * t5;
+    const real t153 = t151 - t152;
+    const real t154 = t150 + t153;
+    const real t155 = w[2] * t22;
+    const real t156 = w[0] * t64;
+    const real t157 = t155 - t156;
+    const real t158 = t28 * t101;
+    const real t159 = t34 * t115;
+    const real t160 = t158 + t159;
+    const real t161 = t41 * t130;
+    const real t162 = t160 + t161;
+    const real t163 = t157 - t162;
+    const real t164 = t154 + t163;
+    B[4] = t164;
+    const real t165 = H[20] * d_s[0];
+    const real t166 = H[21] * d_s[1];
+    const real t167 = t165 + t166;
+    const real t168 = H[22] * d_s[2];
+    const real t169 = t167 + t168;
+    const real t170 = H[23] * d_s[3];
+    const real t171 = t169 + t170;
+    const real t172 = s[0] * d_H[20];
+    const real t173 = s[1] * d_H[21];
+    const real t174 = t172 + t173;
+    const real t175 = s[2] * d_H[22];
+    const real t176 = t174 + t175;
+    const real t177 = s[3] * d_H[23];
+    const real t178 = t176 + t177;
+    const real t179 = t171 + t178;
+    const real t180 = d_c[5] + t179;
+    const real t181 = d_w[1] * t5;
+    const real t182 = d_w[0] * t12;
+    const real t183 = t181 - t182;
+    const real t184 = t180 + t183;
+    const real t185 = w[0] * t43;
+    const real t186 = w[1] * t22;
+    const real t187 = t185 - t186;
+    const real t188 = t49 * t101;
+    const real t189 = t55 * t115;
+    const real t190 = t188 + t189;
+    const real t191 = t62 * t130;
+    const real t192 = t190 + t191;
+    const real t193 = t187 - t192;
+    const real t194 = t184 + t193;
+    B[5] = t194;
+    const real t195 = H[0] * d_s[0];
+    const real t196 = H[1] * d_s[1];
+    const real t197 = t195 + t196;
+    const real t198 = H[2] * d_s[2];
+    const real t199 = t197 + t198;
+    const real t200 = H[3] * d_s[3];
+    const real t201 = t199 + t200;
+    const real t202 = s[0] * d_H[0];
+    const real t203 = s[1] * d_H[1];
+    const real t204 = t202 + t203;
+    const real t205 = s[2] * d_H[2];
+    const real t206 = t204 + t205;
+    const real t207 = s[3] * d_H[3];
+    const real t208 = t206 + t207;
+    const real t209 = t201 + t208;
+    const real t210 = d_c[0] + t209;
+    const real t211 = d_v[2] * t12;
+    const real t212 = 2.0 * t211;
+    const real t213 = d_v[1] * t20;
+    const real t214 = 2.0 * t213;
+    const real t215 = t212 - t214;
+    const real t216 = t210 + t215;
+    const real t217 = R[1] * d_d[0];
+    const real t218 = R[4] * d_d[1];
+    const real t219 = t217 + t218;
+    const real t220 = R[7] * d_d[2];
+    const real t221 = t219 + t220;
+    const real t222 = t5 * t12;
+    const real t223 = t221 * t222;
+    const real t224 = R[0] * d_d[0];
+    const real t225 = R[3] * d_d[1];
+    const real t226 = t224 + t225;
+    const real t227 = R[6] * d_d[2];
+    const real t228 = t226 + t227;
+    const real t229 = t12 * t12;
+    const real t230 = t20 * t20;
+    const real t231 = t229 + t230;
+    const real t232 = t228 * t231;
+    const real t233 = t223 - t232;
+    const real t234 = R[2] * d_d[0];
+    const real t235 = R[5] * d_d[1];
+    const real t236 = t234 + t235;
+    const real t237 = R[8] * d_d[2];
+    const real t238 = t236 + t237;
+    const real t239 = t5 * t20;
+    const real t240 = t238 * t239;
+    const real t241 = t233 + t240;
+    const real t242 = v[1] * 2.0;
+    const real t243 = t64 * t242;
+    const real t244 = v[2] * 2.0;
+    const real t245 = t43 * t244;
+    const real t246 = t243 - t245;
+    const real t247 = t238 * t115;
+    const real t248 = t221 * t130;
+    const real t249 = t247 - t248;
+    const real t250 = t246 + t249;
+    const real t251 = t241 + t250;
+    const real t252 = v[1] * t20;
+    const real t253 = t252 * 2.0;
+    const real t254 = v[2] * t12;
+    const real t255 = 2.0 * t254;
+    const real t256 = t253 - t255;
+    const real t257 = H[0] * s[0];
+    const real t258 = H[1] * s[1];
+    const real t259 = t257 + t258;
+    const real t260 = H[2] * s[2];
+    const real t261 = t259 + t260;
+    const real t262 = H[3] * s[3];
+    const real t263 = t261 + t262;
+    const real t264 = c[0] + t263;
+    const real t265 = t256 - t264;
+    const real t266 = motion[6] + t265;
+    const real t267 = t4 * t266;
+    const real t268 = v[2] * t5;
+    const real t269 = 2.0 * t268;
+    const real t270 = v[0] * t20;
+    const real t271 = 2.0 * t270;
+    const real t272 = t269 - t271;
+    const real t273 = H[4] * s[0];
+    const real t274 = H[5] * s[1];
+    const real t275 = t273 + t274;
+    const real t276 = H[6] * s[2];
+    const real t277 = t275 + t276;
+    const real t278 = H[7] * s[3];
+    const real t279 = t277 + t278;
+    const real t280 = c[1] + t279;
+    const real t281 = t272 - t280;
+    const real t282 = motion[7] + t281;
+    const real t283 = t11 * t282;
+    const real t284 = t267 + t283;
+    const real t285 = v[0] * t12;
+    const real t286 = 2.0 * t285;
+    const real t287 = v[1] * t5;
+    const real t288 = 2.0 * t287;
+    const real t289 = t286 - t288;
+    const real t290 = H[8] * s[0];
+    const real t291 = H[9] * s[1];
+    const real t292 = t290 + t291;
+    const real t293 = H[10] * s[2];
+    const real t294 = t292 + t293;
+    const real t295 = H[11] * s[3];
+    const real t296 = t294 + t295;
+    const real t297 = c[2] + t296;
+    const real t298 = t289 - t297;
+    const real t299 = motion[8] + t298;
+    const real t300 = t19 * t299;
+    const real t301 = t284 + t300;
+    const real t302 = t251 - t301;
+    const real t303 = t216 + t302;
+    B[6] = t303;
+    const real t304 = H[4] * d_s[0];
+    const real t305 = H[5] * d_s[1];
+    const real t306 = t304 + t305;
+    const real t307 = H[6] * d_s[2];
+    const real t308 = t306 + t307;
+    const real t309 = H[7] * d_s[3];
+    const real t310 = t308 + t309;
+    const real t311 = s[0] * d_H[4];
+    const real t312 = s[1] * d_H[5];
+    const real t313 = t311 + t312;
+    const real t314 = s[2] * d_H[6];
+    const real t315 = t313 + t314;
+    const real t316 = s[3] * d_H[7];
+    const real t317 = t315 + t316;
+    const real t318 = t310 + t317;
+    const real t319 = d_c[1] + t318;
+    const real t320 = d_v[0] * t20;
+    const real t321 = 2.0 * t320;
+    const real t322 = d_v[2] * t5;
+    const real t323 = 2.0 * t322;
+    const real t324 = t321 - t323;
+    const real t325 = t319 + t324;
+    const real t326 = t228 * t222;
+    const real t327 = t5 * t5;
+    const real t328 = t230 + t327;
+    const real t329 = t221 * t328;
+    const real t330 = t326 - t329;
+    const real t331 = t12 * t20;
+    const real t332 = t238 * t331;
+    const real t333 = t330 + t332;
+    const real t334 = t22 * t244;
+    const real t335 = v[0] * 2.0;
+    const real t336 = t64 * t335;
+    const real t337 = t334 - t336;
+    const real t338 = t228 * t130;
+    const real t339 = t238 * t101;
+    const real t340 = t338 - t339;
+    const real t341 = t337 + t340;
+    const real t342 = t333 + t341;
+    const real t343 = t28 * t266;
+    const real t344 = t34 * t282;
+    const real t345 = t343 + t344;
+    const real t346 = t41 * t299;
+    const real t347 = t345 + t346;
+    const real t348 = t342 - t347;
+    const real t349 = t325 + t348;
+    B[7] = t349;
+    const real t350 = H[8] * d_s[0];
+    const real t351 = H[9] * d_s[1];
+    const real t352 = t350 + t351;
+    const real t353 = H[10] * d_s[2];
+    const real t354 = t352 + t353;
+    const real t355 = H[11] * d_s[3];
+    const real t356 = t354 + t355;
+    const real t357 = s[0] * d_H[8];
+    const real t358 = s[1] * d_H[9];
+    const real t359 = t357 + t358;
+    const real t360 = s[2] * d_H[10];
+    const real t361 = t359 + t360;
+    const real t362 = s[3] * d_H[11];
+    const real t363 = t361 + t362;
+    const real t364 = t356 + t363;
+    const real t365 = d_c[2] + t364;
+    const real t366 = d_v[1] * t5;
+    const real t367 = 2.0 * t366;
+    const real t368 = d_v[0] * t12;
+    const real t369 = 2.0 * t368;
+    const real t370 = t367 - t369;
+    const real t371 = t365 + t370;
+    const real t372 = t228 * t239;
+    const real t373 = t221 * t331;
+    const real t374 = t372 + t373;
+    const real t375 = t229 + t327;
+    const real t376 = t238 * t375;
+    const real t377 = t374 - t376;
+    const real t378 = t43 * t335;
+    const real t379 = t22 * t242;
+    const real t380 = t378 - t379;
+    const real t381 = t221 * t101;
+    const real t382 = t228 * t115;
+    const real t383 = t381 - t382;
+    const real t384 = t380 + t383;
+    const real t385 = t377 + t384;
+    const real t386 = t49 * t266;
+    const real t387 = t55 * t282;
+    const real t388 = t386 + t387;
+    const real t389 = t62 * t299;
+    const real t390 = t388 + t389;
+    const real t391 = t385 - t390;
+    const real t392 = t371 + t391;
+    B[8] = t392;
+    const real t393 = f[0] * t4;
+    const real t394 = f[1] * t11;
+    const real t395 = t393 + t394;
+    const real t396 = f[2] * t19;
+    const real t397 = t395 + t396;
+    G[0] = t397;
+    const real t398 = f[0] * t28;
+    const real t399 = f[1] * t34;
+    const real t400 = t398 + t399;
+    const real t401 = f[2] * t41;
+    const real t402 = t400 + t401;
+    G[1] = t402;
+    const real t403 = f[0] * t49;
+    const real t404 = f[1] * t55;
+    const real t405 = t403 + t404;
+    const real t406 = f[2] * t62;
+    const real t407 = t405 + t406;
+    G[2] = t407;
+    const real t408 = f[3] * t4;
+    const real t409 = f[4] * t11;
+    const real t410 = t408 + t409;
+    const real t411 = f[5] * t19;
+    const real t412 = t410 + t411;
+    const real t413 = f[2] * t221;
+    const real t414 = f[1] * t238;
+    const real t415 = t413 - t414;
+    const real t416 = t412 + t415;
+    G[3] = t416;
+    const real t417 = f[3] * t28;
+    const real t418 = f[4] * t34;
+    const real t419 = t417 + t418;
+    const real t420 = f[5] * t41;
+    const real t421 = t419 + t420;
+    const real t422 = f[0] * t238;
+    const real t423 = f[2] * t228;
+    const real t424 = t422 - t423;
+    const real t425 = t421 + t424;
+    G[4] = t425;
+    const real t426 = f[3] * t49;
+    const real t427 = f[4] * t55;
+    const real t428 = t426 + t427;
+    const real t429 = f[5] * t62;
+    const real t430 = t428 + t429;
+    const real t431 = f[1] * t228;
+    const real t432 = f[0] * t221;
+    const real t433 = t431 - t432;
+    const real t434 = t430 + t433;
+    G[5] = t434;
+    const real t435 = f[0] * d_H[0];
+    const real t436 = f[1] * d_H[4];
+    const real t437 = t435 + t436;
+    const real t438 = f[2] * d_H[8];
+    const real t439 = t437 + t438;
+    const real t440 = f[3] * d_H[12];
+    const real t441 = t439 + t440;
+    const real t442 = f[4] * d_H[16];
+    const real t443 = t441 + t442;
+    const real t444 = f[5] * d_H[20];
+    const real t445 = t443 + t444;
+    d_tau[0] = t445;
+    const real t446 = f[0] * d_H[1];
+    const real t447 = f[1] * d_H[5];
+    const real t448 = t446 + t447;
+    const real t449 = f[2] * d_H[9];
+    const real t450 = t448 + t449;
+    const real t451 = f[3] * d_H[13];
+    const real t452 = t450 + t451;
+    const real t453 = f[4] * d_H[17];
+    const real t454 = t452 + t453;
+    const real t455 = f[5] * d_H[21];
+    const real t456 = t454 + t455;
+    d_tau[1] = t456;
+    const real t457 = f[0] * d_H[2];
+    const real t458 = f[1] * d_H[6];
+    const real t459 = t457 + t458;
+    const real t460 = f[2] * d_H[10];
+    const real t461 = t459 + t460;
+    const real t462 = f[3] * d_H[14];
+    const real t463 = t461 + t462;
+    const real t464 = f[4] * d_H[18];
+    const real t465 = t463 + t464;
+    const real t466 = f[5] * d_H[22];
+    const real t467 = t465 + t466;
+    d_tau[2] = t467;
+    const real t468 = f[0] * d_H[3];
+    const real t469 = f[1] * d_H[7];
+    const real t470 = t468 + t469;
+    const real t471 = f[2] * d_H[11];
+    const real t472 = t470 + t471;
+    const real t473 = f[3] * d_H[15];
+    const real t474 = t472 + t473;
+    const real t475 = f[4] * d_H[19];
+    const real t476 = t474 + t475;
+    const real t477 = f[5] * d_H[23];
+    const real t478 = t476 + t477;
+    d_tau[3] = t478;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_column_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_column_inputs[] = {
+    {"R", 9, "", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"s", 4, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+    {"d_H", 24, "", 0, 0},
+    {"d_v", 3, "", 0, 0},
+    {"d_w", 3, "", 0, 0},
+    {"d_c", 6, "", 0, 0},
+    {"d_s", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"d_tau", 4, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -4098,6 +4664,18 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_column",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_column,
+        .call = mstmm_sweep_generic4_tangent_column_call,
+        .n_inputs = 15,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic4_tangent_column_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_column_outputs,
+        .ir_hash = "03a49af94272b4025d78d298dac651d824f350a3dd0c726e7ba5bd2fe22839e7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
         .call = mstmm_sweep_generic4_forward_slope_call,
@@ -4127,7 +4705,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "63c74c3d5a20803d684132ee449821e1e396d5b2320e462f5eeef3587931fec1",
+    .hash = "ca4c70b8577087e058165b8f1c524eed9b80c77ac8f816b5b558784c5953de35",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4137,6 +4715,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 10,
+    .n_kernels = 11,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -108,6 +108,16 @@ mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[] = {
     mstmm_sweep_generic6_effort_slope,
 };
 
+mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[] = {
+    mstmm_sweep_generic0_tangent_column,
+    mstmm_sweep_generic1_tangent_column,
+    mstmm_sweep_generic2_tangent_column,
+    mstmm_sweep_generic3_tangent_column,
+    mstmm_sweep_generic4_tangent_column,
+    mstmm_sweep_generic5_tangent_column,
+    mstmm_sweep_generic6_tangent_column,
+};
+
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)62 * n + 4 * (int64_t)n * n; }
@@ -1638,8 +1648,8 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
 /* Unknowns of a body eliminated, the rest carried to the parent. */
 static int mstmm_at_tangent_condense(mstmm_state *state, int index)
 {
-    real S_c[54];
     real d_tau[6];
+    real S_c[54];
     real tau[6];
     real d_required[6];
     real free[6];
@@ -1667,27 +1677,20 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             mstmm_aim_mode(state, modal, c);
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            for (int j = 0; j < n; j++)
-                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
-            mstmm_generic_forward_slope(nu,
-                .Rt = body->connection, .ro = body->connection + 9,
-                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
-                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+            mstmm_generic_tangent_column(nu,
+                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
                 .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
-                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
+                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
                 .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
-                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
-                .d_motion = d_block + MSTMM_BLOCK_MOTION);
-            memcpy(bend + MSTMM_BEND_B(n) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
-            mstmm_frames_tangent_turned(
-                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
-                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
-                .G = bend + MSTMM_BEND_G(n) + 6 * c);
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+                .B = bend + MSTMM_BEND_B(n) + 9 * c, .G = bend + MSTMM_BEND_G(n) + 6 * c,
+                .d_tau = d_tau);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -1733,29 +1736,18 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             code = mstmm_at_hinge_motion_slope(state, index);
             if (code) return code;
             memcpy(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c, (size_t)(nu) * sizeof(real));
-            mstmm_generic_forward_slope(nu,
-                .Rt = body->connection, .ro = body->connection + 9,
-                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
-                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+            mstmm_generic_tangent_column(nu,
+                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
                 .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
-                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
+                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
                 .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
-                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
-                .d_motion = d_block + MSTMM_BLOCK_MOTION);
-            memcpy(tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
-            mstmm_frames_tangent_turned(
-                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
-                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
-                .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c);
-            mstmm_generic_effort_slope(nu,
-                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E,
-                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_f = mstmm_zeros,
-                .d_tau = d_tau);
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+                .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .d_tau = d_tau);
             for (int k = 0; k < body->nu; k++) {
                 mstmm_frames_driven_effort_slope(
                     .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
@@ -1801,27 +1793,20 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             mstmm_aim_mode(state, modal, c);
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            for (int j = 0; j < n; j++)
-                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
-            mstmm_generic_forward_slope(nu,
-                .Rt = body->connection, .ro = body->connection + 9,
-                .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
-                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+            mstmm_generic_tangent_column(nu,
+                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
                 .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
-                .motion_I = parent + MSTMM_BLOCK_MOTION, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
+                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
                 .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_motion_I = mstmm_zeros,
-                .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
-                .d_motion = d_block + MSTMM_BLOCK_MOTION);
-            memcpy(port + MSTMM_PORT_B(n) + 9 * c, d_block + MSTMM_BLOCK_MOTION, (size_t)(9) * sizeof(real));
-            mstmm_frames_tangent_turned(
-                .Rc = block + MSTMM_BLOCK_R, .d_Rc = d_block + MSTMM_BLOCK_R,
-                .d_r = d_block + MSTMM_BLOCK_SHIFT, .f = block + MSTMM_BLOCK_E,
-                .G = port + MSTMM_PORT_G(n) + 6 * c);
+                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+                .B = port + MSTMM_PORT_B(n) + 9 * c, .G = port + MSTMM_PORT_G(n) + 6 * c,
+                .d_tau = d_tau);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),

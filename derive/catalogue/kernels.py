@@ -33,7 +33,7 @@ FRAME_DERIVATIONS = (
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.driven_effort, frames.speed_power, frames.length, frames.turned,
     frames.classical_body, frames.state_deviation,
-    tangent.tangent_carry, tangent.tangent_moved, tangent.tangent_turned,
+    tangent.tangent_carry, tangent.tangent_moved,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
@@ -114,6 +114,7 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("factor", columns.factor(nu)),
         Kernel("push", columns.push(nu)),
         Kernel("answer", columns.answer(nu)),
+        Kernel("tangent_column", tangent.tangent_column(nu)),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )

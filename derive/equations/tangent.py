@@ -116,29 +116,73 @@ def tangent_moved() -> Derivation:
     )
 
 
-def tangent_turned() -> Derivation:
-    """G: what the change of a hinge makes of a load that is carried, felt at P in body axes."""
-    turned = Quantity(symbol("d_Rc", 3, 3), "", "slope of Rc")
-    shifted = Quantity(symbol("d_r", 3), "m", "slope of r")
-    load = Quantity(symbol("f", 6), "N, N*m", "load at P, body axes")
-    out = Quantity(symbol("G", 6), "", "column of G")
-    force, moment = part(load.symbol, 0), part(load.symbol, 3)
-    axes = symbol("A", 3, 3)
-    lever = vector("d_lever", 3)
-    return Derivation(
-        "frames",
-        "change of a load by the hinge that carries it",
-        (R, turned, shifted, load),
-        (out,),
-        (
-            Equation("Rc^T dRc", axes, R.symbol.T * turned.symbol),
-            Equation("Rc^T dr", lever, R.symbol.T * shifted.symbol),
-            Equation(
-                "X^-T dX^T f",
-                out.symbol,
-                stack(axes * force, axes * moment + tilde(column(lever)) * force),
+def tangent_column(nu: int) -> Derivation:
+    """B, G and the load's share of W along one direction of a hinge, seen in body axes.
+
+    With theta~ = R^T dR the turn of the body along the direction, d its place, and the motion of Q
+    in body axes w_Q = w - w_rel and so on, which the body's own motion gives back:
+
+        B = [dw_rel - theta~ w_Q;
+             dc_w - theta~ wd_Q - (theta~ w_Q) x w_rel + w_Q x dw_rel;
+             dc_v - theta~ a_Q + (wd_Q~ + w_Q~ w_Q~) R^T dd - 2 (theta~ w_Q) x v + 2 w_Q x dv]
+        G = [theta~ f; theta~ m + (R^T dd) x f],      dtau = dH^T [f; m]
+    """
+    r, h, s = symbol("R", 3, 3), symbol("H", 6, nu), symbol("s", nu)
+    v, w, c, motion, load = (symbol(n, k) for n, k in (
+        ("v", 3), ("w", 3), ("c", 6), ("motion", 9), ("f", 6)
+    ))  # fmt: skip
+    d_r, d_d, d_h = symbol("d_R", 3, 3), symbol("d_d", 3), symbol("d_H", 6, nu)
+    d_v, d_w, d_c, d_s = symbol("d_v", 3), symbol("d_w", 3), symbol("d_c", 6), symbol("d_s", nu)
+    turn, place = symbol("A", 3, 3), symbol("x", 3)
+    carrier, rate, seen, bias = (symbol(n, k) for n, k in (
+        ("w_Q", 3), ("wd_Q", 3), ("a_Q", 3), ("c_s", 6)
+    ))  # fmt: skip
+    d_carrier, d_bias = symbol("dw_Q", 3), symbol("dc_s", 6)
+    relative, own = tilde(column(w)), tilde(column(carrier))
+    force, moment = part(load, 0), part(load, 3)
+    equations = (
+        Equation("theta~ = R^T dR", turn, r.T * d_r),
+        Equation("R^T dd", place, r.T * d_d),
+        Equation("angular velocity of Q", carrier, part(motion, 0) - column(w)),
+        Equation("own acceleration", bias, c + h * s if nu else c),
+        Equation("its slope", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
+        Equation(
+            "angular acceleration of Q", rate, part(motion, 3) - own * column(w) - part(bias, 3)
+        ),
+        Equation(
+            "acceleration of the point of Q's carrier at P",
+            seen,
+            part(motion, 6) - 2 * own * column(v) - part(bias, 0),
+        ),
+        Equation("slope of w_Q", d_carrier, -turn * carrier),
+        Equation(
+            "B",
+            symbol("B", 9),
+            stack(
+                d_w + d_carrier,
+                part(d_bias, 3) - turn * rate - relative * d_carrier + own * column(d_w),
+                part(d_bias, 0)
+                - turn * seen
+                + tilde(column(rate)) * place
+                + own * (own * place)
+                - 2 * tilde(column(v)) * d_carrier
+                + 2 * own * column(d_v),
             ),
         ),
+        Equation(
+            "G",
+            symbol("G", 6),
+            stack(turn * force, turn * moment + tilde(column(place)) * force),
+        ),
+        Equation("dH^T f", symbol("d_tau", nu), d_h.T * load),
+    )
+    given = (r, h, s, v, w, c, motion, load, d_r, d_d, d_h, d_v, d_w, d_c, d_s)
+    return Derivation(
+        f"generic{nu}",
+        f"a direction of a hinge with {nu} speeds",
+        tuple(map(Quantity, given)),
+        (Quantity(symbol("B", 9)), Quantity(symbol("G", 6)), Quantity(symbol("d_tau", nu))),
+        equations if nu else equations[:-1],
         sources=SOURCES,
     )
 

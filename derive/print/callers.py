@@ -57,7 +57,7 @@ POINTED = {
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
-    "forward_slope", "effort_slope",
+    "forward_slope", "effort_slope", "tangent_column",
 )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ for that body alone with its parent at rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
@@ -108,36 +107,38 @@ def _still(step: Call, *ports: str) -> Sloped:
     return Sloped(step.when, step.kernel + SLOPE, step.ports, still=ports)
 
 
-def _carried(matrices: str, effort: Iterable[Step], to: str, count: str) -> tuple[Step, ...]:
-    """A direction's rows of B, G and W, the body being behind its hinge or section."""
-    return (
-        _still(_ACROSS, "motion_I"),
-        Move(to=f"{matrices}.B[9 * c]", source=D + "body.motion", count="9"),
-        call("frames.tangent_turned", Rc="body.R", d_Rc=D + "body.R", d_r=D + "body.r", f="body.e",
-             G=f"{matrices}.G[6 * c]"),
-        *effort,
-        Move(to=f"{matrices}.W[{count} * c]", source=to, count=count),
-    )  # fmt: skip
+#: What the derivatives of a hinge or of a section are made into, and the numbers that go with them.
+_DIRECTION = {
+    **{name: f"hinge.{name}" for name in ("R", "H", "v", "w", "c")},
+    **{f"d_{name}": f"{D}hinge.{name}" for name in ("R", "d", "H", "v", "w", "c")},
+    "s": "body.s", "d_s": D + "body.s", "motion": "body.motion", "f": "body.e",
+}  # fmt: skip
 
 
-_FELT_BY_MODES = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
-                      tau="modes.felt")  # fmt: skip
+def _column(matrices: str) -> Call:
+    """A direction's row of B and of G, and what the hinge's efforts change by."""
+    return call("generic{nu}.tangent_column", **_DIRECTION, B=f"{matrices}.B[9 * c]",
+                G=f"{matrices}.G[6 * c]", d_tau=D + "local.tau")  # fmt: skip
 
 
 def _section(matrices: str) -> tuple[Step, ...]:
+    """A section has no speeds: its rows are those of the modes."""
+    felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
+                tau="modes.felt")  # fmt: skip
     return (
         Along(
             of="modes",
             steps=(
                 Do(whole=sloped(SECTION_MOTION)),
+                _column(matrices),
                 Copy(to=D + "modes.e_f"),
-                *_carried(matrices, (_still(_FELT_BY_MODES, "e"),), D + "modes.felt", "n"),
+                _still(felt, "e"),
+                Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
             ),
         ),
     )
 
 
-_FELT_BY_HINGE = call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau")
 _DRIVEN = call("frames.driven_effort", felt="local.tau[k]", J="body.rotor[k]",
                udot="body.given[k]", tau="body.tau[k]", tau_d="local.required[k]")  # fmt: skip
 _HINGE = (
@@ -147,16 +148,10 @@ _HINGE = (
             Copy(to=D + "body.s", source=D + "body.given"),
             Do(whole=sloped(_HINGE_MOTION)),
             Move(to=D + "body.tau", source="tangent.laws[nu * c]", count="nu"),
-            *_carried(
-                "tangent",
-                (
-                    _still(_FELT_BY_HINGE, "f"),
-                    EachSpeed(steps=(Sloped("", _DRIVEN.kernel + SLOPE, _DRIVEN.ports),)),
-                    Pick(to="local.free", source=D + "local.required"),
-                ),
-                "local.free",
-                "speeds",
-            ),
+            _column("tangent"),
+            EachSpeed(steps=(Sloped("", _DRIVEN.kernel + SLOPE, _DRIVEN.ports),)),
+            Pick(to="local.free", source=D + "local.required"),
+            Move(to="tangent.W[speeds * c]", source="local.free", count="speeds"),
         ),
     ),
 )

@@ -71,6 +71,14 @@ def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
             yield from _assignments(statement.body)
 
 
+def reads(kernel: KernelIR, port: str) -> bool:
+    """Whether any statement reads the port."""
+    operands = [operand for statement in assignments(kernel) for operand in statement.args]
+    operands += [s.value for s in kernel.statements if isinstance(s, (Store, Sum))]
+    operands += [s.condition for s in kernel.statements if isinstance(s, Guard)]
+    return any(isinstance(x, Element) and x.port == port for x in operands)
+
+
 def check(kernel: KernelIR) -> None:
     """Refuse what no backend could run, with a ValueError that names kernel and place.
 

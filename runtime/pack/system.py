@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array, Integers
 from mstmm.ir import KernelIR
+from mstmm.ir.kernel import reads
 from mstmm.ir.structure import Key
 
 from .layout import Group
@@ -233,6 +234,14 @@ class System:
     def dragged(self) -> bool:
         """Whether the medium drags on a flexible body."""
         return any(one.modal is not None and one.modal.drag is not None for one in self.distinct)
+
+    @property
+    def steady(self) -> bool:
+        """Whether nothing goes by time: no drive, no expression of t, no element that may read it."""
+        kernels = [self.values, *(force.effort for force in self.forces)]
+        timed = any(kernel is not None and reads(kernel, "t") for kernel in kernels)
+        own = any(force.element != ("force", "spring") for force in self.forces)
+        return not (self.driven or timed or own)
 
     @property
     def n_values(self) -> int:

@@ -79,6 +79,7 @@ class SceneSystem:
         known, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
         stage.workspace, stage.work = run.workspace, engine.pointer(work)
         run.base, run.stage, run.known = base.record, stage, engine.pointer(known)
+        run.steady = int(engine.packed.system.steady)
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
         self.kept += [base, stage, work, known, coordinates]

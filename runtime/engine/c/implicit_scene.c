@@ -22,11 +22,12 @@ static int residual(void *context, double t, const double *y, const double *a, d
     return failed(run, run->stage, code);
 }
 
-/* The point at which the equations are linearised. */
+/* The point at which the equations are linearised, unless it is there already. */
 static int at_base(mstmm_scene_run *run, double t, const double *y, const double *a)
 {
-    return failed(run, run->base, mstmm_residual(run->base, t, y, y + run->model->nq, a,
-                                                 run->known, NULL));
+    const real *u = y + run->model->nq;
+    if (mstmm_residual_is_at(run->base, t, y, u, a)) return 0;
+    return failed(run, run->base, mstmm_residual(run->base, t, y, u, a, run->known, NULL));
 }
 
 static int residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
@@ -34,6 +35,8 @@ static int residual_rate(void *context, double t, const double *y, const double 
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     real *still = run->known;
+    memset(r_t, 0, (size_t)model->nu * sizeof(real));
+    if (run->steady) return 0;
     const int code = at_base(run, t, y, a);
     if (code) return code;
     memset(still, 0, (size_t)(model->nq + 2 * model->nu) * sizeof(real));

@@ -209,6 +209,7 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
         memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
     }
     remember_twists(run, y);
+    if (run->base) run->base->known = 0;
     return 0;
 }
 
@@ -265,6 +266,7 @@ static int scene_fire(void *context, int event, double t, double *y)
     (void)t;
     (void)y;
     if (action->action == MSTMM_FIRE_RESTART) run->memory[action->release] = 1;
+    if (run->base) run->base->known = 0;
     return action->action;
 }
 

@@ -71,6 +71,7 @@ typedef struct {
      * NULL: not prepared */
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
+    int steady;       /* nothing in the scene goes by time */
     int *coordinates; /* nu: see mstmm_implicit */
     real *known;      /* nq + 3 nu: scratch */
 } mstmm_scene_run;

@@ -122,12 +122,28 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
     state.balance = balance;
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
+    at->known = 0;
     const int code = mstmm_run_inverse_dynamics(&state);
     if (code) return code;
+    at->known = 1;
     if (balance) balance->power += power_of_imposed(&state, parts.required);
     memcpy(r, parts.required, (size_t)model->nu * sizeof(real));
     without_imposed(model, at->memory, r);
     return 0;
+}
+
+static int same(const real *one, const real *other, int n)
+{
+    return !memcmp(one, other, (size_t)n * sizeof(real));
+}
+
+int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const real *u,
+                         const real *a)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    return at->known && !(at->t < t) && !(at->t > t) && same(parts.q, q, model->nq)
+           && same(parts.u, u, model->nu) && same(parts.a, a, model->nu);
 }
 
 /* The state of the last residual: driven coordinates have been filled in. */

@@ -25,6 +25,7 @@ typedef struct {
     int n_coupled;        /* numbers that they change by */
     real *answers;        /* n_coupled x nu: to one of each */
     real *closure;        /* n_coupled x (2 n_coupled + 3) */
+    int known;            /* there has been a residual since the memory changed */
     real t, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;
@@ -38,6 +39,9 @@ int64_t mstmm_residual_work(const mstmm_model *model);
  * `balance` may be NULL; its power is that of everything that is not stored. */
 int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
                    mstmm_balance *balance);
+/* Is this the state of the last residual, under the same memory? */
+int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const real *u,
+                         const real *a);
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r);
