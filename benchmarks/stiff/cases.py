@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -35,14 +36,14 @@ class Case:
 def _bushed(name: str, count: int, k: float, zeta: float) -> Case:
     damped = {0.0: "undamped", 1.0: "critical"}.get(zeta, f"{100 * zeta:g} %")
     return Case(
-        name, f"{count} rods on bushings, {k:.0e} N/m, {damped}",
+        name, f"{count} rods on bushings, 1e{math.log10(k):g} N/m, {damped}",
         partial(scenes.bushed_rods, count, k, zeta), 1.0,
         tuple(f"rod{i}.tip" for i in range(count)), bushings=(count, k, zeta),
     )  # fmt: skip
 
 
 def _beam(name: str, shapes: int, stiffness: float, zeta: float) -> Case:
-    title = f"falling beam, {shapes} shapes, EI {stiffness:g}, {100 * zeta:g} %"
+    title = f"falling beam, {shapes} shapes, EI {stiffness:g} N m², {100 * zeta:g} %"
     return Case(
         name, title, partial(scenes.falling_beam, shapes, stiffness, zeta), 1.0, ("beam.tip",)
     )
@@ -72,9 +73,9 @@ CASES = {case.name: case for case in (
     _beam("b8-damped", 8, 5e4, 0.01),
     _spun("b4-spun", 4),
     _spun("b8-spun", 8),
-    _arm("c", "arm with stiff drive, friction, stop", True, True),
-    _arm("c-no-stop", "the same without a stop", True, False),
-    _arm("c-no-friction", "the same without friction", False, True),
+    _arm("c", "arm: stiff drive, friction, stop", True, True),
+    _arm("c-no-stop", "arm: stiff drive, friction", True, False),
+    _arm("c-no-friction", "arm: stiff drive, stop", False, True),
     Case("d-half", "half car on bushings", scenes.half_car, 1.0,
          ("car.front", "car.rear", "front.tip", "rear.tip")),
     Case("d-quarter", "quarter car on a stiff mount", scenes.quarter_car, 2.0,

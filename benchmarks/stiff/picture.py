@@ -36,12 +36,12 @@ def draw(record: dict[str, Any], path: Path) -> None:
     results = record["results"]
     columns = min(COLUMNS, len(results))
     rows = -(-len(results) // columns)
-    height = 2.7 * rows + 1.2  # inches
+    height = 2.7 * rows + 1.0  # inches
     figure, panels = plt.subplots(
         rows, columns, figsize=(3.9 * columns + 0.5, height), sharex=True, squeeze=False
     )
     figure.subplots_adjust(
-        left=0.055 if columns == COLUMNS else 0.13, right=0.99, top=1 - 0.85 / height,
+        left=0.055 if columns == COLUMNS else 0.13, right=0.985, top=1 - 0.65 / height,
         bottom=0.7 / height, wspace=0.17, hspace=0.28,
     )  # fmt: skip
     for axes, result in zip(panels.flat, results, strict=False):
@@ -76,7 +76,7 @@ def _panel(axes: Any, result: dict[str, Any]) -> None:
             axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
     axes.set(xscale="log", yscale="log", xlim=ERRORS)
     axes.xaxis.minorticks_off()
-    axes.set_title(f"{result['case']}: {result['title']}", fontsize=8.5)
+    axes.set_title(result["title"], fontsize=9)
 
 
 def _lowest(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
