@@ -1699,28 +1699,28 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_no_mode(state, modal);
-        code = mstmm_tangent_node_own(
+        code = mstmm_judged(state, mstmm_tangent_node_own(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
             .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
             .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n));
+            .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal && !body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_tangent_node_own(
+        code = mstmm_judged(state, mstmm_tangent_node_own(
             .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
             .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
             .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n));
+            .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal) {
@@ -1764,7 +1764,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         for (int k = 0; k < speeds; k++)
             for (int row = 0; row < 6; row++)
                 (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
-        code = mstmm_tangent_node(
+        code = mstmm_judged(state, mstmm_tangent_node(
             .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
             .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
@@ -1774,7 +1774,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq),
             .right = tangent + MSTMM_TANGENT_RIGHT(body->nu, body->nq),
             .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), .S_c = S_c,
-            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq));
+            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq)));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
         memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
     }
@@ -1873,7 +1873,6 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
     const int speeds = mstmm_free_speeds(state, body, columns);
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-    int code;
     if (mstmm_idle(state, body)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -1882,12 +1881,11 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         real *laid = section ? state->workspace + section->place : NULL;
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        code = mstmm_tangent_push(
+        mstmm_tangent_push(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
         memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
     }
     if (body->modal && !body->section) {
@@ -1895,12 +1893,11 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        code = mstmm_tangent_push(
+        mstmm_tangent_push(
             .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
         memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
     }
     if (!body->section && speeds) {
@@ -1908,14 +1905,13 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         for (int k = 0; k < speeds; k++)
             rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
-        code = mstmm_tangent_push(
+        mstmm_tangent_push(
             .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
             .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
             .e_f = rows, .rest = tangent + MSTMM_TANGENT_REST(body->nu, body->nq),
             .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .e_c = e_c,
             .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
         memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
     }
     if (body->section && !body->section->inward) {

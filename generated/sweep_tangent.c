@@ -79,13 +79,14 @@ int mstmm_solve_ldl(
 }
 
 /* x = a^-1 b by LU with row exchange; sizes as above.  `work` (n x n) keeps the factors.  Returns 1
- * if a pivot is not above relative_pivot times the magnitude of its column in a (NaN included),
- * else 0. */
+ * if a pivot is not above relative_pivot times the magnitude of its column in a (NaN included), 2 if
+ * the determinant is negative, else 0. */
 static inline __attribute__((always_inline))
 int mstmm_solve_lu(
     int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
     real *restrict work, real relative_pivot)
 {
+    int negative = 0;
     for (int i = 0; i < n * n; ++i) work[i] = a[i];
     for (int i = 0; i < n * m; ++i) x[i] = b[i];
 #pragma GCC unroll 4
@@ -94,6 +95,7 @@ int mstmm_solve_lu(
         for (int k = i + 1; k < n; ++k)
             if (fabs(work[best * n + i]) < fabs(work[k * n + i])) best = k;
         if (best != i) {
+            negative = !negative;
             for (int j = i; j < n; ++j) {
                 const real entry = work[i * n + j];
                 work[i * n + j] = work[best * n + j];
@@ -109,6 +111,7 @@ int mstmm_solve_lu(
         for (int k = 0; k < n; ++k) size += fabs(a[k * n + i]);
         const real pivot = work[i * n + i];
         if (!(fabs(pivot) > relative_pivot * size)) return 1;
+        if (pivot < 0) negative = !negative;
         for (int k = i + 1; k < n; ++k) {
             const real factor = work[k * n + i] / pivot;
             for (int j = i + 1; j < n; ++j) work[k * n + j] -= factor * work[i * n + j];
@@ -121,7 +124,7 @@ int mstmm_solve_lu(
             for (int k = i + 1; k < n; ++k) rest -= work[i * n + k] * x[k * m + j];
             x[i * m + j] = rest / work[i * n + i];
         }
-    return 0;
+    return negative ? 2 : 0;
 }
 #endif
 
@@ -518,7 +521,8 @@ int mstmm_sweep_tangent_node_sized(int n, const real *restrict H, const real *re
         right[9 * k + 8] = t320;
     }
     /* a pivot of D vanishes: a motion is undetermined */
-    if (mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13)) return 1;
+    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
+    if (found_gain == 1) return 1;
     real t322 = 0;
     for (int k = 0; k < n; ++k) {
         const real t321 = gain[9 * k] * V[k];
@@ -897,6 +901,7 @@ int mstmm_sweep_tangent_node_sized(int n, const real *restrict H, const real *re
     }
     const real t482 = S[53] - t481;
     S_c[53] = t482;
+    if (found_gain) return 2; /* a negative determinant */
     return 0;
 }
 
@@ -1376,7 +1381,8 @@ int mstmm_sweep_tangent_node_own_sized(int n, const real *restrict H, const real
         right[9 * k + 8] = t360;
     }
     /* a pivot of D vanishes: a motion is undetermined */
-    if (mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13)) return 1;
+    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
+    if (found_gain == 1) return 1;
     real t362 = 0;
     for (int k = 0; k < n; ++k) {
         const real t361 = gain[9 * k] * V[k];
@@ -1755,6 +1761,7 @@ int mstmm_sweep_tangent_node_own_sized(int n, const real *restrict H, const real
     }
     const real t522 = S[53] - t521;
     S_c[53] = t522;
+    if (found_gain) return 2; /* a negative determinant */
     return 0;
 }
 
@@ -2281,7 +2288,8 @@ int mstmm_sweep_tangent_push_sized(int n, const real *restrict H, const real *re
         rest[k] = t12;
     }
     /* a pivot of D vanishes: a motion is undetermined */
-    if (mstmm_solve_lu(n, 1, D, rest, y, work, 1e-13)) return 1;
+    const int found_y = mstmm_solve_lu(n, 1, D, rest, y, work, 1e-13);
+    if (found_y == 1) return 1;
     real t14 = 0;
     for (int k = 0; k < n; ++k) {
         const real t13 = V[k] * y[k];
@@ -2324,6 +2332,7 @@ int mstmm_sweep_tangent_push_sized(int n, const real *restrict H, const real *re
     }
     const real t30 = e[5] + t29;
     e_c[5] = t30;
+    if (found_y) return 2; /* a negative determinant */
     return 0;
 }
 
@@ -2622,7 +2631,9 @@ int mstmm_sweep_tangent_lag_sized(int n, const real *restrict sq, const real *re
         }
     }
     /* a pivot of A vanishes: a motion is undetermined */
-    if (mstmm_solve_lu(n, n, A, one, Q, work, 1e-13)) return 1;
+    const int found_Q = mstmm_solve_lu(n, n, A, one, Q, work, 1e-13);
+    if (found_Q == 1) return 1;
+    if (found_Q) return 2; /* a negative determinant */
     return 0;
 }
 

@@ -132,6 +132,7 @@ class KernelText:
         return {
             "kind": "solve",
             "function": "mstmm_solve_ldl" if solve.symmetric else "mstmm_solve_lu",
+            "negative": not solve.symmetric,
             "columns": "n" if isinstance(width, str) else width,
             "matrix": self.names[solve.matrix],
             "right": self.names[solve.right],

@@ -22,6 +22,7 @@ from mstmm.border.failures import Failed
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
 from mstmm.ir.facts import HingeFacts, facts_to_data
 from mstmm.ir.spec import ElementSpec, Param
+from mstmm.ir.statements import NEGATIVE
 from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
@@ -180,7 +181,14 @@ def _render(name: str, **values: Any) -> str:
     return (
         _environment()
         .get_template(name)
-        .render(abi=abi, fused_abi=fused_abi, tape=_tape_view(), failures=Failed, **values)
+        .render(
+            abi=abi,
+            fused_abi=fused_abi,
+            tape=_tape_view(),
+            failures=Failed,
+            negative=NEGATIVE,
+            **values,
+        )
     )
 
 
@@ -271,6 +279,8 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
         + ([] if kernel.inputs else ["in"])
         + ([] if outputs else ["out"]),
         "statements": statements,
+        "negative": NEGATIVE,
+        "judged": [s["output"] for s in statements if s["kind"] == "solve" and s["negative"]],
         "guards": [
             {"code": s.code, "message": string(s.message)}
             for s in kernel.statements

@@ -206,6 +206,8 @@ class StepText:
             call = call.replace(first, _INTERPRETED[first])
         if not step.fails:
             return [f"{indent}{call};"]
+        if step.fails == "tangent":
+            call = f"mstmm_judged(state, {call})"
         return [f"{indent}code = {call};", *self._failed(step.fails, indent)]
 
     def _first(self, step: Call, callee: Callee) -> str:

@@ -305,7 +305,7 @@ TANGENT_COLUMN = Pass(
 
 def _pushed(matrices: str, size: str, subspace: str, rows: str) -> tuple[Step, ...]:
     return (
-        call("tangent.push", n=size, fails="tangent", H=subspace, V=f"{matrices}.V",
+        call("tangent.push", n=size, H=subspace, V=f"{matrices}.V",
              D=f"{matrices}.D", e=D + "body.e", e_f=rows, rest=f"{matrices}.rest",
              y=f"{matrices}.y", e_c="local.e_c", work=f"{matrices}.work"),
         Copy(to=D + "body.e", source="local.e_c"),

@@ -127,6 +127,11 @@ class Guard:
     message: str
 
 
+#: What C returns behind a whole kernel if a matrix that is not symmetric, of which it is not known
+#: to be positive definite, has a negative determinant: all results are there.
+NEGATIVE = 2
+
+
 @dataclass(frozen=True)
 class Solve:
     """output = A^-1 B for a run-time sized A (n x n), B (n,) or (n, m).

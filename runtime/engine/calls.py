@@ -12,6 +12,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.border.failures import Failed
+from mstmm.ir.statements import NEGATIVE
 
 from ..pack.packed import Packed
 
@@ -204,6 +205,11 @@ class Calls:
         if reason == Failed.TANGENT:
             name = self.hinge_name(element) if element >= 0 else ""
             what = f'hinge "{name}"' if name else "the springs and loads across the tree"
+            if int(failure.code) == NEGATIVE:
+                return (
+                    f"{what} {at}: a motion leaves by itself faster than the step allows (a "
+                    "negative stiffness, or a body that topples or buckles); take a shorter step"
+                )
             return (
                 f"{what} {at}: the equations of an implicit step leave a motion undetermined: no "
                 "inertia, stiffness or damping holds it, or a negative stiffness cancels them; "

@@ -59,22 +59,23 @@ class Tangent:
         self._call("residual_slope", float(d_t), d_q, d_u, d_a, found)
         return found
 
-    def factor(self, s: float, sq: float, kappa: float = 1.0) -> None:
-        """Factor the change of R along du, da = s du, dq = (sq - kappa g_q)^-1 N du, where N u are
-        the rates of the coordinates and g_q their slopes by the coordinates."""
-        self._call("tangent_factor", float(s), float(sq), float(kappa))
+    def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
+        """Factor the change of R along unknowns x: du = rate x, da = s x and
+        dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the coordinates and g_q their
+        slopes by the coordinates."""
+        self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
 
     def solve(self, r: Array) -> Array:
-        """du (nu,) along which R changes by r (nu,)."""
-        du = np.empty(self.nu)
-        self._call("tangent_solve", np.ascontiguousarray(r, float), du)
-        return du
+        """x (nu,) along which R changes by r (nu,)."""
+        x = np.empty(self.nu)
+        self._call("tangent_solve", np.ascontiguousarray(r, float), x)
+        return x
 
-    def coordinates(self, du: Array, rho: Array | None = None) -> Array:
-        """dq (nq,) of a du: sq dq = kappa g_q dq + N du + rho."""
+    def coordinates(self, x: Array, rho: Array | None = None) -> Array:
+        """dq (nq,) of an x: sq dq = kappa g_q dq + N x + rho."""
         dq = np.zeros(self.nq)
         null = self.engine.ffi.NULL
-        self._call("tangent_coordinates", du, null if rho is None else rho, dq)
+        self._call("tangent_coordinates", x, null if rho is None else rho, dq)
         return dq
 
     def _call(self, name: str, *arguments: Any) -> None:

@@ -11,7 +11,8 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
-from ..pack.layout import refuse_dense
+from ..engine.rest_by_sweep import RestBySweep
+from ..engine.tangent import Tangent
 from ..run.system import SceneSystem
 from .sizes import speed_sizes
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Coordinates that a message lists.
 _LISTED = 3
+#: More free speeds than this come to rest by the sweep, without a stiffness matrix.
+_DENSE = 600
 
 
 class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
@@ -38,11 +41,13 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
-    refuse_dense(model.nu, "the stiffness matrix")
     free = free_speeds(model)
     problem = _problem(model, t, free)
     try:
-        found = at_rest(problem, q, tolerance)
+        if len(free) > _DENSE:
+            found = _by_sweep(model, q, t, tolerance)
+        else:
+            found = at_rest(problem, q, tolerance)
     except Undetermined as failure:
         names = _some([model.layout.u_name(int(free[k])) for k in failure.places])
         raise NumericalFailure(
@@ -59,6 +64,25 @@ def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equili
     efforts = dict(zip(free, problem.needed(found).tolist(), strict=True))
     result.residuals = {model.layout.u_name(j): effort for j, effort in efforts.items()}
     return result
+
+
+def _by_sweep(model: Compiled, q: Array, t: float, tolerance: float) -> Array:
+    """Rest of many bodies; `Unsettled` has the efforts of all free speeds."""
+    engine, still = model.looped, np.zeros((1, model.nu))
+    memory, free = engine.start_memory(), free_speeds(model)
+    times, scene = np.array([t]), SceneSystem(engine)
+
+    def acceleration(q: Array) -> Array:
+        return engine.accelerations(times, q[None], still, memory[None])[1][0]
+
+    def settled(q: Array) -> Array:
+        return scene.start(t, q, still[0])[: model.nq]
+
+    rest = RestBySweep(Tangent(engine), t, speed_sizes(model), acceleration, settled)
+    try:
+        return rest.find(q, tolerance)
+    except Unsettled as failure:
+        raise Unsettled(str(failure), failure.residual[free]) from None
 
 
 def free_speeds(model: Compiled) -> list[int]:

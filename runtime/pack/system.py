@@ -237,7 +237,7 @@ class System:
 
     @property
     def steady(self) -> bool:
-        """Whether nothing goes by time: no drive, no expression of t, no element that may read it."""
+        """Whether nothing goes by time: neither drive nor expression, nor an element that may."""
         kernels = [self.values, *(force.effort for force in self.forces)]
         timed = any(kernel is not None and reads(kernel, "t") for kernel in kernels)
         own = any(force.element != ("force", "spring") for force in self.forces)

@@ -19,7 +19,7 @@ import mstmm
 from mstmm.errors import NumericalFailure
 from mstmm.runtime.engine.tangent import Tangent
 
-TIME, INVERSE_STEP, SHARE = 0.3, 40.0, 1.0
+TIME, INVERSE_STEP, SHARE = 0.3, 200.0, 1.0
 UNIT = 2.0**-53
 
 Scene = dict[str, Any]

@@ -35,6 +35,7 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     const mstmm_tangents *step = state->tangents;
     real *q = mstmm_aimed(state->slope->q) + body->q;
     mstmm_aim_rate(state, body, j);
+    mstmm_aimed(state->slope->u)[body->u + j] = step->rate;
     mstmm_aimed(state->slope->given)[body->u + j] = step->s;
     if (body->straight) {
         q[j] = 1 / step->sq;
@@ -58,7 +59,7 @@ static inline void mstmm_aim_mode(mstmm_state *state, const mstmm_modal *modal, 
 {
     mstmm_aim_no_mode(state, modal);
     mstmm_aimed(state->slope->q)[modal->q + i] = 1 / state->tangents->sq;
-    mstmm_aimed(state->slope->u)[modal->u + i] = 1;
+    mstmm_aimed(state->slope->u)[modal->u + i] = state->tangents->rate;
     mstmm_aimed(state->slope->given)[modal->u + i] = state->tangents->s;
 }
 
@@ -66,6 +67,14 @@ static inline void mstmm_aim_mode(mstmm_state *state, const mstmm_modal *modal, 
 static inline void mstmm_aim_motion(real *motion, int k)
 {
     for (int i = 0; i < 9; i++) motion[i] = i == k;
+}
+
+/* The code of an elimination: a negative determinant is no failure where it is counted. */
+static inline int mstmm_judged(mstmm_state *state, int code)
+{
+    if (code != MSTMM_NEGATIVE || !state->tangents->negative) return code;
+    *state->tangents->negative = !*state->tangents->negative;
+    return 0;
 }
 
 /* S of the tangent, of a body or (-1) of the ground. */

@@ -55,7 +55,7 @@ static int tangent(void *context, double t, const double *y, const double *a, do
 {
     mstmm_scene_run *run = context;
     const int code = at_base(run, t, y, a);
-    return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, s, sq, kappa));
+    return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, 1, s, sq, kappa));
 }
 
 /* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */

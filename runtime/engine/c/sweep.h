@@ -207,7 +207,9 @@ static inline real *mstmm_of_speeds(real *block, int nu, int which)
 /* What the tangent of a step keeps. */
 typedef struct mstmm_tangents {
     real *numbers;        /* see mstmm_tangent_lay */
-    real s, sq, kappa;    /* da = s du, dq = (sq - kappa g_q)^-1 N du */
+    /* Along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x */
+    real rate, s, sq, kappa;
+    int *negative;        /* whether the determinant is so far; NULL: one of a body's is a failure */
     const real *rho;      /* nq: what the rates lack */
     real *change;         /* nq: change of the coordinates */
     real *unit;           /* a load that is one in a right-hand side; NULL: none */

@@ -238,17 +238,19 @@ static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
     return mstmm_values(slope) + all->values[k];
 }
 
-/* The change of every coupling along du. */
-static int coupled_along(mstmm_tangent *at, const real *du, real *changes)
+/* The change of every coupling along x. */
+static int coupled_along(mstmm_tangent *at, const real *x, real *changes)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
-    int code = mstmm_tangent_coordinates(at, du, NULL, parts.change);
+    int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
     if (code) return code;
     memcpy(parts.d_q, parts.change, (size_t)model->nq * sizeof(real));
-    memcpy(parts.d_u, du, (size_t)model->nu * sizeof(real));
-    for (int j = 0; j < model->nu; j++) parts.d_a[j] = at->s * du[j];
+    for (int j = 0; j < model->nu; j++) {
+        parts.d_u[j] = at->rate * x[j];
+        parts.d_a[j] = at->s * x[j];
+    }
     state.slope = &slope;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     code = mstmm_run_applied_slope(&state);
@@ -266,7 +268,7 @@ int mstmm_hook_unit_load(mstmm_state *state)
 static int solve_alone(mstmm_tangent *at, const real *r, int k, real *du)
 {
     const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = {.numbers = at->numbers, .s = at->s, .sq = at->sq, .kappa = at->kappa};
+    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     const int loads = at->n_coupled - at->couplings->n_efforts;
     state.slope = &slope;
@@ -282,7 +284,7 @@ static int solve_alone(mstmm_tangent *at, const real *r, int k, real *du)
 }
 
 /* With couplings c = G du and answers Y to each: du = du_0 + Y c, (1 - G Y) c = G du_0. */
-static int close_couplings(mstmm_tangent *at)
+static int close_couplings(mstmm_tangent *at, int negative)
 {
     const int m = at->n_coupled, nu = at->model->nu;
     const mstmm_parts parts = parts_of(at);
@@ -294,25 +296,34 @@ static int close_couplings(mstmm_tangent *at)
         if (code) return code;
         for (int i = 0; i < m; i++) at->closure[i * m + k] = (i == k) - changes[i];
     }
-    return 0;
+    real *work = at->closure + m * m, *none = work + m * m;
+    memset(none, 0, (size_t)m * sizeof(real));
+    const int code = mstmm_solve_lu(m, 1, at->closure, none, none + m, work, 1e-13);
+    if (code != 1 && (code == 2) == negative) return 0;
+    return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1,
+                      code == 1 ? 1 : MSTMM_NEGATIVE);
 }
 
-int mstmm_tangent_factor(mstmm_tangent *at, real s, real sq, real kappa)
+int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = {.numbers = at->numbers, .s = s, .sq = sq, .kappa = kappa};
+    mstmm_tangents step = {.numbers = at->numbers, .rate = rate, .s = s, .sq = sq, .kappa = kappa};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
+    at->rate = rate;
     at->s = s;
     at->sq = sq;
     at->kappa = kappa;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    /* With couplings left out a body may topple that they hold. */
+    int negative = 0;
+    if (at->n_coupled) step.negative = &negative;
     const int code = mstmm_run_tangent(&state);
-    return code || !at->n_coupled ? code : close_couplings(at);
+    return code || !at->n_coupled ? code : close_couplings(at, negative);
 }
 
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du)
@@ -323,8 +334,7 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du)
     real *work = at->closure + m * m, *changes = work + m * m, *amounts = changes + m;
     code = coupled_along(at, du, changes);
     if (code) return code;
-    if (mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, 1e-13))
-        return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1, 1);
+    mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, 1e-13); /* regular: see above */
     for (int k = 0; k < m; k++)
         for (int j = 0; j < nu; j++) du[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
     return 0;
@@ -371,7 +381,7 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = {.numbers = at->numbers, .s = at->s, .sq = at->sq, .kappa = at->kappa,
+    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa,
                            .rho = rho ? rho : parts.still, .change = dq};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     state.slope = &slope;

@@ -26,7 +26,7 @@ typedef struct {
     real *answers;        /* n_coupled x nu: to one of each */
     real *closure;        /* n_coupled x (2 n_coupled + 3) */
     int known;            /* there has been a residual since the memory changed */
-    real t, s, sq, kappa; /* of the last residual and tangent */
+    real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;
 
@@ -45,18 +45,18 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r);
-/* Factors dR along changes du, da = s du, dq = (sq - kappa g_q)^-1 N du, where g_q are the slopes
- * of the coordinates' rates N u by the coordinates. */
-int mstmm_tangent_factor(mstmm_tangent *at, real s, real sq, real kappa);
-/* du (nu) that makes the change of R equal to r. */
-int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du);
+/* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the
+ * slopes of the coordinates' rates N u by the coordinates. */
+int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
+/* x (nu) that makes the change of R equal to r. */
+int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *x);
 /* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
  * residual, whose workspace this writes to. */
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);
 /* Zeros in entries (nu) of speeds that somebody imposes. */
 void mstmm_tangent_free(const mstmm_tangent *at, real *entries);
-/* dq (nq) of a du: sq dq = kappa g_q dq + N du + rho; rho (nq) may be NULL. */
-int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq);
+/* dq (nq) of an x: sq dq = kappa g_q dq + N x + rho; rho (nq) may be NULL. */
+int mstmm_tangent_coordinates(mstmm_tangent *at, const real *x, const real *rho, real *dq);
 /* cdef end */
 
 #endif

@@ -1,0 +1,121 @@
+"""The way to rest of trees with many bodies: pseudo-time by the factored tangent, O(bodies) a step.
+
+    (K + sigma M) x = -R(q)
+
+is a step of the motion without speed, downhill in whatever has a potential; sigma is an inverse
+time squared.  It falls while steps go downhill, so that the way ends in Newton's method
+(pseudo-transient continuation; Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from .rest import Unsettled
+from .tangent import Tangent
+
+_MOST, _NEWTON = 2000, 40
+#: Steps in sizes of the coordinates: the longest, and that of the first one.
+_LONGEST, _FIRST = 0.5, 0.05
+#: By how much sigma falls behind a step that goes downhill and rises before one that would go
+#: beyond the bottom; how long a step, in sizes, still lets Newton's method be tried without it.
+_EASED, _HELD, _NEAR = 2.0, 4.0, 1e-2
+#: Cycles of rounding: a step that no longer shrinks below this, in sizes, is as near as numbers go.
+_ROUNDING = 1e-7
+
+
+class RestBySweep:
+    """Rest of a packed scene at time t.
+
+    `sizes` (nu,) are motions of order one, `acceleration` gives the accelerations (nu,) at rest,
+    `settled` puts a state's drives and quaternions in order.
+    """
+
+    def __init__(
+        self,
+        tangent: Tangent,
+        t: float,
+        sizes: Array,
+        acceleration: Callable[[Array], Array],
+        settled: Callable[[Array], Array],
+    ) -> None:
+        self.tangent, self.t, self.sizes = tangent, t, sizes
+        self.acceleration, self.settled = acceleration, settled
+        self._still = np.zeros(tangent.nu)
+
+    def find(self, q: Array, tolerance: float) -> Array:
+        """q (nq,) at rest, coordinates within `tolerance` times their sizes.  Raises Unsettled, and
+        NumericalFailure naming a motion that nothing holds."""
+        q, near = self.settled(q), _NEAR
+        missing = self._residual(q)
+        sigma = self._unrest(q) / _FIRST
+        for _ in range(_MOST):
+            step = self._downhill(missing, sigma)
+            if step is not None and self._length(step) <= near:
+                try:
+                    return self._newton(q, tolerance)
+                except NumericalFailure:
+                    if sigma <= 0:  # at rest already, though nothing holds it
+                        raise
+                    near /= 10  # too far away still, or beside a rest that does not last
+                missing = self._residual(q)
+                continue
+            ahead = q if step is None else self._after(q, step)
+            left = missing if step is None else self._residual(ahead)
+            # Beyond the bottom by much, or no way down with so little inertia
+            if step is None or float(left @ step) > -0.5 * float(missing @ step):
+                sigma *= _HELD
+                missing = self._residual(q)
+            else:
+                q, missing, sigma = ahead, left, sigma / _EASED
+        raise Unsettled(f"no rest after {_MOST} steps", missing)
+
+    def _downhill(self, missing: Array, sigma: float) -> Array | None:
+        """The step, None where the stiffness with so much inertia is not positive."""
+        try:
+            return self._step(missing, sigma)
+        except NumericalFailure:
+            if sigma <= 0:
+                raise
+            return None
+
+    def _newton(self, q: Array, tolerance: float) -> Array:
+        shortest = np.inf
+        for _ in range(_NEWTON):
+            step = self._step(self._residual(q), 0.0)
+            length = self._length(step)
+            q = self._after(q, step)
+            if length <= tolerance or (length >= shortest and length < _ROUNDING):
+                return q
+            if length > 2 * shortest or length >= _LONGEST:
+                break
+            shortest = min(shortest, length)
+        raise Unsettled(f"no rest after {_NEWTON} steps of Newton's method", self._residual(q))
+
+    def _residual(self, q: Array) -> Array:
+        return self.tangent.residual(self.t, q, self._still, self._still)
+
+    def _unrest(self, q: Array) -> float:
+        """The largest acceleration, in sizes."""
+        found = float(np.abs(self.acceleration(q) / self.sizes).max(initial=0.0))
+        if not np.isfinite(found):
+            raise NumericalFailure("the accelerations of this state are not finite")
+        return found
+
+    def _step(self, missing: Array, sigma: float) -> Array:
+        """From the state whose residual has just been made."""
+        self.tangent.factor(sigma, 1.0, 0.0, rate=0.0)
+        step = -self.tangent.solve(missing)
+        return step / max(1.0, self._length(step) / _LONGEST)
+
+    def _length(self, step: Array) -> float:
+        return float(np.abs(step / self.sizes).max(initial=0.0))
+
+    def _after(self, q: Array, step: Array) -> Array:
+        """The tangent must be that of q: it turns a motion into a change of coordinates."""
+        return self.settled(q + self.tangent.coordinates(step))
