@@ -39,7 +39,7 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
     if isinstance(tableau, Implicit):
         t.kind, t.gamma = tableau.kind, tableau.gamma
         t.n_inner, t.inner = len(tableau.inner), doubles(tableau.inner)
-        t.quadrature = doubles(tableau.quadrature)
+        t.quadrature, t.roughness = doubles(tableau.quadrature), doubles(tableau.roughness)
     if isinstance(tableau, Rosenbrock):
         t.d = doubles(tableau.d)
     if isinstance(tableau, Alpha):

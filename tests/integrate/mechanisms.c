@@ -318,6 +318,15 @@ static void slide(const double *p, number t, const number *q, const number *u, c
   r[1] = a[1] + a[0] * ccos(q[1]) + 9.81 * csin(q[1]);
   rest[0] = push * u[0];
 }
+/* 1 kg that a drive moves like that and nothing else; the work of the drive */
+static void carried(const double *p, number t, const number *q, const number *u, const number *a,
+                    number *r, number *rest) {
+  (void)p;
+  (void)t;
+  (void)q;
+  r[0] = a[0];
+  rest[0] = a[0] * u[0];
+}
 static void driven(const double *p, number t, number *q, number *u, number *a) {
   q[0] = p[0] * csin(3.0 * t);
   u[0] = 3.0 * p[0] * ccos(3.0 * t);
@@ -431,6 +440,7 @@ parameters *test_mechanism(mstmm_system *system, const char *name) {
       {"pendulum", 2, 2, 1, pendulum, same_two, NULL, 0},
       {"base", 1, 1, 0, base, same_one, NULL, 0},
       {"slide", 2, 2, 1, slide, same_two, driven, 1},
+      {"carried", 1, 1, 1, carried, same_one, driven, 1},
       {"ball", 4, 3, 0, ball, turning_rates, NULL, 0},
       {"friction", 1, 1, 0, friction, same_one, NULL, 0},
       {"fall", 1, 1, 0, fall, same_one, NULL, 0},

@@ -150,6 +150,7 @@ def test_the_vibration_of_a_slack_stiff_spring_costs_nothing(lab: Lab) -> None:
 
 def test_counts_are_those_of_the_method(lab: Lab) -> None:
     problem, start = hanging(lab), (0.0, 0.4, 0, 0, 0)
+    problem.system.n_error = 4  # the work is not asked
     run = problem.solved("rodas4p2", 1.0, start, rtol=1e-5)
     s = run.statistics
     tries = s.steps + s.rejected
@@ -190,6 +191,20 @@ def test_a_state_that_accept_changes_starts_afresh(lab: Lab) -> None:
         assert fresh.statistics.evaluations == fresh.statistics.steps
         assert kept.statistics.evaluations == 1
         assert fresh.y == pytest.approx(kept.y, abs=1e-5)
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_work_steers_the_step_where_nothing_else_does(lab: Lab, method: str) -> None:
+    # 1 kg is driven as sin 3 t: the work is the kinetic energy, and nothing is there to be solved
+    problem = lab.mechanism("carried", 1.0)
+    tolerance = 1e-6 if get(method).order > 2 else 1e-4
+    errors = []
+    for n_error in (2, 3):
+        problem.system.n_error = n_error
+        run = problem.solved(method, 2.0, (0, 3, 0), rtol=tolerance, atol=tolerance)
+        errors.append(abs(run.y[2] - 4.5 * (math.cos(6.0) ** 2 - 1.0)))
+    assert errors[1] < 200 * tolerance
+    assert errors[1] < 0.5 * errors[0]
 
 
 def test_a_tangent_that_does_not_change_is_made_once(lab: Lab) -> None:

@@ -179,8 +179,12 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
   if (mstmm_in_gap(run)) *error = 0.0;
   if (run->fixed_step == 0.0 && *error >= 1.0) return 0;
   const int dense = mstmm_output_inside(run) || mstmm_n_watched(work->system);
-  if (work->implicit) return mstmm_implicit_finish(work, dense);
-  return dense ? mstmm_build_dense(work) : 0;
+  if (run->fixed_step > 0.0) run->real.error_previous = *error; /* of the motion alone */
+  if (!work->implicit) return dense ? mstmm_build_dense(work) : 0;
+  status = mstmm_implicit_finish(work, dense);
+  if (!status && work->tableau->n_errors && !mstmm_in_gap(run))
+    *error = mstmm_error_norm(work, absolute); /* that of quadratures is known now */
+  return status;
 }
 
 int mstmm_try_step(const mstmm_work *work) {
@@ -202,7 +206,6 @@ int mstmm_try_step(const mstmm_work *work) {
     if (status) return status;
   }
   if (!fixed) mstmm_propose(run, error);
-  if (fixed && work->implicit) run->real.error_previous = error;
   mstmm_count_step(run, error, absolute);
   if (!work->implicit) watch_stability(work);
   run->real.t_scan = run->real.t;

@@ -78,6 +78,24 @@ int mstmm_implicit_stages(const mstmm_work *work) {
   }
 }
 
+/* The error of quadrature i of the step: the highest difference of its rates, squared against their
+ * size, which has the order of the rule where they are smooth and is their size where they are not
+ * (R. Piessens and others, QUADPACK, 1983, judge alike).  To where the error estimate finds it; what
+ * the last stage of it stands for is known by then. */
+static void estimate_quadrature(const mstmm_work *work, int i) {
+  const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
+  const int rest = mstmm_n_rest(work), n = work->tableau->n_inner + 2, last = terms.count - 1;
+  double difference = 0.0, size = 0.0;
+  if (!work->tableau->n_errors) return;
+  for (int l = 0; l < n; l++) {
+    const double part = work->tableau->roughness[l] * work->nodes[l * rest + i];
+    difference += part;
+    size += fabs(part);
+  }
+  work->k[terms.columns[last] * work->row + work->system->n_state - rest + i] =
+      size > 0.0 ? difference * difference / size / terms.weights[last] : 0.0;
+}
+
 /* Quadratures over the step, and their dense output: from their rates at its ends, which the slopes
  * hold, and on the dense output of the motion between. */
 static int integrate_quadratures(const mstmm_work *work) {
@@ -103,6 +121,7 @@ static int integrate_quadratures(const mstmm_work *work) {
       work->dense[j * work->row + first + i] = h * sum;
     }
     work->y_new[first + i] = work->y[first + i] + work->dense[first + i];
+    estimate_quadrature(work, i);
   }
   return mstmm_check_finite(work, work->run->real.t_new, work->y_new);
 }

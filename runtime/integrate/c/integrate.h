@@ -90,6 +90,7 @@ typedef struct mstmm_tableau {
   int n_inner;
   const double *inner;      /* n_inner */
   const double *quadrature; /* (n_inner + 2) x n_dense, nodes in their order */
+  const double *roughness;  /* n_inner + 2: the rates' highest divided difference, sizes adding to 1 */
 } mstmm_tableau;
 
 enum {

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.arrays import Array
 
-from .tableau import Tableau, frozen, hermite, integrals_in_basis
+from .tableau import Tableau, divided_difference, frozen, hermite, integrals_in_basis
 
 ROSENBROCK, DIRK, ALPHA = 1, 2, 3  # as in `c/integrate.h`
 
@@ -74,6 +74,13 @@ class Implicit(Tableau):
         nodes = [Fraction(0), *(Fraction(float(x)) for x in self.inner), Fraction(1)]
         found = integrals_in_basis(nodes)
         return frozen(np.pad(found, ((0, 0), (0, self.n_dense - found.shape[1]))))
+
+    @property
+    def roughness(self) -> Array:
+        """(n + 2,) weights of those rates in their highest difference, whose sizes add to 1."""
+        nodes = np.array([0.0, *self.inner, 1.0])
+        weights = divided_difference(nodes.tolist())
+        return frozen(np.array(weights) / np.abs(weights).sum())
 
     def _rows(self) -> list[Array]:
         lower = [np.tril(self.A, -1)[i] for i in range(1, self.n_stages)]

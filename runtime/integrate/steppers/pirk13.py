@@ -21,7 +21,6 @@ which smooth motion does not notice it and a pole or a jump cannot be missed.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -30,7 +29,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from .tableau import Tableau, from_monomials, frozen, integrals
+from .tableau import Tableau, divided_difference, from_monomials, frozen, integrals
 
 _ITERATIONS = 12
 _COMPARED = 9  # the error estimate: what three iterations less give
@@ -57,15 +56,6 @@ def _value(polynomial: Polynomial, at: Fraction) -> float:
     return float(sum(x * at ** (power + 1) for power, x in enumerate(polynomial)))
 
 
-def _divided_difference(nodes: Sequence[Fraction]) -> list[float]:
-    """Weights of the values at 0, the nodes and 1 in their highest divided difference."""
-    points = [Fraction(0), *nodes, Fraction(1)]
-    return [
-        float(1 / math.prod(point - other for other in points if other != point))
-        for point in points
-    ]
-
-
 def tableau() -> Tableau:
     """The method `pirk13`."""
     nodes = _nodes()
@@ -82,7 +72,9 @@ def tableau() -> Tableau:
         a[after, before] = block
     b[places[-1]] = error[places[-1]] = weights
     error[places[_COMPARED - 1]] = -weights
-    error[[0, *range(stages - n, stages + 1)]] += _ROUGHNESS * np.array(_divided_difference(nodes))
+    error[[0, *range(stages - n, stages + 1)]] += _ROUGHNESS * np.array(
+        divided_difference([Fraction(0), *nodes, Fraction(1)])
+    )
     return Tableau(
         name="pirk13",
         order=_ITERATIONS + 1,

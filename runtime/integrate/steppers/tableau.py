@@ -12,6 +12,7 @@ is free of cancellation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -290,6 +291,14 @@ def integrals(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
                 product = [(a - b) / (node - other) for a, b in zip(shifted, scaled, strict=True)]
         found.append([x / (power + 1) for power, x in enumerate(product)])
     return found
+
+
+def divided_difference(points: Sequence[Any]) -> list[float]:
+    """Weights of the values at n points in their highest divided difference."""
+    return [
+        float(1 / math.prod(point - other for other in points if other != point))
+        for point in points
+    ]
 
 
 def integrals_in_basis(nodes: Sequence[Fraction]) -> Array:
