@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 #: What a run ends with where call-backs of the scene fail; their code says how.
-_EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED)
+_EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED)
 
 
 #: States looked at past the last good one lie this many times farther ahead each, up to this part

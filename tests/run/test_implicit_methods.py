@@ -1,4 +1,4 @@
-"""Scenes by implicit methods: against explicit runs, across drives and releases, resumed, in batches."""
+"""Scenes by implicit methods: against explicit runs, across releases, resumed, in batches."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Implicit(Tableau):
         """True."""
         return True
 
-    @property
+    @cached_property
     def real_stability_limit(self) -> float:
         """Infinite: no step of an implicit method here is too long for a motion that decays."""
         return math.inf
@@ -124,7 +124,8 @@ class Rosenbrock(Implicit):
     def _inverse(self) -> Array:
         """Gamma of the classical form, of which the second set of weights holds the inverse."""
         s = self.n_stages - 1
-        return np.asarray(np.linalg.inv(np.eye(s) / self.gamma - self.second[1:, 1:]))
+        inverse = np.linalg.inv(np.eye(s) / self.gamma - self.second[1:, 1:])
+        return np.asarray(inverse, dtype=np.float64)
 
     @cached_property
     def classical(self) -> tuple[Array, Array]:
