@@ -25,6 +25,8 @@ _LONGEST, _FIRST = 0.5, 0.05
 #: By how much sigma falls behind a step that goes downhill and rises before one that would go
 #: beyond the bottom; how long a step, in sizes, still lets Newton's method be tried without it.
 _EASED, _HELD, _NEAR = 2.0, 4.0, 1e-2
+#: A step that is rounding, in sizes.
+_AT_REST = 1e-12
 #: Cycles of rounding: a step that no longer shrinks below this, in sizes, is as near as numbers go.
 _ROUNDING = 1e-7
 
@@ -60,7 +62,7 @@ class RestBySweep:
                 try:
                     return self._newton(q, tolerance)
                 except NumericalFailure:
-                    if sigma <= 0:  # at rest already, though nothing holds it
+                    if near < _AT_REST:  # nothing holds it here, nor drives it away
                         raise
                     near /= 10  # too far away still, or beside a rest that does not last
                 missing = self._residual(q)
@@ -80,9 +82,7 @@ class RestBySweep:
         try:
             return self._step(missing, sigma)
         except NumericalFailure:
-            if sigma <= 0:
-                raise
-            return None
+            return None if sigma > 0 else 0.0 * missing
 
     def _newton(self, q: Array, tolerance: float) -> Array:
         shortest = np.inf
