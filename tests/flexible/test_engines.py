@@ -12,6 +12,7 @@ from numpy.random import Generator
 from reference.compare import worst
 from reference.jets import Array
 from support.complex_arithmetic import complex_step
+from support.shaken_arithmetic import STEP, shaken
 
 import mstmm
 from mstmm.bridge.fusion import Fusion, modes_at
@@ -26,7 +27,7 @@ UNIT = 2.0**-53
 
 
 class Interpreted:
-    """The fused IR of a model with plain floats, and how rounding of numbers and state moves it.
+    """The fused IR of a model with plain floats, and how rounding moves it.
 
     A body whose frame is far from the section that is held may pass rounding of its moments on a
     thousandfold, and the mass matrix passes rounding on by its condition; no engine can be nearer
@@ -40,22 +41,15 @@ class Interpreted:
             "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
             "memory": [0.0] * structure.n_memory,
         }  # fmt: skip
-        self.udot = self._at(p, q, u)
-        rng, step = np.random.default_rng(1), 1e-8
-        moved = [
-            self._at(*(x * (1 + step * rng.uniform(-1, 1, len(x))) for x in (p, q, u)))
-            for _ in range(6)
-        ]
-        sensitive = max(worst(udot, self.udot) for udot in moved) * UNIT / step
+        self.udot = np.array(evaluate_floats(self.kernel, self.inputs)["udot"])
+        rng = np.random.default_rng(1)
+        moved = [np.array(shaken(self.kernel, self.inputs, rng)["udot"]) for _ in range(6)]
+        sensitive = max(worst(udot, self.udot) for udot in moved) * UNIT / STEP
         matrix = model.mass_matrix(q)
         size = np.sqrt(np.diag(matrix))
         condition = float(np.linalg.cond(matrix / np.outer(size, size))) if len(size) else 1.0
         solved = max(10, 2 * len(size)) * UNIT * condition  # n equations: n rounding errors each
-        self.allowed = max(AGREEMENT, 100 * sensitive, solved)
-
-    def _at(self, p: Array, q: Array, u: Array) -> Array:
-        given = self.inputs | {"p": list(p), "q": list(q), "u": list(u)}
-        return np.array(evaluate_floats(self.kernel, given)["udot"])
+        self.allowed = max(AGREEMENT, 10 * sensitive, solved)
 
 
 def compiled(scene: dict[str, Any], engine: str) -> mstmm.Model:
