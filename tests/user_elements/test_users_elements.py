@@ -160,8 +160,12 @@ def test_hinge_without_a_compiler(
     u = rng.uniform(-2, 2, (40, library.nu))
     expected = library.accelerations(q, u)
     assert np.abs(interpreted.accelerations(q, u) - expected).max() < 1e-11 * np.abs(expected).max()
-    ends = [model.simulate(0.25, rtol=1e-10).q[-1] for model in (library, interpreted)]
+    both = (library, interpreted)
+    ends = [model.simulate(0.25, rtol=1e-10).q[-1] for model in both]
     assert np.abs(ends[0] - ends[1]).max() < 1e-10
+    implicit = [model.simulate(0.25, rtol=1e-9, method="rodas5p").q[-1] for model in both]
+    assert np.abs(implicit - ends[0]).max() < 1e-6
+    assert np.abs(implicit[0] - implicit[1]).max() < 1e-10
     slopes = [model.derivatives(q[0], u[0]).q for model in (library, interpreted)]
     assert np.abs(slopes[0] - slopes[1]).max() < 1e-11 * np.abs(slopes[0]).max()
 
