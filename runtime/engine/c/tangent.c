@@ -17,6 +17,8 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
     int64_t place = 54; /* S of the ground, which nobody reads */
     for (int i = 0; i < model->n_bodies; i++) {
         mstmm_body *body = &model->bodies[i];
+        const int known = body->slope_tape || body->hinge_slope;
+        if (!known || !body->bias_load_slope || !body->load_by_motion) return -1 - i;
         body->tangent = place;
         place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
         if (body->modal) {
