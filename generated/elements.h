@@ -29,10 +29,202 @@ extern const mstmm_element mstmm_classical_ball;
 int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
     const real *restrict tau_n, real *restrict U_h, real *restrict margin);
 
+extern const mstmm_element mstmm_classical_beam_planar_discrete;
+int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict I_0, const real *restrict s, const real *restrict S_c,
+    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
+    const real *restrict L, const real *restrict phi_O, const real *restrict Theta_O,
+    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
+    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
+    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
+    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
+    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
+    const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_beam_spatial_discrete;
+int mstmm_classical_beam_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict J_0, const real *restrict s, const real *restrict e,
+    const real *restrict M_phi, const real *restrict K_f, const real *restrict D_f,
+    const real *restrict r_e, const real *restrict Phi_O, const real *restrict Theta_O,
+    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
+    const real *restrict B_r, const real *restrict B_w, const real *restrict D_w,
+    const real *restrict T, const real *restrict B_eta, const real *restrict D_eta,
+    const real *restrict r_p, const real *restrict R_p, const real *restrict eta_p,
+    const real *restrict q_p, const real *restrict m_p, const real *restrict m_pI,
+    const real *restrict K_g, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, const real *restrict f_eta, real *restrict U, real *restrict W);
+
+extern const mstmm_element mstmm_classical_body_planar_discrete;
+int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict I_0, const real *restrict r_e, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
+    const real *restrict D_theta, const real *restrict r_p, const real *restrict theta_p,
+    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
+    const real *restrict f_m, real *restrict U);
+
 extern const mstmm_element mstmm_classical_body_spatial;
 int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
     const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
     const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
+
+extern const mstmm_element mstmm_classical_body_spatial_discrete;
+int mstmm_classical_body_spatial_discrete_transfer(const real *restrict m, const real *restrict S_0,
+    const real *restrict J_0, const real *restrict r_e, const real *restrict A,
+    const real *restrict C, const real *restrict B_r, const real *restrict B_w,
+    const real *restrict D_w, const real *restrict T, const real *restrict r_p,
+    const real *restrict R_p, const real *restrict q_p, const real *restrict g,
+    const real *restrict f_r, const real *restrict f_m, real *restrict U);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_beam;
+int mstmm_classical_hinge_ball_spatial_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_beam_rigid;
+int mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_beam;
+int mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_ball_spatial_rigid_rigid;
+int mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_beam;
+int mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(const real *restrict W,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
+    const real *restrict eta_pO, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
+    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_beam_rigid;
+int mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(const real *restrict S_I,
+    const real *restrict eta_pI, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_r, const real *restrict c_r, const real *restrict C,
+    const real *restrict d_s, const real *restrict q_s, const real *restrict m_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_beam;
+int mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(const real *restrict W,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
+    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
+    const real *restrict m_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_elastic_spatial_rigid_rigid;
+int mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_r, const real *restrict c_r,
+    const real *restrict C, const real *restrict d_s, const real *restrict q_s,
+    const real *restrict m_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_beam;
+int mstmm_classical_hinge_fixed_planar_beam_beam_transfer(const real *restrict W,
+    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict gamma,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_rigid;
+int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(const real *restrict Theta_I,
+    const real *restrict gamma, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_beam;
+int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(const real *restrict W,
+    const real *restrict Theta_O, const real *restrict gamma, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_rigid;
+int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(const real *restrict gamma,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_beam;
+int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict W,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
+    const real *restrict eta_pO, const real *restrict beta, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_rigid;
+int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(const real *restrict S_I,
+    const real *restrict eta_pI, const real *restrict beta, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_beam;
+int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(const real *restrict W,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict beta,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_rigid;
+int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(const real *restrict beta,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_beam;
+int mstmm_classical_hinge_pin_spatial_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict S_I, const real *restrict eta_pI,
+    const real *restrict S_O, const real *restrict eta_pO, const real *restrict a,
+    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
+    const real *restrict tau_n, const real *restrict S_N, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_beam_rigid;
+int mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(const real *restrict U,
+    const real *restrict S_I, const real *restrict eta_pI, const real *restrict a,
+    const real *restrict beta, const real *restrict a_n, const real *restrict m_n,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_beam;
+int mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict S_O, const real *restrict eta_pO,
+    const real *restrict a, const real *restrict beta, const real *restrict a_n,
+    const real *restrict m_n, const real *restrict tau_n, const real *restrict S_N,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_rigid;
+int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict a, const real *restrict beta, const real *restrict a_n,
+    const real *restrict m_n, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_beam;
+int mstmm_classical_hinge_smooth_planar_beam_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_rigid;
+int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_beam;
+int mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(const real *restrict U,
+    const real *restrict W, const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_smooth_planar_rigid_rigid;
+int mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(const real *restrict U,
+    const real *restrict tau_n, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_beam;
+int mstmm_classical_hinge_spring_planar_beam_beam_transfer(const real *restrict W,
+    const real *restrict Theta_I, const real *restrict Theta_O, const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
+    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
+    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
+    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_rigid;
+int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict Theta_I,
+    const real *restrict k_t, const real *restrict c_t, const real *restrict k_1,
+    const real *restrict k_3, const real *restrict c_r, const real *restrict C,
+    const real *restrict D_phi, const real *restrict phi_0, const real *restrict phi_s,
+    const real *restrict theta_s, const real *restrict d_s, const real *restrict q_s,
+    real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_beam;
+int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict W,
+    const real *restrict Theta_O, const real *restrict k_t, const real *restrict c_t,
+    const real *restrict k_1, const real *restrict k_3, const real *restrict c_r,
+    const real *restrict C, const real *restrict D_phi, const real *restrict phi_0,
+    const real *restrict phi_s, const real *restrict theta_s, const real *restrict d_s,
+    const real *restrict q_s, real *restrict U_h);
+
+extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_rigid;
+int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restrict k_t,
+    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
+    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
+    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
+    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
 
 extern const mstmm_element mstmm_classical_pin_spatial;
 int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *restrict F_scale,

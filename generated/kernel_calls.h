@@ -1335,6 +1335,606 @@ static inline int mstmm_classical_acceleration_transfer_by(struct mstmm_classica
 }
 #define mstmm_classical_acceleration_transfer(...) mstmm_classical_acceleration_transfer_by((struct mstmm_classical_acceleration_transfer){__VA_ARGS__})
 
+struct mstmm_discrete_body_planar_transfer {
+    const real *m;
+    const real *S_0;
+    const real *I_0;
+    const real *r_e;
+    const real *A;
+    const real *C;
+    const real *B_r;
+    const real *B_theta;
+    const real *D_theta;
+    const real *r_p;
+    const real *theta_p;
+    const real *q_p;
+    const real *g;
+    const real *f_r;
+    const real *f_m;
+    real *U;
+};
+static inline int mstmm_discrete_body_planar_transfer_by(struct mstmm_discrete_body_planar_transfer to)
+{
+    return mstmm_classical_body_planar_discrete_transfer(
+        to.m, to.S_0, to.I_0, to.r_e, to.A, to.C, to.B_r, to.B_theta, to.D_theta, to.r_p,
+        to.theta_p, to.q_p, to.g, to.f_r, to.f_m, to.U);
+}
+#define mstmm_discrete_body_planar_transfer(...) mstmm_discrete_body_planar_transfer_by((struct mstmm_discrete_body_planar_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_beam_planar_transfer {
+    const real *m;
+    const real *S_0;
+    const real *I_0;
+    const real *s;
+    const real *S_c;
+    const real *M_f;
+    const real *K_f;
+    const real *D_f;
+    const real *L;
+    const real *phi_O;
+    const real *Theta_O;
+    const real *Theta_I;
+    const real *A;
+    const real *C;
+    const real *B_r;
+    const real *B_theta;
+    const real *D_theta;
+    const real *B_eta;
+    const real *D_eta;
+    const real *r_p;
+    const real *theta_p;
+    const real *eta_p;
+    const real *q_p;
+    const real *g;
+    const real *f_r;
+    const real *f_m;
+    const real *f_eta;
+    real *U;
+    real *W;
+};
+static inline int mstmm_discrete_beam_planar_transfer_by(struct mstmm_discrete_beam_planar_transfer to)
+{
+    return mstmm_classical_beam_planar_discrete_transfer(
+        to.m, to.S_0, to.I_0, to.s, to.S_c, to.M_f, to.K_f, to.D_f, to.L, to.phi_O, to.Theta_O,
+        to.Theta_I, to.A, to.C, to.B_r, to.B_theta, to.D_theta, to.B_eta, to.D_eta, to.r_p,
+        to.theta_p, to.eta_p, to.q_p, to.g, to.f_r, to.f_m, to.f_eta, to.U, to.W);
+}
+#define mstmm_discrete_beam_planar_transfer(...) mstmm_discrete_beam_planar_transfer_by((struct mstmm_discrete_beam_planar_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_body_spatial_transfer {
+    const real *m;
+    const real *S_0;
+    const real *J_0;
+    const real *r_e;
+    const real *A;
+    const real *C;
+    const real *B_r;
+    const real *B_w;
+    const real *D_w;
+    const real *T;
+    const real *r_p;
+    const real *R_p;
+    const real *q_p;
+    const real *g;
+    const real *f_r;
+    const real *f_m;
+    real *U;
+};
+static inline int mstmm_discrete_body_spatial_transfer_by(struct mstmm_discrete_body_spatial_transfer to)
+{
+    return mstmm_classical_body_spatial_discrete_transfer(
+        to.m, to.S_0, to.J_0, to.r_e, to.A, to.C, to.B_r, to.B_w, to.D_w, to.T, to.r_p, to.R_p,
+        to.q_p, to.g, to.f_r, to.f_m, to.U);
+}
+#define mstmm_discrete_body_spatial_transfer(...) mstmm_discrete_body_spatial_transfer_by((struct mstmm_discrete_body_spatial_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_beam_spatial_transfer {
+    const real *m;
+    const real *S_0;
+    const real *J_0;
+    const real *s;
+    const real *e;
+    const real *M_phi;
+    const real *K_f;
+    const real *D_f;
+    const real *r_e;
+    const real *Phi_O;
+    const real *Theta_O;
+    const real *Theta_I;
+    const real *A;
+    const real *C;
+    const real *B_r;
+    const real *B_w;
+    const real *D_w;
+    const real *T;
+    const real *B_eta;
+    const real *D_eta;
+    const real *r_p;
+    const real *R_p;
+    const real *eta_p;
+    const real *q_p;
+    const real *m_p;
+    const real *m_pI;
+    const real *K_g;
+    const real *g;
+    const real *f_r;
+    const real *f_m;
+    const real *f_eta;
+    real *U;
+    real *W;
+};
+static inline int mstmm_discrete_beam_spatial_transfer_by(struct mstmm_discrete_beam_spatial_transfer to)
+{
+    return mstmm_classical_beam_spatial_discrete_transfer(
+        to.m, to.S_0, to.J_0, to.s, to.e, to.M_phi, to.K_f, to.D_f, to.r_e, to.Phi_O, to.Theta_O,
+        to.Theta_I, to.A, to.C, to.B_r, to.B_w, to.D_w, to.T, to.B_eta, to.D_eta, to.r_p, to.R_p,
+        to.eta_p, to.q_p, to.m_p, to.m_pI, to.K_g, to.g, to.f_r, to.f_m, to.f_eta, to.U, to.W);
+}
+#define mstmm_discrete_beam_spatial_transfer(...) mstmm_discrete_beam_spatial_transfer_by((struct mstmm_discrete_beam_spatial_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_planar_rigid_rigid_transfer {
+    const real *gamma;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_planar_rigid_rigid_transfer_by(struct mstmm_discrete_fixed_planar_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(
+        to.gamma, to.U_h);
+}
+#define mstmm_discrete_fixed_planar_rigid_rigid_transfer(...) mstmm_discrete_fixed_planar_rigid_rigid_transfer_by((struct mstmm_discrete_fixed_planar_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_planar_rigid_beam_transfer {
+    const real *W;
+    const real *Theta_O;
+    const real *gamma;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_planar_rigid_beam_transfer_by(struct mstmm_discrete_fixed_planar_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(
+        to.W, to.Theta_O, to.gamma, to.U_h);
+}
+#define mstmm_discrete_fixed_planar_rigid_beam_transfer(...) mstmm_discrete_fixed_planar_rigid_beam_transfer_by((struct mstmm_discrete_fixed_planar_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_planar_beam_beam_transfer {
+    const real *W;
+    const real *Theta_I;
+    const real *Theta_O;
+    const real *gamma;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_planar_beam_beam_transfer_by(struct mstmm_discrete_fixed_planar_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_fixed_planar_beam_beam_transfer(
+        to.W, to.Theta_I, to.Theta_O, to.gamma, to.U_h);
+}
+#define mstmm_discrete_fixed_planar_beam_beam_transfer(...) mstmm_discrete_fixed_planar_beam_beam_transfer_by((struct mstmm_discrete_fixed_planar_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_planar_beam_rigid_transfer {
+    const real *Theta_I;
+    const real *gamma;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_planar_beam_rigid_transfer_by(struct mstmm_discrete_fixed_planar_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(
+        to.Theta_I, to.gamma, to.U_h);
+}
+#define mstmm_discrete_fixed_planar_beam_rigid_transfer(...) mstmm_discrete_fixed_planar_beam_rigid_transfer_by((struct mstmm_discrete_fixed_planar_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_smooth_planar_rigid_rigid_transfer {
+    const real *U;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_smooth_planar_rigid_rigid_transfer_by(struct mstmm_discrete_smooth_planar_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(
+        to.U, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_smooth_planar_rigid_rigid_transfer(...) mstmm_discrete_smooth_planar_rigid_rigid_transfer_by((struct mstmm_discrete_smooth_planar_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_smooth_planar_rigid_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_smooth_planar_rigid_beam_transfer_by(struct mstmm_discrete_smooth_planar_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(
+        to.U, to.W, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_smooth_planar_rigid_beam_transfer(...) mstmm_discrete_smooth_planar_rigid_beam_transfer_by((struct mstmm_discrete_smooth_planar_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_smooth_planar_beam_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_smooth_planar_beam_beam_transfer_by(struct mstmm_discrete_smooth_planar_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_smooth_planar_beam_beam_transfer(
+        to.U, to.W, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_smooth_planar_beam_beam_transfer(...) mstmm_discrete_smooth_planar_beam_beam_transfer_by((struct mstmm_discrete_smooth_planar_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_smooth_planar_beam_rigid_transfer {
+    const real *U;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_smooth_planar_beam_rigid_transfer_by(struct mstmm_discrete_smooth_planar_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(
+        to.U, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_smooth_planar_beam_rigid_transfer(...) mstmm_discrete_smooth_planar_beam_rigid_transfer_by((struct mstmm_discrete_smooth_planar_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_spring_planar_rigid_rigid_transfer {
+    const real *k_t;
+    const real *c_t;
+    const real *k_1;
+    const real *k_3;
+    const real *c_r;
+    const real *C;
+    const real *D_phi;
+    const real *phi_0;
+    const real *phi_s;
+    const real *theta_s;
+    const real *d_s;
+    const real *q_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_spring_planar_rigid_rigid_transfer_by(struct mstmm_discrete_spring_planar_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(
+        to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s,
+        to.d_s, to.q_s, to.U_h);
+}
+#define mstmm_discrete_spring_planar_rigid_rigid_transfer(...) mstmm_discrete_spring_planar_rigid_rigid_transfer_by((struct mstmm_discrete_spring_planar_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_spring_planar_rigid_beam_transfer {
+    const real *W;
+    const real *Theta_O;
+    const real *k_t;
+    const real *c_t;
+    const real *k_1;
+    const real *k_3;
+    const real *c_r;
+    const real *C;
+    const real *D_phi;
+    const real *phi_0;
+    const real *phi_s;
+    const real *theta_s;
+    const real *d_s;
+    const real *q_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_spring_planar_rigid_beam_transfer_by(struct mstmm_discrete_spring_planar_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_spring_planar_rigid_beam_transfer(
+        to.W, to.Theta_O, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0,
+        to.phi_s, to.theta_s, to.d_s, to.q_s, to.U_h);
+}
+#define mstmm_discrete_spring_planar_rigid_beam_transfer(...) mstmm_discrete_spring_planar_rigid_beam_transfer_by((struct mstmm_discrete_spring_planar_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_spring_planar_beam_beam_transfer {
+    const real *W;
+    const real *Theta_I;
+    const real *Theta_O;
+    const real *k_t;
+    const real *c_t;
+    const real *k_1;
+    const real *k_3;
+    const real *c_r;
+    const real *C;
+    const real *D_phi;
+    const real *phi_0;
+    const real *phi_s;
+    const real *theta_s;
+    const real *d_s;
+    const real *q_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_spring_planar_beam_beam_transfer_by(struct mstmm_discrete_spring_planar_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_spring_planar_beam_beam_transfer(
+        to.W, to.Theta_I, to.Theta_O, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi,
+        to.phi_0, to.phi_s, to.theta_s, to.d_s, to.q_s, to.U_h);
+}
+#define mstmm_discrete_spring_planar_beam_beam_transfer(...) mstmm_discrete_spring_planar_beam_beam_transfer_by((struct mstmm_discrete_spring_planar_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_spring_planar_beam_rigid_transfer {
+    const real *Theta_I;
+    const real *k_t;
+    const real *c_t;
+    const real *k_1;
+    const real *k_3;
+    const real *c_r;
+    const real *C;
+    const real *D_phi;
+    const real *phi_0;
+    const real *phi_s;
+    const real *theta_s;
+    const real *d_s;
+    const real *q_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_spring_planar_beam_rigid_transfer_by(struct mstmm_discrete_spring_planar_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_spring_planar_beam_rigid_transfer(
+        to.Theta_I, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s,
+        to.theta_s, to.d_s, to.q_s, to.U_h);
+}
+#define mstmm_discrete_spring_planar_beam_rigid_transfer(...) mstmm_discrete_spring_planar_beam_rigid_transfer_by((struct mstmm_discrete_spring_planar_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer {
+    const real *beta;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(
+        to.beta, to.U_h);
+}
+#define mstmm_discrete_fixed_spatial_rigid_rigid_transfer(...) mstmm_discrete_fixed_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_spatial_rigid_beam_transfer {
+    const real *W;
+    const real *S_O;
+    const real *eta_pO;
+    const real *beta;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_spatial_rigid_beam_transfer_by(struct mstmm_discrete_fixed_spatial_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(
+        to.W, to.S_O, to.eta_pO, to.beta, to.U_h);
+}
+#define mstmm_discrete_fixed_spatial_rigid_beam_transfer(...) mstmm_discrete_fixed_spatial_rigid_beam_transfer_by((struct mstmm_discrete_fixed_spatial_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_spatial_beam_beam_transfer {
+    const real *W;
+    const real *S_I;
+    const real *eta_pI;
+    const real *S_O;
+    const real *eta_pO;
+    const real *beta;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_spatial_beam_beam_transfer_by(struct mstmm_discrete_fixed_spatial_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(
+        to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.beta, to.U_h);
+}
+#define mstmm_discrete_fixed_spatial_beam_beam_transfer(...) mstmm_discrete_fixed_spatial_beam_beam_transfer_by((struct mstmm_discrete_fixed_spatial_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_fixed_spatial_beam_rigid_transfer {
+    const real *S_I;
+    const real *eta_pI;
+    const real *beta;
+    real *U_h;
+};
+static inline int mstmm_discrete_fixed_spatial_beam_rigid_transfer_by(struct mstmm_discrete_fixed_spatial_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(
+        to.S_I, to.eta_pI, to.beta, to.U_h);
+}
+#define mstmm_discrete_fixed_spatial_beam_rigid_transfer(...) mstmm_discrete_fixed_spatial_beam_rigid_transfer_by((struct mstmm_discrete_fixed_spatial_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_ball_spatial_rigid_rigid_transfer {
+    const real *U;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_ball_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_ball_spatial_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(
+        to.U, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_ball_spatial_rigid_rigid_transfer(...) mstmm_discrete_ball_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_ball_spatial_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_ball_spatial_rigid_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_ball_spatial_rigid_beam_transfer_by(struct mstmm_discrete_ball_spatial_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(
+        to.U, to.W, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_ball_spatial_rigid_beam_transfer(...) mstmm_discrete_ball_spatial_rigid_beam_transfer_by((struct mstmm_discrete_ball_spatial_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_ball_spatial_beam_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_ball_spatial_beam_beam_transfer_by(struct mstmm_discrete_ball_spatial_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_ball_spatial_beam_beam_transfer(
+        to.U, to.W, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_ball_spatial_beam_beam_transfer(...) mstmm_discrete_ball_spatial_beam_beam_transfer_by((struct mstmm_discrete_ball_spatial_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_ball_spatial_beam_rigid_transfer {
+    const real *U;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_ball_spatial_beam_rigid_transfer_by(struct mstmm_discrete_ball_spatial_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(
+        to.U, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_ball_spatial_beam_rigid_transfer(...) mstmm_discrete_ball_spatial_beam_rigid_transfer_by((struct mstmm_discrete_ball_spatial_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_pin_spatial_rigid_rigid_transfer {
+    const real *U;
+    const real *a;
+    const real *beta;
+    const real *a_n;
+    const real *m_n;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_pin_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_pin_spatial_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(
+        to.U, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_pin_spatial_rigid_rigid_transfer(...) mstmm_discrete_pin_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_pin_spatial_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_pin_spatial_rigid_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *S_O;
+    const real *eta_pO;
+    const real *a;
+    const real *beta;
+    const real *a_n;
+    const real *m_n;
+    const real *tau_n;
+    const real *S_N;
+    real *U_h;
+};
+static inline int mstmm_discrete_pin_spatial_rigid_beam_transfer_by(struct mstmm_discrete_pin_spatial_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(
+        to.U, to.W, to.S_O, to.eta_pO, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.S_N, to.U_h);
+}
+#define mstmm_discrete_pin_spatial_rigid_beam_transfer(...) mstmm_discrete_pin_spatial_rigid_beam_transfer_by((struct mstmm_discrete_pin_spatial_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_pin_spatial_beam_beam_transfer {
+    const real *U;
+    const real *W;
+    const real *S_I;
+    const real *eta_pI;
+    const real *S_O;
+    const real *eta_pO;
+    const real *a;
+    const real *beta;
+    const real *a_n;
+    const real *m_n;
+    const real *tau_n;
+    const real *S_N;
+    real *U_h;
+};
+static inline int mstmm_discrete_pin_spatial_beam_beam_transfer_by(struct mstmm_discrete_pin_spatial_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_pin_spatial_beam_beam_transfer(
+        to.U, to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.a, to.beta, to.a_n, to.m_n, to.tau_n,
+        to.S_N, to.U_h);
+}
+#define mstmm_discrete_pin_spatial_beam_beam_transfer(...) mstmm_discrete_pin_spatial_beam_beam_transfer_by((struct mstmm_discrete_pin_spatial_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_pin_spatial_beam_rigid_transfer {
+    const real *U;
+    const real *S_I;
+    const real *eta_pI;
+    const real *a;
+    const real *beta;
+    const real *a_n;
+    const real *m_n;
+    const real *tau_n;
+    real *U_h;
+};
+static inline int mstmm_discrete_pin_spatial_beam_rigid_transfer_by(struct mstmm_discrete_pin_spatial_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(
+        to.U, to.S_I, to.eta_pI, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.U_h);
+}
+#define mstmm_discrete_pin_spatial_beam_rigid_transfer(...) mstmm_discrete_pin_spatial_beam_rigid_transfer_by((struct mstmm_discrete_pin_spatial_beam_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer {
+    const real *k_t;
+    const real *c_t;
+    const real *k_r;
+    const real *c_r;
+    const real *C;
+    const real *d_s;
+    const real *q_s;
+    const real *m_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_elastic_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer to)
+{
+    return mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(
+        to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
+}
+#define mstmm_discrete_elastic_spatial_rigid_rigid_transfer(...) mstmm_discrete_elastic_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_elastic_spatial_rigid_beam_transfer {
+    const real *W;
+    const real *S_O;
+    const real *eta_pO;
+    const real *k_t;
+    const real *c_t;
+    const real *k_r;
+    const real *c_r;
+    const real *C;
+    const real *d_s;
+    const real *q_s;
+    const real *m_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_elastic_spatial_rigid_beam_transfer_by(struct mstmm_discrete_elastic_spatial_rigid_beam_transfer to)
+{
+    return mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(
+        to.W, to.S_O, to.eta_pO, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s,
+        to.U_h);
+}
+#define mstmm_discrete_elastic_spatial_rigid_beam_transfer(...) mstmm_discrete_elastic_spatial_rigid_beam_transfer_by((struct mstmm_discrete_elastic_spatial_rigid_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_elastic_spatial_beam_beam_transfer {
+    const real *W;
+    const real *S_I;
+    const real *eta_pI;
+    const real *S_O;
+    const real *eta_pO;
+    const real *k_t;
+    const real *c_t;
+    const real *k_r;
+    const real *c_r;
+    const real *C;
+    const real *d_s;
+    const real *q_s;
+    const real *m_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_elastic_spatial_beam_beam_transfer_by(struct mstmm_discrete_elastic_spatial_beam_beam_transfer to)
+{
+    return mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(
+        to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s,
+        to.q_s, to.m_s, to.U_h);
+}
+#define mstmm_discrete_elastic_spatial_beam_beam_transfer(...) mstmm_discrete_elastic_spatial_beam_beam_transfer_by((struct mstmm_discrete_elastic_spatial_beam_beam_transfer){__VA_ARGS__})
+
+struct mstmm_discrete_elastic_spatial_beam_rigid_transfer {
+    const real *S_I;
+    const real *eta_pI;
+    const real *k_t;
+    const real *c_t;
+    const real *k_r;
+    const real *c_r;
+    const real *C;
+    const real *d_s;
+    const real *q_s;
+    const real *m_s;
+    real *U_h;
+};
+static inline int mstmm_discrete_elastic_spatial_beam_rigid_transfer_by(struct mstmm_discrete_elastic_spatial_beam_rigid_transfer to)
+{
+    return mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(
+        to.S_I, to.eta_pI, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
+}
+#define mstmm_discrete_elastic_spatial_beam_rigid_transfer(...) mstmm_discrete_elastic_spatial_beam_rigid_transfer_by((struct mstmm_discrete_elastic_spatial_beam_rigid_transfer){__VA_ARGS__})
+
 struct mstmm_generic_forward {
     const real *Rt;
     const real *ro;

@@ -16,7 +16,7 @@ from mstmm.ir.spec import ElementSpec
 from ..language.derivation import Derivation
 from ..lower.kernel import lower
 from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
-from .discrete.catalogue import FLEXIBLE
+from .discrete.catalogue import FLEXIBLE, STEPPED
 from .hinge_relation import guards
 
 
@@ -36,9 +36,10 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
     **FLEXIBLE,
 }
 
-#: Those of which a run multiplies the matrices (`sweep = "product"`).  They are generated and
-#: compiled; the others are derived when somebody shows or checks them.
-RUN = ("body_spatial", "pin_spatial", "ball", "acceleration")
+#: Those of which a run multiplies the matrices: of `sweep = "product"`, and of the discrete-time
+#: method.  They are generated and compiled; the others are derived when somebody shows or checks
+#: them.
+RUN = ("body_spatial", "pin_spatial", "ball", "acceleration", *STEPPED)
 
 
 def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:

@@ -26,7 +26,19 @@ DIRECT = {
     "classical_pin": ("classical", "pin_spatial"),
     "classical_ball": ("classical", "ball"),
     "classical_acceleration": ("classical", "acceleration"),
-}
+    **{
+        f"discrete_{name}": ("classical", f"{name}_discrete")
+        for name in ("body_planar", "beam_planar", "body_spatial", "beam_spatial")
+    },
+    **{
+        f"discrete_{hinge}_{pairing}": ("classical", f"hinge_{hinge}_{pairing}")
+        for hinge in (
+            "fixed_planar", "smooth_planar", "spring_planar",
+            "fixed_spatial", "ball_spatial", "pin_spatial", "elastic_spatial",
+        )
+        for pairing in ("rigid_rigid", "rigid_beam", "beam_beam", "beam_rigid")
+    },
+}  # fmt: skip
 #: Kernels that a record points to: short name -> (element that has the same ports, kernels).  The
 #: names of a law's two kinds are those of the kernels they look like.
 POINTED = {

@@ -117,7 +117,7 @@ def _sweep() -> Section:
 
 def _methods() -> Section:
     from mstmm.runtime.integrate.steppers import get, names
-    from mstmm.runtime.run import sundials
+    from mstmm.runtime.run import classical, sundials
 
     rows, data = [], []
     for name in names():
@@ -134,6 +134,11 @@ def _methods() -> Section:
         said = "CVODE of SUNDIALS on the same kernels (extra stiff)"
         rows.append((name, "", "adaptive", said))
         data.append({"name": name, "order": None, "steps": "adaptive", "source": said})
+    for name, product in classical.METHODS.items():
+        how = "product of the matrices" if product else "Riccati on the matrices"
+        said = f"Rui, Wang, Zhang, ch. 7 and 8: absolute coordinates, {how}"
+        rows.append((name, "2", "fixed", said))
+        data.append({"name": name, "order": 2, "steps": "fixed", "source": said})
     columns = ("method", "order>", "steps", "source")
     return Section("methods of integration", columns, rows, data)
 

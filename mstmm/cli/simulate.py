@@ -38,6 +38,9 @@ _ROWS = 9
 #: How the names of methods begin that SciPy and SUNDIALS bring.
 _OF_OTHERS = ("scipy-", "sundials-")
 
+#: How the names of the classical discrete-time method begin.
+_CLASSICAL = "dttmm-classical"
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -61,11 +64,13 @@ class Plan:
     accuracy: float | None = None
     max_step: float = 0.0
     radius: float | None = None
+    scheme: str = ""
+    iterations: int = 1
 
     @property
     def resumable(self) -> bool:
-        """Integrators of others keep no checkpoints."""
-        return not self.method.startswith(_OF_OTHERS)
+        """Integrators of others and the classical method keep no checkpoints."""
+        return not self.method.startswith((*_OF_OTHERS, _CLASSICAL))
 
     @property
     def checkpoint(self) -> Path:
@@ -82,7 +87,7 @@ def simulate(
         str,
         typer.Option(
             "--method", metavar="NAME", help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
-            "more for stiff motion (see mstmm list); scipy-NAME or sundials-NAME."
+            "more for stiff motion (see mstmm list); dttmm-classical; scipy-NAME or sundials-NAME."
         ),
     ] = METHOD,
     step: Annotated[
@@ -154,6 +159,16 @@ def simulate(
         typer.Option("--flexibility", metavar="LEVEL", help="coupled, one-way, or rigid: level of "
                      "model of all flexible bodies; by default as the scene says."),
     ] = None,
+    scheme: Annotated[
+        str,
+        typer.Option("--scheme", metavar="NAME", help="Of dttmm-classical: generalised-alpha, hht, "
+                     "newmark or wilson, with a number as in hht:0.3."),
+    ] = "",
+    iterations: Annotated[
+        int,
+        typer.Option("--iterations", metavar="N", help="Of dttmm-classical: linear solutions that "
+                     "a step may take."),
+    ] = 1,
     accuracy: Annotated[
         float | None,
         typer.Option("--accuracy", metavar="X", parser=positive, help="Error up to which the "
@@ -167,7 +182,7 @@ def simulate(
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
-        max_step or 0.0, radius,
+        max_step or 0.0, radius, scheme, iterations,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -277,7 +292,8 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
     return model.simulate(
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
-        max_step=plan.max_step, radius=plan.radius, progress=progress, resume=plan.resume,
+        max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
+        iterations=plan.iterations, progress=progress, resume=plan.resume,
         checkpoint=str(plan.checkpoint) if plan.resumable else None,
     )  # fmt: skip
 
@@ -338,8 +354,10 @@ def load_method(name: str) -> None:
     SceneError for a method that does not exist, EnvironmentFailure for one whose package is not
     installed.
     """
-    from mstmm.runtime.run import sundials
+    from mstmm.runtime.run import classical, sundials
 
+    if name in classical.METHODS:
+        return
     if name in sundials.METHODS:
         sundials.refuse_without(name)
     elif not name.startswith(_OF_OTHERS):

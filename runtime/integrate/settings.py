@@ -24,7 +24,8 @@ class Settings:
 
     `first_step`, `min_step` and `max_step` (s) are chosen by the loop where they are 0, and
     `max_steps` is 0 for as many as it takes.  `radius` is the spectral radius, 0 to 1, that
-    generalised alpha leaves to infinitely fast motion, None for its usual one.
+    generalised alpha leaves to infinitely fast motion, None for its usual one.  `scheme` and
+    `iterations` (most linear solutions a step) are for the methods dttmm-classical.
     """
 
     t_end: float
@@ -39,6 +40,8 @@ class Settings:
     first_step: float = 0.0
     min_step: float = 0.0
     radius: float | None = None
+    scheme: str = ""
+    iterations: int = 1
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
@@ -69,6 +72,8 @@ def checked(settings: Settings) -> Settings:
         raise SceneError(f"t_end = {t_end:g}: expected a time in s, not before t_start")
     if not isinstance(settings.method, str):
         raise SceneError(f"method = {settings.method!r}: expected a name such as dop853")
+    if not isinstance(settings.scheme, str):
+        raise SceneError(f"scheme = {settings.scheme!r}: expected a name such as hht:0.3")
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
     return replace(
@@ -84,6 +89,9 @@ def checked(settings: Settings) -> Settings:
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
         radius=None if settings.radius is None else _radius(settings.method, settings.radius),
+        iterations=whole(
+            "iterations", settings.iterations, 1, "a whole number of iterations, 1 or more"
+        ),
     )  # fmt: skip
 
 

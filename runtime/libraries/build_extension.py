@@ -21,7 +21,9 @@ from cffi import FFI
 GENERATED = Path("generated")
 
 #: Folders of C that the module is built from, and a folder of which it includes text.
-FOLDERS = (GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"))
+FOLDERS = (
+    GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"), Path("runtime/classical/c"),
+)  # fmt: skip
 PASTED = Path("templates")
 
 MODULE = "mstmm.generated._kernels"

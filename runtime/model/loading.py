@@ -21,6 +21,7 @@ from ..integrate.steppers import get
 from ..kernels import store
 from ..result.output import provenance
 from ..result.result import Result
+from ..run import classical
 from ..run.stability import check_step
 from ..run.trajectory import Trajectory
 from .model import Model
@@ -113,7 +114,8 @@ def _rebuilt(data: Any, path: Path) -> Result:
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
     step = None
-    if run.settings.step is not None and (run.start is not None or len(run.t)):
+    explicit = run.settings.step is not None and run.settings.method not in classical.METHODS
+    if explicit and (run.start is not None or len(run.t)):
         start = np.concatenate(run.first[1:])
         engine, tableau = model.looped, get(run.settings.method)
         step = check_step(engine, tableau, run.settings, start, engine.start_memory())

@@ -201,6 +201,8 @@ class Model(Compiled):
         max_step: float = 0.0,
         max_steps: int = 0,
         radius: float | None = None,
+        scheme: str = "",
+        iterations: int = 1,
         certify: bool = False,
         progress: Callable[[float, float], None] | None = None,
         checkpoint: str | Path | None = None,
@@ -211,14 +213,18 @@ class Model(Compiled):
         Args:
             method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
                 code); for stiff motion rodas4p2, rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436,
-                kvaerno5, genalpha, dttmm, hht, newmark, wilson or houbolt; or scipy-DOP853,
+                kvaerno5, genalpha, dttmm, hht, newmark, wilson or houbolt; scipy-DOP853,
                 scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams:
-                integrators of SciPy and SUNDIALS on the same kernels.
+                integrators of SciPy and SUNDIALS on the same kernels; dttmm-classical,
+                dttmm-classical-product (with `step`): the discrete-time transfer matrix method in
+                absolute coordinates.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
                 (0.8).
+            scheme, iterations: of dttmm-classical; generalised-alpha, hht, newmark or wilson, with
+                a number as in "hht:0.3", and how many linear solutions a step may take.
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
             progress: called with (t, t_end) about every 0.1 s.
@@ -234,7 +240,7 @@ class Model(Compiled):
         settings = checked(
             Settings(
                 t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
-                max_steps, radius=radius,
+                max_steps, radius=radius, scheme=scheme, iterations=iterations,
             )
         )  # fmt: skip
         q, u = self.initial_state() if initial is None else pair("initial", initial)

@@ -26,6 +26,7 @@ from ..integrate.loop import Failure, Run, Status, failure_text
 from ..integrate.settings import Settings, checked
 from ..integrate.steppers import get
 from ..pack.switches import has_switches
+from . import classical, second_opinion
 from .lanes import Lanes, run_lanes
 from .simulate import advance, make_run, said, settled, trajectory
 from .system import SceneCode, SceneSystem
@@ -234,6 +235,8 @@ def prepared(
         settings = replace(settings, output_times=(settings.t_end,))
     if not settings.output_times:
         raise SceneError("output_times: expected one time in s or more")
+    if settings.method in (*second_opinion.METHODS, *classical.METHODS):
+        raise SceneError(f"method {settings.method!r} makes one run at a time: use simulate")
     if settings.step is None and not get(settings.method).adaptive:
         raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
     q, u = pair("initial_states", initial)

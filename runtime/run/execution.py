@@ -16,8 +16,8 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import get
+from . import classical, second_opinion
 from . import engine_choice as compiled_run
-from . import second_opinion
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .simulate import advance, make_run, said, trajectory
@@ -88,10 +88,12 @@ def first_run(
     model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
 ) -> tuple[Trajectory, StepCheck | None]:
     """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
-    if settings.method in second_opinion.METHODS:
+    if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f"method {settings.method!r} keeps no checkpoints; use dop853")
-        return second_opinion.integrate(model, settings, q, u, watch.tell), None
+        others = classical if settings.method in classical.METHODS else second_opinion
+        return others.integrate(model, settings, q, u, watch.tell), None
+    classical.refuse_options(settings)
     state, earlier = _continued(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
     engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)

@@ -56,7 +56,11 @@ def test_what_no_run_calls_has_no_c() -> None:
     """Functions that the engine's C, or Python by a descriptor, calls; and no others but these."""
     printed = [GENERATED / name for name in ("sweep_steps.c", "link_steps.h")]
     paths = [*written_by_hand(GENERATED.parent), *printed]
-    called = set(re.findall(r"\bmstmm_(\w+)\(", "".join(path.read_text() for path in paths)))
+    text = "".join(path.read_text() for path in paths)
+    called = set(re.findall(r"\bmstmm_(\w+)\(", text))
+    pasted = re.findall(r"\bmstmm_(\w+?)##pairing##(\w+)\(", text)
+    pairings = set(re.findall(r"\b(?:CALL|BY_SPACE)\((\w+),", text))
+    called |= {before + pairing + behind for before, behind in pasted for pairing in pairings}
     short = {key: name for name, key in DIRECT.items()}
     by_name = {
         "hinge", "forward", "condense", "recover", "angle", "singularity", "inertia", "bias_load",

@@ -57,7 +57,7 @@ def test_stage_c_is_the_generated_file(mstmm: Command) -> None:
 
 
 def test_stage_c_of_a_matrix_that_no_run_needs_is_derived(mstmm: Command) -> None:
-    name = "classical_hinge_fixed_planar_rigid_beam"
+    name = "classical_elastic_planar_discrete"
     assert f"mstmm_{name}_transfer(" in mstmm("show", name, "--at", "c").out
     assert not (Path(__file__).parents[2] / "generated" / f"{name}.c").exists()
 

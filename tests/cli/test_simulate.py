@@ -237,3 +237,16 @@ def test_disk_too_full_for_netcdf(
     done = mstmm("simulate", "pendulum.toml", "--t-end", "0.1")
     assert done.code == 3 and "MB left" in done.err
     assert not list(folder.glob("*.nc")) and not list(folder.glob(".*.nc"))
+
+
+def test_the_classical_method_has_options_of_its_own(mstmm: Command, folder: Path) -> None:
+    method = ("simulate", "pendulum.toml", "--t-end", "1", "--method", "dttmm-classical")
+    done = mstmm(
+        *method, "--step", "0.01", "--scheme", "hht:0.1", "--iterations", "9", "-o", "a.csv"
+    )
+    assert done.code == 0
+    assert "dttmm-classical, step 0.01 s: 100 steps" in done.out
+    assert not (folder / "a.csv.checkpoint").exists()
+    refused = mstmm(*method, "--step", "0.01", "--scheme", "euler", "-o", "b.csv")
+    assert refused.code == 2 and "generalised-alpha, hht, newmark, wilson" in refused.err
+    assert mstmm(*method, "-o", "b.csv").code == 2

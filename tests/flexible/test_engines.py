@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from flexible import engine_scenes
+from flexible.shaken_arithmetic import STEP, shaken
 from numpy.random import Generator
 from reference.compare import worst
 from reference.jets import Array
 from support.complex_arithmetic import complex_step
-from support.shaken_arithmetic import STEP, shaken
 
 import mstmm
 from mstmm.bridge.fusion import Fusion, modes_at

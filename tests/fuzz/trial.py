@@ -27,7 +27,11 @@ FIRST = "dop853"
 METHODS = (
     "dopri5", "rk4", "pirk13", "scipy-DOP853", "scipy-RK45", "scipy-RK23",
     "scipy-Radau", "scipy-BDF", "scipy-LSODA", "sundials-BDF", "sundials-Adams",
+    "dttmm-classical", "dttmm-classical-product",
 )  # fmt: skip
+
+#: Those that take fixed steps.
+FIXED = ("rk4", "dttmm-classical", "dttmm-classical-product")
 
 REFUSED, RAN, STOPPED, INTERRUPTED = "refused well", "ran", "stopped with a reason", "interrupted"
 TRACEBACK, CRASH, HANG, SILENT = "traceback", "crash", "hang", "silent non-finite"
@@ -153,7 +157,7 @@ def _ask(model: Model, question: Callable[[Model], object]) -> Outcome:
 
 def _run(model: Model, method: str) -> Outcome:
     most = 0 if method.startswith("scipy-") else MAX_STEPS
-    step = STEP if method == "rk4" else None
+    step = STEP if method in FIXED else None
     with ImpatientSignal(PATIENCE) as ctrl_c:
         try:
             result = model.simulate(T_END, method, step, max_steps=most, certify=method == FIRST)

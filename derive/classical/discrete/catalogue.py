@@ -147,3 +147,11 @@ FLEXIBLE: dict[str, Callable[[], Derivation]] = {
         for which in numbers
     },
 }
+
+#: Those of which the discrete-time method makes its steps: rigid bodies and beams with the largest
+#: number of modes (a beam with fewer leaves some idle), and every hinge.
+STEPPED = (
+    "body_planar_discrete", "beam_planar_discrete", "body_spatial_discrete",
+    "beam_spatial_discrete",
+    *(f"{name}_{which}" for name, (_, _, numbers) in HINGES.items() for which in numbers),
+)  # fmt: skip

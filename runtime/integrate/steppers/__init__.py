@@ -97,6 +97,6 @@ def get(name: str, radius: float | None = None) -> Tableau:
         raise SceneError(
             f"method {name!r} is not known; there are: {', '.join(names())}, and SciPy's as "
             "scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and SUNDIALS' as "
-            "sundials-BDF, sundials-Adams"
+            "sundials-BDF, sundials-Adams; and dttmm-classical, dttmm-classical-product"
         )
     return _registered[name]

@@ -13,12 +13,13 @@ import numpy as np
 from mstmm import version
 from mstmm.arrays import Array
 
+from ...classical.schemes import scheme_of
 from ...engine.identity import kernels_hash
 from ...integrate.loop import Statistics, Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import get
+from ...run import classical, second_opinion
 from ...run.error_estimate import ErrorEstimate
-from ...run.second_opinion import METHODS
 from ...run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -148,11 +149,13 @@ def _number(value: Any) -> Any:
 def _settings(found: dict[str, Any]) -> Settings:
     """Settings of values that are of the kind that settings have."""
     for name, value in found.items():
-        if name not in ("method", "output_times"):
+        if name not in ("method", "output_times", "scheme"):
             _number(value)
     method = found["method"]
-    if method not in METHODS:
+    if method not in (*second_opinion.METHODS, *classical.METHODS):
         get(method)
+    if method in classical.METHODS:
+        scheme_of(found.get("scheme", ""))
     return Settings(**found)
 
 

@@ -1,0 +1,201 @@
+"""Bodies of a scene as the classical method takes them: one part per rigid body or beam.
+
+A rigid body has the internal frame of the engine.  A beam has its own axes, and its origin where it
+is held; the nodes by which the engine sweeps it (floating frame, sections) are one part here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..engine.calls import Probe
+from ..flexible.modal_body import ModalBody
+from ..flexible.modal_port import ModalPort
+from ..pack.flexible.expansion import HELD
+from ..pack.packed import Packed
+from .known import Springs, hinge_kinds, refused
+
+#: Largest share of a length that is rounding.
+_NOTHING = 1e-12
+
+
+def _none(rows: int) -> Array:
+    return np.zeros((rows, 0))
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Shapes of a beam, in the order of its modal coordinates from q and u on: directions (1: y,
+    2: z), int rho phi and int rho x phi (n,), matrices (n, n)."""
+
+    directions: tuple[int, ...]
+    shift: Array
+    moment: Array
+    mass: Array
+    stiffness: Array
+    damping: Array
+    q: int
+    u: int
+
+    @property
+    def n(self) -> int:
+        """Number of shapes."""
+        return len(self.directions)
+
+
+@dataclass(frozen=True)
+class Hung:
+    """What a body hangs on: part `parent` (-1: the ground) with hinge point (3) and axes (3, 3) at
+    rest in its frame, where its shapes displace by `shapes` and turn by `slopes` (3, n)."""
+
+    parent: int
+    point: Array
+    turn: Array
+    shapes: Array
+    slopes: Array
+
+
+@dataclass(frozen=True)
+class Part:
+    """A body with its inboard hinge.
+
+    `hinge` is the place in the engine's tree whose inboard hinge it is, `frame` the body's axes and
+    origin there.  `end` (3, 3) are the hinge's axes on the body itself at rest, turned by its own
+    shapes as `held` (3, n) says.
+    """
+
+    hinge: int
+    hung: Hung
+    kind: str
+    springs: Springs | None
+    frame: Probe
+    mass: float
+    first: Array
+    inertia: Array
+    end: Array
+    held: Array
+    bending: Bending | None = None
+
+    @property
+    def parent(self) -> int:
+        """Part that it hangs on, -1 for the ground."""
+        return self.hung.parent
+
+
+def parts_of(packed: Packed) -> list[Part]:
+    """The parts of a scene, parents first.  SceneError for what there is no matrix for."""
+    parts = list(_Parts(packed))
+    carried: dict[int, int] = {}
+    for part in parts:
+        if part.parent >= 0 and parts[part.parent].bending is not None:
+            if part.parent in carried:
+                hinge = packed.scene.hinges.name(packed.topology.links[part.hinge].hinge)
+                raise refused(f'hinge "{hinge}"', "its beam carries another hinge already")
+            carried[part.parent] = part.hinge
+    return parts
+
+
+class _Parts:
+    """One walk over the tree of nodes."""
+
+    def __init__(self, packed: Packed) -> None:
+        self.packed, self.expanded = packed, packed.expanded
+        self.kinds = hinge_kinds(packed)
+        #: Place of a node -> its part, and the section of a beam that it is.
+        self.owner: dict[int, tuple[int, ModalPort | None]] = {-1: (-1, None)}
+        self.origins: list[Array] = []
+
+    def __iter__(self) -> Iterator[Part]:
+        scene, passages = self.packed.scene, self.expanded.passages
+        for place, link in enumerate(self.packed.topology.links):
+            name = scene.bodies.name(link.body)
+            if not self.expanded.is_node(name):
+                self.owner[place] = (len(self.origins), None)
+                yield self._rigid(place)
+            elif name not in passages:  # held by a hinge of the scene
+                beam = name.removesuffix(f"/{HELD}")
+                body = self.expanded.bodies[beam]
+                port = body.ports[self.expanded.held[beam]]
+                self.owner[place] = (len(self.origins), port)
+                yield self._beam(place, body, port)
+            else:
+                self.owner[place] = (self.owner[link.parent][0], passages[name].port)
+
+    def _rigid(self, place: int) -> Part:
+        kind, springs = self.kinds[place]
+        self.origins.append(np.zeros(3))
+        p = np.array(self.packed.system.body(place).body_p)
+        frame = Probe(place, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+        return Part(
+            place, self._hung(place), kind, springs, frame, float(p[0]), p[1:4], p[4:10], np.eye(3),
+            _none(3),
+        )  # fmt: skip
+
+    def _node(self, place: int) -> tuple[str, Array, Array]:
+        """Name of a node, and its internal axes and origin in the user's axes."""
+        name = self.packed.scene.bodies.name(self.packed.topology.links[place].body)
+        own = self.packed.placements[name]
+        return name, np.array(own.rotation), np.array(own.origin)
+
+    def _hung(self, place: int) -> Hung:
+        parent = self.packed.topology.links[place].parent
+        owner, port = self.owner[parent]
+        connection = np.array(self.packed.system.body(place).connection)
+        turn, point = connection[:9].reshape(3, 3), connection[9:12]
+        if port is None:
+            return Hung(owner, point, turn, _none(3), _none(3))
+        _, rotation, origin = self._node(parent)
+        if np.abs(origin + rotation @ point).max() > _NOTHING:
+            hinge = self.packed.scene.hinges.name(self.packed.topology.links[place].hinge)
+            raise refused(f'hinge "{hinge}"', "it lies beside the axis of a beam")
+        position = port.position - self.origins[owner]
+        return Hung(owner, position, port.rotation @ rotation @ turn, port.phi, port.theta)
+
+    def _beam(self, place: int, body: ModalBody, port: ModalPort) -> Part:
+        kind, springs = self.kinds[place]
+        hung, bending = self._hung(place), _bending(body, port, self.packed)
+        self.origins.append(port.position)
+        node, axes, _ = self._node(place)
+        if node != body.name:  # the section, which turns with the beam
+            axes = port.rotation @ axes
+        first = body.first - body.mass * port.position
+        crossed = np.outer(port.position, body.first) + np.outer(first, port.position)
+        second = body.second - crossed
+        inertia = np.trace(second) * np.eye(3) - second
+        return Part(
+            place, hung, kind, springs, self._floating(body, port), body.mass, first,
+            inertia[np.triu_indices(3)], axes, port.theta, bending,
+        )  # fmt: skip
+
+    def _floating(self, body: ModalBody, port: ModalPort) -> Probe:
+        """Axes of a beam, and the point of its floating frame where it is held at rest."""
+        own = self.packed.placements[body.name]
+        x, y, z = (float(entry) for entry in port.position)
+        axes = tuple(np.array(own.rotation).T.ravel().tolist())
+        return Probe(self.packed.positions[body.name], axes, own.point((x, y, z)))
+
+
+def _bending(body: ModalBody, port: ModalPort, packed: Packed) -> Bending:
+    """Shapes of a beam.  SceneError for what the matrices of beams leave out."""
+    what = f'"{body.name}"'
+    if body.shapes is None:
+        raise refused(what, "of flexible bodies beams alone have matrices")
+    data = body.shapes.data
+    if body.shapes.stiffening:
+        raise refused(what, "its matrices are linear in the deflection; set stiffening = false")
+    if body.points or body.drag is not None or data.rotary:
+        raise refused(what, "quadrature, viscous drag and rotary inertia have no place in them")
+    if any(name[0] not in "yz" for name in body.modes):
+        raise refused(what, "twist and axial shapes have no place in its matrices")
+    if np.any(port.phi):
+        raise refused(what, "its frame does not stay at its held end; use tangent or chord")
+    d = np.array(["xyz".index(name[0]) for name in body.modes], dtype=np.int64)
+    k, slots = np.arange(len(d)), packed.layout.modal[body.name]
+    moment = body.E[0, d, k] - port.position[0] * body.C[d, k]
+    gram = body.F[d[:, None], d[None, :], k[:, None], k[None, :]]
+    return Bending(tuple(d.tolist()), body.C[d, k], moment, gram, body.K, body.D, slots.q, slots.u)
