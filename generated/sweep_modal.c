@@ -168,55 +168,6 @@ int mstmm_solve_ldl(
     }
     return 0;
 }
-
-/* x = a^-1 b by LU with row exchange; sizes as above.  `work` (n x n) keeps the factors.  Returns 1
- * if a pivot is not above relative_pivot times the magnitude of its column in a (NaN included), 2 if
- * the determinant is negative, else 0. */
-static inline __attribute__((always_inline))
-int mstmm_solve_lu(
-    int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
-    real *restrict work, real relative_pivot)
-{
-    int negative = 0;
-    for (int i = 0; i < n * n; ++i) work[i] = a[i];
-    for (int i = 0; i < n * m; ++i) x[i] = b[i];
-#pragma GCC unroll 4
-    for (int i = 0; i < n; ++i) {
-        int best = i;
-        for (int k = i + 1; k < n; ++k)
-            if (fabs(work[best * n + i]) < fabs(work[k * n + i])) best = k;
-        if (best != i) {
-            negative = !negative;
-            for (int j = i; j < n; ++j) {
-                const real entry = work[i * n + j];
-                work[i * n + j] = work[best * n + j];
-                work[best * n + j] = entry;
-            }
-            for (int j = 0; j < m; ++j) {
-                const real entry = x[i * m + j];
-                x[i * m + j] = x[best * m + j];
-                x[best * m + j] = entry;
-            }
-        }
-        real size = 0;
-        for (int k = 0; k < n; ++k) size += fabs(a[k * n + i]);
-        const real pivot = work[i * n + i];
-        if (!(fabs(pivot) > relative_pivot * size)) return 1;
-        if (pivot < 0) negative = !negative;
-        for (int k = i + 1; k < n; ++k) {
-            const real factor = work[k * n + i] / pivot;
-            for (int j = i + 1; j < n; ++j) work[k * n + j] -= factor * work[i * n + j];
-            for (int j = 0; j < m; ++j) x[k * m + j] -= factor * x[i * m + j];
-        }
-    }
-    for (int i = n - 1; i >= 0; --i)
-        for (int j = 0; j < m; ++j) {
-            real rest = x[i * m + j];
-            for (int k = i + 1; k < n; ++k) rest -= work[i * n + k] * x[k * m + j];
-            x[i * m + j] = rest / work[i * n + i];
-        }
-    return negative ? 2 : 0;
-}
 #endif
 
 /* residual of a flexible body in its floating frame

@@ -33,54 +33,11 @@ int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict
 int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
     real *restrict dq);
 
-#ifndef MSTMM_SOLVE_LDL
-#define MSTMM_SOLVE_LDL
-/* x = a^-1 b by a = L D L^T without pivoting: a is n x n (lower triangle read), b and x are n x m.
- * `work` (n x n) keeps L below and D on its diagonal.  Returns 1 if a pivot is not above
- * relative_pivot times its own diagonal entry (NaN included), else 0.  Where n is a number that the
- * compiler knows, the loops are unrolled. */
-static inline __attribute__((always_inline))
-int mstmm_solve_ldl(
-    int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
-    real *restrict work, real relative_pivot)
-{
-#pragma GCC unroll 4
-    for (int i = 0; i < n; ++i) {
-#pragma GCC unroll 4
-        for (int j = 0; j < i; ++j) {
-            real rest = a[i * n + j];
-#pragma GCC unroll 4
-            for (int k = 0; k < j; ++k) rest -= work[i * n + k] * work[j * n + k] * work[k * n + k];
-            work[i * n + j] = rest / work[j * n + j];
-        }
-        real pivot = a[i * n + i];
-#pragma GCC unroll 4
-        for (int k = 0; k < i; ++k) pivot -= work[i * n + k] * work[i * n + k] * work[k * n + k];
-        if (!(pivot > relative_pivot * fabs(a[i * n + i]))) return 1;
-        work[i * n + i] = pivot;
-    }
-    for (int column = 0; column < m; ++column) {
-#pragma GCC unroll 4
-        for (int i = 0; i < n; ++i) {
-            real rest = b[i * m + column];
-#pragma GCC unroll 4
-            for (int k = 0; k < i; ++k) rest -= work[i * n + k] * x[k * m + column];
-            x[i * m + column] = rest;
-        }
-#pragma GCC unroll 4
-        for (int i = n - 1; i >= 0; --i) {
-            real rest = x[i * m + column] / work[i * n + i];
-#pragma GCC unroll 4
-            for (int k = i + 1; k < n; ++k) rest -= work[k * n + i] * x[k * m + column];
-            x[i * m + column] = rest;
-        }
-    }
-    return 0;
-}
-
-/* x = a^-1 b by LU with row exchange; sizes as above.  `work` (n x n) keeps the factors.  Returns 1
- * if a pivot is not above relative_pivot times the magnitude of its column in a (NaN included), 2 if
- * the determinant is negative, else 0. */
+#ifndef MSTMM_SOLVE_LU
+#define MSTMM_SOLVE_LU
+/* x = a^-1 b by LU with row exchange; a is n x n, b and x are n x m.  `work` (n x n) keeps the factors.
+ * Returns 1 if a pivot is not above relative_pivot times the magnitude of its column in a (NaN
+ * included), 2 if the determinant is negative, else 0. */
 static inline __attribute__((always_inline))
 int mstmm_solve_lu(
     int n, int m, const real *restrict a, const real *restrict b, real *restrict x,

@@ -44,6 +44,11 @@ def literal(text: str) -> str:
     return f"(-{written})" if value < 0 else written
 
 
+def solver(solve: Solve) -> str:
+    """The template with the C function, mstmm_ and this, that solves."""
+    return "solve_ldl" if solve.symmetric else "solve_lu"
+
+
 def string(text: str) -> str:
     """C string literal; every byte that is not plain ASCII is escaped."""
     plain = "".join(
@@ -131,7 +136,7 @@ class KernelText:
         width = columns[0] if columns else 1
         return {
             "kind": "solve",
-            "function": "mstmm_solve_ldl" if solve.symmetric else "mstmm_solve_lu",
+            "function": f"mstmm_{solver(solve)}",
             "negative": not solve.symmetric,
             "columns": "n" if isinstance(width, str) else width,
             "matrix": self.names[solve.matrix],

@@ -27,7 +27,7 @@ from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .callers import calls_header
-from .kernel import KernelText, comment, string
+from .kernel import KernelText, comment, solver, string
 from .storage import layout_header
 from .sweep import sweep_files
 
@@ -231,7 +231,9 @@ def _element_view(spec: ElementSpec) -> dict[str, Any]:
         "sources": list(spec.sources),
         "hash": spec.hash(),
         "replayed": [kernel.name for kernel in spec.kernels if kernel not in kernels],
-        "solves": any(abi.needs_work(kernel) for kernel in kernels),
+        "solvers": sorted(
+            {solver(s) for kernel in kernels for s in kernel.statements if isinstance(s, Solve)}
+        ),
         "tables": [
             *_name_tables("q", spec.coordinates),
             *_name_tables("u", spec.speeds),

@@ -231,9 +231,10 @@ class System:
         return self.bodies[-1].place + self.bodies[-1].count if self.bodies else 0
 
     @property
-    def dragged(self) -> bool:
-        """Whether the medium drags on a flexible body."""
-        return any(one.modal is not None and one.modal.drag is not None for one in self.distinct)
+    def dragged(self) -> list[int]:
+        """Places of the flexible bodies on which the medium drags."""
+        dragged = self.rows(lambda one: one.modal is not None and one.modal.drag is not None)
+        return [int(place) for place in np.flatnonzero(dragged)]
 
     @property
     def steady(self) -> bool:

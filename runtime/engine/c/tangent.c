@@ -6,7 +6,7 @@
 
 #include "aim.h"
 #include "hinge.h"
-#include "solve.c.jinja"
+#include "solve_lu.c.jinja"
 #include "sweep_steps.h"
 
 int64_t mstmm_bend_numbers(int n);
@@ -30,6 +30,8 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
             place += mstmm_port_numbers(body->section->modal->n);
         }
     }
+    for (int k = 0; k < model->n_forces; k++)
+        if (!model->forces[k].wrench_slope) return -1 - model->n_bodies - k;
     return place;
 }
 

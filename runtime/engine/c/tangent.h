@@ -31,7 +31,8 @@ typedef struct {
 } mstmm_tangent;
 
 /* Lays out the tangent's numbers over the bodies; returns how many there are, or -1 - i if the
- * kernels of body i or its hinge are from before there were derivatives. */
+ * kernels of body i or its hinge, or the force behind all bodies, are from before there were
+ * derivatives. */
 int64_t mstmm_tangent_lay(mstmm_model *model);
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots);
 /* Numbers of `work` for one that knows mstmm_residual and mstmm_tangent_rates alone. */
