@@ -900,6 +900,7 @@ static const mstmm_port mstmm_sweep_tangent_node_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
+    {2, "the determinant is negative; all results are there"},
 };
 
 /* unknowns of a flexible body eliminated
@@ -1763,6 +1764,7 @@ static const mstmm_port mstmm_sweep_tangent_node_own_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_tangent_node_own_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
+    {2, "the determinant is negative; all results are there"},
 };
 
 /* what hangs on a port, as the unknowns of its body see it
@@ -2328,6 +2330,7 @@ static const mstmm_port mstmm_sweep_tangent_push_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_tangent_push_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
+    {2, "the determinant is negative; all results are there"},
 };
 
 /* unknowns that answer a right-hand side
@@ -2627,6 +2630,7 @@ static const mstmm_port mstmm_sweep_tangent_lag_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_tangent_lag_guards[] = {
     {1, "a pivot of A vanishes: a motion is undetermined"},
+    {2, "the determinant is negative; all results are there"},
 };
 
 /* change of coordinates
@@ -2685,7 +2689,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .inputs = mstmm_sweep_tangent_node_inputs,
         .outputs = mstmm_sweep_tangent_node_outputs,
         .ir_hash = "e97de26a445ed6531523caad2a9c95715d1efef6453f0ab54e29363803d18efe",
-        .n_guards = 1,
+        .n_guards = 2,
         .guards = mstmm_sweep_tangent_node_guards,
     },
     {
@@ -2697,7 +2701,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .inputs = mstmm_sweep_tangent_node_own_inputs,
         .outputs = mstmm_sweep_tangent_node_own_outputs,
         .ir_hash = "75314a369a51310126bb00c31ca07f95c9e72eb6712bb068e4ed183c6769c9d1",
-        .n_guards = 1,
+        .n_guards = 2,
         .guards = mstmm_sweep_tangent_node_own_guards,
     },
     {
@@ -2721,7 +2725,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .inputs = mstmm_sweep_tangent_push_inputs,
         .outputs = mstmm_sweep_tangent_push_outputs,
         .ir_hash = "6a634f9014a00b11d154dc54d30d76f666c770d276a3a47c042b04f8c97d5da0",
-        .n_guards = 1,
+        .n_guards = 2,
         .guards = mstmm_sweep_tangent_push_guards,
     },
     {
@@ -2757,7 +2761,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .inputs = mstmm_sweep_tangent_lag_inputs,
         .outputs = mstmm_sweep_tangent_lag_outputs,
         .ir_hash = "ab7ccaaf68e860a935ad491f961210f5ccaa4d6a5547754d4457322e781fce0e",
-        .n_guards = 1,
+        .n_guards = 2,
         .guards = mstmm_sweep_tangent_lag_guards,
     },
     {

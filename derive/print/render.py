@@ -266,6 +266,9 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
     unused = [name for name in names if name not in used | written]
     looped = any(s["kind"] in ("sum", "solve") or s.get("loops") for s in statements)
     sized = any("n *" in str(s) for s in statements)
+    judged = [s["output"] for s in statements if s["kind"] == "solve" and s["negative"]]
+    guards = [(s.code, s.message) for s in kernel.statements if isinstance(s, (Guard, Solve))]
+    guards += [(NEGATIVE, "the determinant is negative; all results are there")] * bool(judged)
     return {
         "name": kernel.name,
         "function": abi.kernel_symbol(spec.kind, spec.name, kernel.name),
@@ -282,12 +285,8 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
         + ([] if outputs else ["out"]),
         "statements": statements,
         "negative": NEGATIVE,
-        "judged": [s["output"] for s in statements if s["kind"] == "solve" and s["negative"]],
-        "guards": [
-            {"code": s.code, "message": string(s.message)}
-            for s in kernel.statements
-            if isinstance(s, (Guard, Solve))
-        ],
+        "judged": judged,
+        "guards": [{"code": code, "message": string(message)} for code, message in guards],
         "hash": kernel.hash(),
     }
 

@@ -117,8 +117,6 @@ def test_large_matrices_are_refused() -> None:
     q, _ = model.initial_state()
     with pytest.raises(SceneError, match=r"mass matrix of 20001 speeds would have 3 GB"):
         model.mass_matrix(q)
-    with pytest.raises(SceneError, match=r"stiffness matrix of 20001 speeds"):
-        model.equilibrium()
 
 
 def test_a_large_result_is_saved_without_what_follows_from_it(tmp_path: Any) -> None:
