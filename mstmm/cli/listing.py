@@ -116,7 +116,7 @@ def _sweep() -> Section:
 
 
 def _methods() -> Section:
-    from mstmm.runtime.integrate.steppers import get, names
+    from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get, names
     from mstmm.runtime.run import classical, sundials
 
     rows, data = [], []
@@ -125,6 +125,9 @@ def _methods() -> Section:
         steps = "adaptive or fixed" if method.adaptive else "fixed"
         rows.append((name, str(method.order), steps, method.source))
         data.append({"name": name, "order": method.order, "steps": steps, "source": method.source})
+    choice = f"{AUTO_EXPLICIT}, and rodas4p2 or rodas5p where stability sets its steps"
+    rows.append((AUTO, "", "adaptive", choice))
+    data.append({"name": AUTO, "order": None, "steps": "adaptive", "source": choice})
     scipy = "scipy-NAME"
     rows.append(
         (scipy, "", "adaptive", "solve_ivp of SciPy on the same kernels, such as scipy-LSODA")

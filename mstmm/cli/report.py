@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
     from mstmm.runtime.result.verdict import Verdict
 
+#: Stretches of a run that are told one by one.
+_STRETCHES = 6
+
 
 def sizes(result: Result) -> str:
     """3 bodies on 3 hinges, 9 degrees of freedom."""
@@ -34,8 +37,25 @@ def effort(result: Result, seconds: float) -> str:
     if counted is not None:
         parts.append(count(counted.steps, "step"))
         parts.append(count(counted.evaluations, "evaluation"))
+        if counted.residuals:
+            parts.append(count(counted.residuals, "residual"))
     parts.append(f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s")
     return ": ".join([parts[0], ", ".join(parts[1:])])
+
+
+def method_lines(result: Result, width: int) -> list[str]:
+    """What the choice among methods did, folded; of many stretches how much each method made."""
+    stretches = result.methods
+    if not stretches:
+        return []
+    if len(stretches) <= _STRETCHES:
+        return [part for stretch in stretches for part in _folded(f"  {stretch}", width)]
+    ends = [*(stretch.t for stretch in stretches[1:]), result.last_state[0]]
+    times: dict[str, float] = {}
+    for stretch, end in zip(stretches, ends, strict=True):
+        times[stretch.method] = times.get(stretch.method, 0.0) + end - stretch.t
+    shares = ", ".join(f"{name} {time:.4g} s" for name, time in times.items())
+    return _folded(f"  in {len(stretches)} stretches: {shares}", width)
 
 
 def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int) -> str:
@@ -88,6 +108,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "q": dict(zip(layout.q_names, result.q[last].tolist(), strict=True)) if last >= 0 else {},
         "u": dict(zip(layout.u_names, result.u[last].tolist(), strict=True)) if last >= 0 else {},
         "method": result.settings.method,
+        "methods": [asdict(stretch) for stretch in result.methods],
         "engine": result.model.engine,
         "engine_choice": result.model.engine_choice,
         "seconds": seconds,

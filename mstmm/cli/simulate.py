@@ -87,7 +87,8 @@ def simulate(
         str,
         typer.Option(
             "--method", metavar="NAME", help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
-            "more for stiff motion (see mstmm list); dttmm-classical; scipy-NAME or sundials-NAME."
+            "more for stiff motion (see mstmm list); auto, which chooses; dttmm-classical; "
+            "scipy-NAME or sundials-NAME."
         ),
     ] = METHOD,
     step: Annotated[
@@ -361,9 +362,9 @@ def load_method(name: str) -> None:
     if name in sundials.METHODS:
         sundials.refuse_without(name)
     elif not name.startswith(_OF_OTHERS):
-        from mstmm.runtime.integrate.steppers import get
+        from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get
 
-        get(name)
+        get(AUTO_EXPLICIT if name == AUTO else name)
 
 
 def interrupted(result: Result) -> bool:
@@ -407,6 +408,8 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
         output.say(line)
     output.say(f"{plan.scene}: {report.sizes(result)}, {result.model.engine} engine")
     output.say(report.effort(result, seconds))
+    for line in report.method_lines(result, console.width):
+        output.say(line)
     output.say(result.message)
     if len(result.t):
         output.say()

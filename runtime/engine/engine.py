@@ -84,11 +84,13 @@ class Engine(Calls):
         matrix = np.array(columns).reshape(self.nu, self.nu).T
         return np.asarray((matrix + matrix.T) / 2)
 
-    def solve(self, q: Array, columns: Array) -> Array:
+    def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
-        the others.  q (nq,) of one state; S is factored once, each column is O(bodies)."""
+        the others.  q (nq,) of one state; S is factored once, each column is O(bodies).
+        Without `memory` nothing is released."""
         engine = self.inertia_alone
-        answers, memory = np.empty(columns.shape), engine.start_memory()
+        answers = np.empty(columns.shape)
+        memory = engine.start_memory() if memory is None else memory
         failure = self.ffi.new("mstmm_failure *")
         code = self.lib.mstmm_solve(
             engine.packed.model, engine.workspace(), len(columns), self.pointer(q),

@@ -72,6 +72,12 @@ class Tangent:
         self._call("tangent_solve", np.ascontiguousarray(r, float), x)
         return x
 
+    def rates(self, q: Array, u: Array) -> Array:
+        """N(q) u (nq,), zero on coordinates that somebody imposes; spoils the residual's state."""
+        dq = np.zeros(self.nq)
+        self._call("tangent_rates", q, u, dq)
+        return dq
+
     def coordinates(self, x: Array, rho: Array | None = None) -> Array:
         """dq (nq,) of an x: sq dq = kappa g_q dq + N x + rho."""
         dq = np.zeros(self.nq)

@@ -166,12 +166,8 @@ class Run:
         bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
         capacity: int | None = None,
     ) -> None:
-        if tableau.implicit and not system.implicit:
-            raise SceneError(
-                f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
-                "motion, which this system has not; take an explicit method such as dop853"
-            )
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
+        self._refuse_without_tangent(tableau)
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
@@ -193,13 +189,24 @@ class Run:
         run.n_bounds = len(starts)
         run.bound_starts, run.bounds = self._doubles(starts), self._doubles(longest)
         self._buffer(run, capacity)
-        size = lib.mstmm_workspace_size(system, run.tableau)
-        run.workspace = self._doubles(np.zeros(max(size, 1)))
+        run.workspace = self._space = self._room(run.tableau)
         start = np.array(y0, dtype=np.float64)
         if start.shape != (system.n_state,):
             raise SceneError(f"y0 has shape {start.shape}, expected ({system.n_state},)")
         if lib.mstmm_run_start(run, self._doubles(start)) == Status.BAD_ARGUMENT:
             raise SceneError(f"{tableau.name}: check {_ARGUMENTS[run.count.code]}")
+
+    def _refuse_without_tangent(self, tableau: Tableau) -> None:
+        if tableau.implicit and not self._system.implicit:
+            raise SceneError(
+                f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
+                "motion, which this system has not; take an explicit method such as dop853"
+            )
+
+    def _room(self, tableau: Any) -> Any:
+        """Workspace for a method; it lives as long as what is returned."""
+        size = self._lib.mstmm_workspace_size(self._system, tableau)
+        return self._ffi.from_buffer("double[]", np.zeros(max(size, 1)))
 
     def _doubles(self, array: ArrayLike) -> Any:
         """`double *` to a contiguous copy that lives as long as the run."""
@@ -248,6 +255,46 @@ class Run:
                 return status
             if left == 0.0:
                 return Status.RUNNING
+
+    def call_back(self, signs: int, look: int = 0, short_step: float = 0.0) -> None:
+        """Have `advance` come back between steps, with `asked`.
+
+        Args:
+            signs: when so many of the last steps spoke for another kind of method: of explicit
+                methods those as long as stability allows, of implicit ones those below short_step.
+            look: when so many steps have been made in all.  For both, 0 is never.
+            short_step: s.
+        """
+        self._run.sign_steps, self._run.look_steps = signs, look
+        self._run.short_step = short_step
+
+    @property
+    def asked(self) -> bool:
+        """Whether the last `advance` came back for what `call_back` asked for."""
+        return bool(self._run.count.asked)
+
+    @property
+    def signs(self) -> int:
+        """How many of the last steps spoke for another kind of method."""
+        return int(self._run.count.sign)
+
+    @property
+    def last_step(self) -> float:
+        """Length of the last step in s."""
+        return float(self._run.real.h)
+
+    def change(self, tableau: Tableau) -> None:
+        """Go on by another method from where the run stands between two steps.  Counts, samples,
+        events and the length of the next step go on.
+
+        Raises SceneError within a step, and for methods or runs of fixed steps.
+        """
+        self._refuse_without_tangent(tableau)
+        c_method = c_tableau(self._ffi, tableau)
+        space = self._room(c_method)
+        if self._lib.mstmm_run_change(self._run, c_method, space):
+            raise SceneError(f"method {tableau.name!r} cannot take this run over")
+        self.tableau, self._space = tableau, space
 
     def _drain(self) -> None:
         m = int(self._run.n_samples)

@@ -12,7 +12,7 @@ from mstmm.arrays import numbers, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
-from .steppers import check_radius
+from .steppers import AUTO, AUTO_EXPLICIT, check_radius
 
 #: Absolute tolerances below this are this: squares of errors against them must not overflow.
 _LEAST = 1e-100
@@ -42,6 +42,11 @@ class Settings:
     radius: float | None = None
     scheme: str = ""
     iterations: int = 1
+
+    @property
+    def first_method(self) -> str:
+        """The method by which the run begins."""
+        return AUTO_EXPLICIT if self.method == AUTO else self.method
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
@@ -74,6 +79,11 @@ def checked(settings: Settings) -> Settings:
         raise SceneError(f"method = {settings.method!r}: expected a name such as dop853")
     if not isinstance(settings.scheme, str):
         raise SceneError(f"scheme = {settings.scheme!r}: expected a name such as hht:0.3")
+    if settings.method == AUTO and settings.step is not None:
+        raise SceneError(
+            f"step = {settings.step!r}: method {AUTO!r} chooses its steps; leave step out, or name "
+            "a method"
+        )
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
     return replace(

@@ -212,12 +212,13 @@ class Model(Compiled):
 
         Args:
             method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
-                code); for stiff motion rodas4p2, rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436,
-                kvaerno5, genalpha, dttmm, hht, newmark, wilson or houbolt; scipy-DOP853,
-                scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams:
-                integrators of SciPy and SUNDIALS on the same kernels; dttmm-classical,
-                dttmm-classical-product (with `step`): the discrete-time transfer matrix method in
-                absolute coordinates.
+                code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol
+                from 1e-5 on) or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4,
+                ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, newmark, wilson or
+                houbolt; scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA,
+                sundials-BDF, sundials-Adams: integrators of SciPy and SUNDIALS on the same kernels;
+                dttmm-classical, dttmm-classical-product (with `step`): the discrete-time transfer
+                matrix method in absolute coordinates.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
@@ -275,12 +276,14 @@ class Model(Compiled):
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
             threads: as many as the machine has processors if not given.
-            method, step, rtol, atol, t_start, max_step, max_steps, radius: as in `simulate`.
+            method, step, rtol, atol, t_start, max_step, max_steps, radius: as in `simulate`; auto
+                chooses for each trajectory.
 
-        Trajectories run side by side in the lanes of vectors where the scene has neither events,
-        releases, twist springs nor drives, and over threads.  The numbers of one depend on no
-        other: not on the size of the batch, its neighbours or the threads, to the last bit.  A
-        trajectory that fails has `success` False, a message, and nan where it did not come.
+        Trajectories run side by side in the lanes of vectors, by explicit methods, where the scene
+        has neither events, releases, twist springs nor drives, and over threads.  The numbers of
+        one depend on no other: not on the size of the batch, its neighbours or the threads, to the
+        last bit.  A trajectory that fails has `success` False, a message, and nan where it did not
+        come.
 
         Raises SceneError for settings, shapes or parameters that make no sense.
         """

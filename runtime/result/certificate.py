@@ -198,7 +198,7 @@ def _advice(c: Certificate) -> list[str]:
         return []
     return [
         "many steps were as long as the stability of the explicit method allows: the scene is "
-        "stiff for it (scipy-Radau or scipy-BDF may be faster), or the fixed step is too long"
+        'stiff for it (method = "auto" or "rodas4p2" may be faster), or the fixed step is too long'
     ]
 
 

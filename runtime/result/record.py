@@ -17,6 +17,7 @@ from ..pack.layout import HingeSlots
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
 from ..run.stability import StepCheck
+from ..run.stretches import Stretch
 from ..run.trajectory import Trajectory
 from .certificate import Certificate
 from .flexible.quantities import FlexibleResults
@@ -77,6 +78,12 @@ class Record(FlexibleResults, ABC):
             return f"{count}: {self._observed.failures[0]}"
         finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
         return "" if finite else "its energies or momenta are beyond what numbers hold"
+
+    @property
+    def methods(self) -> tuple[Stretch, ...]:
+        """What method="auto" did: each method with its begin (s), reason and fastest motion (1/s);
+        empty for a run whose method was given."""
+        return self.trajectory.methods
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:

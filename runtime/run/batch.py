@@ -24,11 +24,11 @@ from mstmm.errors import MstmmError, SceneError
 
 from ..integrate.loop import Failure, Run, Status, failure_text
 from ..integrate.settings import Settings, checked
-from ..integrate.steppers import get
+from ..integrate.steppers import AUTO, get
 from ..pack.switches import has_switches
 from . import classical, second_opinion
 from .lanes import Lanes, run_lanes
-from .simulate import advance, make_run, said, settled, trajectory
+from .simulate import advance, choice_of, make_run, said, settled, trajectory
 from .system import SceneCode, SceneSystem
 from .threads import on_threads
 
@@ -83,7 +83,8 @@ def simulate_batch(
 ) -> BatchResult:
     """See `Model.simulate_batch`; settings hold the output times."""
     n, times = len(q), np.asarray(settings.output_times)
-    library = None if get(settings.method).implicit else _lanes(model)
+    alone_only = settings.method == AUTO or get(settings.method).implicit
+    library = None if alone_only else _lanes(model)
     models = _models(model, parameters, n)
     count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(
@@ -216,7 +217,7 @@ def _alone(
 ) -> None:  # fmt: skip
     system = SceneSystem(model.looped, compiled, with_power=False)
     run = make_run(system, settings, q, u)
-    status = advance(run, look)
+    status = advance(run, look, choice=choice_of(system, settings, run))
     found = trajectory(system, run, settings, status, said(system, run, status))
     places = np.searchsorted(np.asarray(settings.output_times), found.t)
     rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
@@ -237,7 +238,7 @@ def prepared(
         raise SceneError("output_times: expected one time in s or more")
     if settings.method in (*second_opinion.METHODS, *classical.METHODS):
         raise SceneError(f"method {settings.method!r} makes one run at a time: use simulate")
-    if settings.step is None and not get(settings.method).adaptive:
+    if settings.step is None and not get(settings.first_method).adaptive:
         raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
     q, u = pair("initial_states", initial)
     lead, (q_rows, u_rows) = batch(("initial q", q, model.nq), ("initial u", u, model.nu))

@@ -26,11 +26,14 @@ if TYPE_CHECKING:
 
 State = Mapping[str, Any]
 
-_FORMAT = "mstmm checkpoint 3"
+_FORMAT = "mstmm checkpoint 4"
 _ROWS = ("t", "y", "memory", "event")
 
 #: Name, kind of numbers and axes of what a file holds.
-_STATE = (("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0))
+_STATE = (
+    ("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0),
+    ("methods", "U", 0),
+)  # fmt: skip
 _SAMPLES = (("t", "f", 1), ("y", "f", 2), ("memory", "f", 2), ("event", "i", 1))
 
 

@@ -55,7 +55,7 @@ def look_after(model: Compiled, settings: Settings) -> int:
     """Steps of a looped run after which `worth_compiling` is to be asked; 0 for never."""
     if model.fusion.obstacle:
         return 0
-    return math.ceil(_LOOK_AFTER / get(settings.method).n_stages)
+    return math.ceil(_LOOK_AFTER / get(settings.first_method).n_stages)
 
 
 def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode | None:
@@ -72,6 +72,6 @@ def _compiled(
     model: Compiled, settings: Settings, library: FusedLibrary, evaluations: float
 ) -> SceneCode:
     """Lanes only for methods that have use for them."""
-    iterated = get(settings.method).iterated is not None
+    iterated = get(settings.first_method).iterated is not None
     lanes = model.fusion.ready_lanes(evaluations) if iterated else None
     return SceneCode(library, lanes, model.fusion.numbers)

@@ -20,7 +20,8 @@ from . import classical, second_opinion
 from . import engine_choice as compiled_run
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
-from .simulate import advance, make_run, said, trajectory
+from .method_choice import Choice
+from .simulate import advance, choice_of, make_run, said, trajectory
 from .stability import StepCheck, check_step
 from .system import SceneSystem
 from .trajectory import Trajectory
@@ -45,6 +46,7 @@ class Watch:
         self.run, self.notes = 0, list[str]()
         self.checkpoint: Checkpoint | None = None
         self.engine = compiled_run.LOOPED
+        self.choice: Choice | None = None
         self._saved = time.monotonic()
 
     def tell(self, t: float) -> None:
@@ -71,7 +73,9 @@ class Watch:
         """
         if self.checkpoint is not None and self.run == 0:
             try:
-                words = {"engine": np.array(self.engine), "message": np.array(message)}
+                methods = "" if self.choice is None else self.choice.state()
+                said = {"engine": self.engine, "message": message, "methods": methods}
+                words = {name: np.array(text) for name, text in said.items()}
                 self.checkpoint.save({**run.state(), **words}, _joined(earlier, run.samples))
             except (MstmmError, MemoryError) as error:
                 note = f"no checkpoint: {error or 'there is not enough memory'}"
@@ -99,11 +103,12 @@ def first_run(
     engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
     system = SceneSystem(engine, compiled)
     start = system.start(settings.t_start, q, u)
-    step = check_step(engine, get(settings.method), settings, start, system.memory)
+    step = check_step(engine, get(settings.first_method), settings, start, system.memory)
     run = make_run(system, settings, q, u)
+    watch.choice = choice_of(system, settings, run)
     message = "" if run.status is Status.RUNNING else said(system, run, run.status)
     if state is not None and earlier is not None and watch.checkpoint is not None:
-        message = _restored(run, state, earlier, watch.checkpoint)
+        message = _restored(run, state, earlier, watch.checkpoint, watch.choice)
     look = 0 if compiled else compiled_run.look_after(model, settings)
     status: Status | None = run.status
     if status is Status.RUNNING and run.statistics.steps < look:
@@ -114,10 +119,13 @@ def first_run(
         if compiled is not None:
             system, earlier = SceneSystem(engine, compiled), None
             run = make_run(system, settings, q, u)
+            watch.choice = choice_of(system, settings, run)
     watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
     if status is Status.RUNNING:
         status, message = _advanced(system, run, watch, earlier)
     found = trajectory(system, run, settings, status, message, earlier)
+    if watch.choice is not None:
+        found = replace(found, methods=tuple(watch.choice.stretches))
     if step is not None and status is not None and not found.success:
         found = replace(found, message=step.blamed(found.message))
     return found, step
@@ -128,19 +136,23 @@ def _advanced(
 ) -> tuple[Status | None, str]:
     """Advance a run and keep what it became: no interrupt comes between the two."""
     with interruptible():
-        status = advance(run, lambda now: watch.look(now, earlier), steps)
+        status = advance(run, lambda now: watch.look(now, earlier), steps, watch.choice)
         message = said(system, run, status)
         if status is not Status.RUNNING:
             watch.save(run, earlier, "" if status is None else message)
     return status, message
 
 
-def _restored(run: Run, state: State, earlier: Samples, checkpoint: Checkpoint) -> str:
+def _restored(
+    run: Run, state: State, earlier: Samples, checkpoint: Checkpoint, choice: Choice | None
+) -> str:
     """Put a run where its checkpoint was taken; returns how it had ended, "" if it had not."""
     try:
+        if choice is not None:
+            choice.restore(run, str(state["methods"]))
         run.restore(state)
         ended = run.status is not Status.RUNNING
-    except ValueError:  # a status that does not exist
+    except ValueError:  # a status or a method that does not exist
         raise checkpoint.damaged("a state that no run can have") from None
     if not run.fits(earlier):
         raise checkpoint.damaged("samples of another size")

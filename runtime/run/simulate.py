@@ -14,8 +14,9 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
-from ..integrate.steppers import get
+from ..integrate.steppers import AUTO, get
 from .endings import message_of
+from .method_choice import Choice
 from .notes import unseen
 from .system import SceneSystem
 from .trajectory import Trajectory
@@ -35,7 +36,7 @@ _WORK_TOLERANCE = 10.0
 
 def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
     """The integrator at the start of the run."""
-    tableau = get(settings.method, settings.radius)
+    tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         system.offer_tangent()
     if settings.step is None and not tableau.adaptive:
@@ -84,8 +85,16 @@ def _energy(system: SceneSystem, t: float, y: Array) -> float:
     )
 
 
+def choice_of(system: SceneSystem, settings: Settings, run: Run) -> Choice | None:
+    """The choice among methods that goes with a run that has just been made."""
+    return Choice(system, settings, run) if settings.method == AUTO else None
+
+
 def advance(
-    run: Run, observe: Callable[[Run], None] | None = None, steps: int = 0
+    run: Run,
+    observe: Callable[[Run], None] | None = None,
+    steps: int = 0,
+    choice: Choice | None = None,
 ) -> Status | None:
     """Run to the end; None if an interrupt came first or the samples fill the memory they may take.
 
@@ -94,6 +103,8 @@ def advance(
     with interruptible() as interrupted:
         while True:
             status = run.advance(SLICE, steps)
+            if status is Status.RUNNING and choice is not None:
+                choice.look(run)
             if status is not Status.RUNNING or run.statistics.steps == steps:
                 return status
             if observe is not None:

@@ -12,6 +12,7 @@ from mstmm.errors import SceneError
 
 from ..integrate.loop import Statistics, Status
 from ..integrate.settings import Settings
+from .stretches import Stretch
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Trajectory:
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
     unseen: tuple[str, ...] = ()  # of expressions: what the steps may have passed over
+    methods: tuple[Stretch, ...] = ()  # of a run that chose among them
 
     @property
     def first(self) -> tuple[float, Array, Array]:

@@ -250,3 +250,19 @@ def test_the_classical_method_has_options_of_its_own(mstmm: Command, folder: Pat
     refused = mstmm(*method, "--step", "0.01", "--scheme", "euler", "-o", "b.csv")
     assert refused.code == 2 and "generalised-alpha, hht, newmark, wilson" in refused.err
     assert mstmm(*method, "-o", "b.csv").code == 2
+
+
+def test_the_choice_of_methods_is_told(mstmm: Command, folder: Path) -> None:
+    scene = (folder / "pendulum.toml").read_text()
+    (folder / "stiff.toml").write_text(scene + "law = { damping = [1e6] }\n")
+    command = ("--t-end", "1", "--method", "auto", "--rtol", "1e-4", "-o", "run.csv")
+    told = mstmm("simulate", "stiff.toml", *command)
+    assert told.code == 0 and "auto, rtol 0.0001" in told.out
+    assert "  dop853 from t = 0 s" in told.out and "  rodas4p2 from t = " in told.out
+    assert max(map(len, told.out.splitlines())) <= 80
+    data = json.loads(mstmm("simulate", "stiff.toml", *command, "--json").out)
+    assert [row["method"] for row in data["methods"]] == ["dop853", "rodas4p2"]
+    plain = mstmm("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv")
+    assert "from t = 0 s" not in plain.out
+    refused = mstmm("simulate", "stiff.toml", *command, "--step", "0.1")
+    assert refused.code == 2 and "chooses its steps" in refused.err

@@ -112,15 +112,17 @@ void mstmm_count_step(mstmm_run *run, double error, double absolute) {
   run->real.largest_step = fmax(run->real.largest_step, run->real.h);
 }
 
-static void watch_stability(const mstmm_work *work) {
+/* Was the step as long as stability allows? */
+static int watch_stability(const mstmm_work *work) {
   mstmm_run *run = work->run;
   mstmm_run_count *count = &run->count;
   run->real.stiffness = mstmm_stiffness(work);
   run->real.largest_stiffness = fmax(run->real.largest_stiffness, run->real.stiffness);
-  if (run->real.stiffness > NEAR_LIMIT * work->tableau->stability_limit)
-    count->stability_limited_steps++;
+  const int limited = run->real.stiffness > NEAR_LIMIT * work->tableau->stability_limit;
+  count->stability_limited_steps += limited;
   count->stability_limited = count->stability_limited_steps >= MANY_STEPS &&
                              LARGE_PART * count->stability_limited_steps >= count->steps;
+  return limited;
 }
 
 int mstmm_aim(mstmm_run *run) {
@@ -207,7 +209,7 @@ int mstmm_try_step(const mstmm_work *work) {
   }
   if (!fixed) mstmm_propose(run, error);
   mstmm_count_step(run, error, absolute);
-  if (!work->implicit) watch_stability(work);
+  mstmm_watch_sign(run, work->implicit ? 0 : watch_stability(work));
   run->real.t_scan = run->real.t;
   run->count.phase = work->system->n_switches ? PHASE_SWITCH : PHASE_SCAN;
   run->real.t_switch = INFINITY;

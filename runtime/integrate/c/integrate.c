@@ -366,6 +366,7 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
   if (run->count.phase == PHASE_END) return (int)run->count.status;
   mstmm_work_cut(run, &work);
   run->count.tangent_held = 0; /* the caller may have used the system since */
+  run->count.asked = 0;
   const int64_t steps = run->count.steps;
   const double now = seconds();
   pace at = {.deadline = now + wall_seconds, .last = now, .stride = 1, .left = 1};
@@ -376,6 +377,7 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
     if (status < 0) run->count.phase = PHASE_END;
     if (status) return status;
     if (phase != PHASE_SAMPLE || run->count.steps == steps) continue;
-    if (run->count.steps == run->pause_steps || time_is_up(&at)) return MSTMM_RUNNING;
+    if (mstmm_is_asked(run) || run->count.steps == run->pause_steps || time_is_up(&at))
+      return MSTMM_RUNNING;
   }
 }

@@ -157,6 +157,8 @@ typedef struct mstmm_run_count {
   int64_t tangent_valid; /* the workspace holds where it was taken */
   int64_t tangent_held;  /* and the system has it factored */
   int64_t history;       /* steps of the length of the last one, at most 2 */
+  int64_t sign, sign_against; /* steps that spoke for another kind of method; others since */
+  int64_t asked;              /* the last mstmm_advance came back for them or for look_steps */
 } mstmm_run_count;
 
 typedef struct mstmm_run {
@@ -170,6 +172,11 @@ typedef struct mstmm_run {
   double first_step, min_step, max_step; /* 0: chosen */
   int64_t max_steps; /* 0: as many as it takes, if the end is in sight */
   int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
+  /* It returns too, with count.asked, between steps: when so many of the last ones spoke for another
+   * kind of method (of explicit methods those as long as stability allows, of implicit ones those
+   * shorter than short_step), and when look_steps have been made; 0: never. */
+  int64_t sign_steps, look_steps;
+  double short_step;
   int64_t n_breaks;
   const double *breaks; /* strictly increasing */
   int64_t n_bounds; /* adaptive steps: none from bound_starts[i] on is longer than bounds[i] */
@@ -202,6 +209,11 @@ int mstmm_run_start(mstmm_run *run, const double *y0);
 /* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed; one step is
  * always made, and the clock is looked at about every 0.1 ms or every step. */
 int mstmm_advance(mstmm_run *run, double wall_seconds);
+/* Goes on with another method from where the run stands between two steps: what has been counted, the
+ * proposed step and what is known of events stay.  `workspace` has mstmm_workspace_size doubles for
+ * that method and takes the place of the run's.  Returns 0, or MSTMM_BAD_ARGUMENT with the run
+ * unchanged: within a step, with fixed steps, for a method that the system does not allow. */
+int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);
 /* State of a run as plain numbers: sizes, writing, and reading back into a run whose problem part

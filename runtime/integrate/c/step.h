@@ -56,6 +56,10 @@ int mstmm_output_inside(const mstmm_run *run);
 int mstmm_reject(mstmm_run *run, int failed, double error);
 void mstmm_propose(mstmm_run *run, double error);
 void mstmm_count_step(mstmm_run *run, double error, double absolute);
+/* Notes what a step says of the method: an explicit one whether stability limited it. */
+void mstmm_watch_sign(mstmm_run *run, int limited);
+/* Is the caller to look at the run, as it asked for? */
+int mstmm_is_asked(mstmm_run *run);
 /* First step: a guess from y and k, and the step from the slope f1 at y + guess k.  Components lie
  * `stride` doubles apart, tolerances side by side. */
 typedef struct mstmm_slopes {

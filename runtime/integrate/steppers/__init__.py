@@ -16,6 +16,8 @@ from mstmm.errors import SceneError
 from .tableau import Tableau, from_monomials, frozen, hermite
 
 __all__ = [
+    "AUTO",
+    "AUTO_EXPLICIT",
     "BUILT_IN",
     "EXPLICIT",
     "IMPLICIT",
@@ -40,6 +42,9 @@ BUILT_IN = EXPLICIT + IMPLICIT
 #: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
 WITH_RADIUS = ("genalpha", "dttmm")
 
+#: The name of the choice that a run makes among methods, and the one by which it begins.
+AUTO, AUTO_EXPLICIT = "auto", "dop853"
+
 _registered: dict[str, Tableau] = {}
 
 
@@ -56,7 +61,7 @@ def register(tableau: Tableau) -> None:
     Raises:
         ValueError: if the name is taken.
     """
-    if tableau.name in names():
+    if tableau.name in (AUTO, *names()):
         raise ValueError(f"a method named {tableau.name!r} exists already")
     _registered[tableau.name] = tableau
 
@@ -95,8 +100,8 @@ def get(name: str, radius: float | None = None) -> Tableau:
         return _built_in(name, radius)
     if name not in _registered:
         raise SceneError(
-            f"method {name!r} is not known; there are: {', '.join(names())}, and SciPy's as "
-            "scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and SUNDIALS' as "
+            f"method {name!r} is not known; there are: {', '.join((AUTO, *names()))}, and SciPy's "
+            "as scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and SUNDIALS' as "
             "sundials-BDF, sundials-Adams; and dttmm-classical, dttmm-classical-product"
         )
     return _registered[name]

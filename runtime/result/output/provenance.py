@@ -17,9 +17,10 @@ from ...classical.schemes import scheme_of
 from ...engine.identity import kernels_hash
 from ...integrate.loop import Statistics, Status
 from ...integrate.settings import Settings
-from ...integrate.steppers import get
+from ...integrate.steppers import AUTO, get
 from ...run import classical, second_opinion
 from ...run.error_estimate import ErrorEstimate
+from ...run.stretches import from_rows
 from ...run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def attributes(result: Record) -> dict[str, Any]:
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
         "notes": json.dumps(list(run.notes)),
         "unseen": json.dumps(list(run.unseen)),
+        "methods": json.dumps([asdict(stretch) for stretch in run.methods]),
         "norm_residual": run.norm_residual,
         "certificate": str(result.certificate),
     }
@@ -152,7 +154,7 @@ def _settings(found: dict[str, Any]) -> Settings:
         if name not in ("method", "output_times", "scheme"):
             _number(value)
     method = found["method"]
-    if method not in (*second_opinion.METHODS, *classical.METHODS):
+    if method not in (AUTO, *second_opinion.METHODS, *classical.METHODS):
         get(method)
     if method in classical.METHODS:
         scheme_of(found.get("scheme", ""))
@@ -189,4 +191,5 @@ def trajectory(data: Any) -> Trajectory:
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
         start, tuple(json.loads(a.get("unseen", "[]"))),
+        from_rows(json.loads(a.get("methods", "[]"))),
     )  # fmt: skip

@@ -1,0 +1,64 @@
+/* The sign that another kind of method would suit a run better, and the change to it between steps. */
+#include <string.h>
+
+#include "step.h"
+
+/* So many other steps in a row, and those that spoke for a change before count no more (as in the
+ * codes of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.2). */
+enum { FORGOTTEN_AFTER = 6 };
+
+void mstmm_watch_sign(mstmm_run *run, int limited) {
+  mstmm_run_count *count = &run->count;
+  const int implicit = run->tableau->kind != MSTMM_EXPLICIT;
+  if (implicit && run->count.cut_short) return; /* its length says nothing */
+  if (implicit ? run->real.h < run->short_step : limited) {
+    count->sign++;
+    count->sign_against = 0;
+  } else if (++count->sign_against >= FORGOTTEN_AFTER) {
+    count->sign = 0;
+  }
+}
+
+int mstmm_is_asked(mstmm_run *run) {
+  const mstmm_run_count *count = &run->count;
+  const int signs = run->sign_steps && count->sign >= run->sign_steps;
+  run->count.asked = signs || (run->look_steps && count->steps == run->look_steps);
+  return (int)run->count.asked;
+}
+
+/* What belongs to the method is as at a start; the rest of the run is what it was. */
+static void forget_method(mstmm_run *run) {
+  mstmm_run_count *count = &run->count;
+  run->real.h_previous = run->real.error_previous = 0.0;
+  run->real.contraction = -1.0;
+  run->real.tangent_t = run->real.tangent_s = run->real.tangent_sq = 0.0;
+  count->n_stages = run->tableau->n_stages;
+  count->n_extra = run->tableau->n_extra;
+  count->n_dense = run->tableau->n_dense;
+  count->first_stage_valid = count->rejected_last = 0;
+  count->tangent_valid = count->tangent_held = count->history = 0;
+  count->sign = count->sign_against = count->asked = 0;
+}
+
+int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace) {
+  const int64_t size = mstmm_workspace_size(run->system, tableau);
+  const size_t watched = (size_t)mstmm_n_watched(run->system) * sizeof(double);
+  mstmm_run changed = *run;
+  mstmm_work from, to;
+  if (!size || run->count.phase > PHASE_STEP || run->fixed_step > 0.0 || !tableau->n_errors)
+    return MSTMM_BAD_ARGUMENT;
+  memset(workspace, 0, (size_t)size * sizeof(double));
+  changed.tableau = tableau;
+  changed.workspace = workspace;
+  mstmm_work_cut(run, &from);
+  mstmm_work_cut(&changed, &to);
+  memcpy(to.y, from.y, (size_t)run->system->n_state * sizeof(double));
+  if (watched) {
+    memcpy(to.truth, from.truth, watched);
+    memcpy(to.last_fire, from.last_fire, watched);
+    memcpy(to.side, from.side, watched);
+  }
+  forget_method(&changed);
+  *run = changed;
+  return 0;
+}
