@@ -274,6 +274,11 @@ class Run:
         return bool(self._run.count.asked)
 
     @property
+    def no_step(self) -> bool:
+        """Whether the run failed because its method finds no step from where it stands."""
+        return bool(self._run.count.no_step)
+
+    @property
     def signs(self) -> int:
         """How many of the last steps spoke for another kind of method."""
         return int(self._run.count.sign)
@@ -284,8 +289,8 @@ class Run:
         return float(self._run.real.h)
 
     def change(self, tableau: Tableau) -> None:
-        """Go on by another method from where the run stands between two steps.  Counts, samples,
-        events and the length of the next step go on.
+        """Go on by another method from where the run stands between two steps, or failed for want
+        of one.  Counts, samples, events and, but for a failure, the length of the next step go on.
 
         Raises SceneError within a step, and for methods or runs of fixed steps.
         """

@@ -13,7 +13,7 @@ import json
 import math
 from dataclasses import asdict
 
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 
 from ..integrate.loop import Run
 from ..integrate.settings import Settings
@@ -53,9 +53,9 @@ class Choice:
 
     def look(self, run: Run) -> None:
         """Change the method if the run asked for a look and its steps say so."""
-        if not run.asked:
+        rate = self._rate(run) if run.asked else None
+        if rate is None:
             return
-        rate = self._rate(run)
         if run.tableau.implicit:
             self._look_back(run, rate)
         elif self._is_stiff(run, rate):
@@ -63,11 +63,27 @@ class Choice:
         else:
             self._ask(run, 2 * self._asked_for[0])
 
-    def _rate(self, run: Run) -> float:
-        """|lambda| where the run stands; 0 where it cannot be computed, which the run will say."""
+    def rescue(self, run: Run) -> bool:
+        """Whether a run that failed for want of an implicit step goes on explicitly, to its end."""
+        if not (run.tableau.implicit and run.no_step):
+            return False
+        why = f"{run.tableau.name} finds no step"
+        run.change(get(AUTO_EXPLICIT))
+        self.stretches.append(Stretch(run.t, AUTO_EXPLICIT, None, why))
+        self._ask(run, 0)
+        return True
+
+    def _rate(self, run: Run) -> float | None:
+        """|lambda| where the run stands, 0 where it cannot be computed, which the run will say.
+        None, and no further questions, for scenes without implicit methods."""
         system, engine = self._system, self._system.engine
         if self._fastest is None:
-            self._fastest = Fastest(engine, system.memory)
+            try:
+                self._fastest = Fastest(engine, system.memory)
+            except SceneError as error:
+                self.stretches.append(Stretch(run.t, AUTO_EXPLICIT, None, f"stays: {error}"))
+                self._ask(run, 0)
+                return None
         q, u = run.y[: engine.nq], run.y[engine.nq : engine.nq + engine.nu]
         try:
             return self._fastest.rate(run.t, q, u)

@@ -103,8 +103,9 @@ def advance(
     with interruptible() as interrupted:
         while True:
             status = run.advance(SLICE, steps)
-            if status is Status.RUNNING and choice is not None:
+            if choice is not None:
                 choice.look(run)
+                status = Status.RUNNING if choice.rescue(run) else status
             if status is not Status.RUNNING or run.statistics.steps == steps:
                 return status
             if observe is not None:

@@ -122,3 +122,31 @@ def test_short_steps_of_implicit_methods_are_signs(lab: Lab) -> None:
     assert run.advance(60.0) is Status.RUNNING and run.asked and run.signs == 10
     run.call_back(20, short_step=1e-9)
     assert run.advance(60.0) is Status.FINISHED and run.signs == 0
+
+
+def test_a_run_without_a_next_step_goes_on_by_another_method(lab: Lab) -> None:
+    """No tangent can be taken after 0.5 s: an explicit method goes on from the last good state."""
+
+    def tangent(context: Any, t: float, *rest: Any) -> int:
+        return 1 if t > 0.5 else int(given.tangent(context, t, *rest))
+
+    problem = lab.mechanism("pendulum", 20.0, 0.5)
+    given, start = problem.system.implicit, (0.0, 0.4, 0.0, 0.0, 0.0)
+    failing = lab.ffi.new("mstmm_implicit *", given[0])
+    called = lab.ffi.callback(lab.ffi.typeof(failing.tangent), tangent)
+    failing.tangent, problem.system.implicit = called, failing
+    run = problem.run("rodas5p", 1.5, start, rtol=1e-9, atol=1e-11)
+    assert run.advance(60.0) is Status.TANGENT_FAILED and run.no_step
+    failed_at = run.t
+    assert 0.5 < failed_at < 0.6
+    run.change(get("dop853"))
+    assert run.status is Status.RUNNING and not run.no_step and run.t == failed_at
+    assert run.advance(60.0) is Status.FINISHED
+    wanted = lab.mechanism("pendulum", 20.0, 0.5).solved(
+        "dop853", 1.5, start, rtol=1e-11, atol=1e-13
+    )
+    assert run.y == pytest.approx(wanted.y, abs=1e-6)
+    limited = lab.mechanism("pendulum", 20.0, 0.5).run("rodas5p", 1.5, start, max_steps=5)
+    assert limited.advance(60.0) is Status.TOO_MANY_STEPS and not limited.no_step
+    with pytest.raises(SceneError, match="cannot take this run over"):
+        limited.change(get("dop853"))

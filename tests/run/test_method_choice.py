@@ -20,6 +20,7 @@ from mstmm.runtime.integrate.steppers import get, register
 from mstmm.runtime.model.model import Model
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.run import execution
+from mstmm.runtime.run.system import SceneSystem
 
 LOOSE: dict[str, Any] = {"rtol": 1e-4, "atol": 1e-6}
 ARRAYS = ("t", "q", "u", "work", "event")
@@ -195,6 +196,45 @@ def test_an_edited_checkpoint_is_refused(tmp_path: Path, methods: str) -> None:
     np.savez(path, **data | {"methods": np.array(methods)})
     with pytest.raises(mstmm.SceneError, match="damaged"):
         model.simulate(1.0, method="auto", checkpoint=path, resume=True)
+
+
+def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tangent that is singular from 0.02 s on costs a change, not the run."""
+    offer, kept = SceneSystem.offer_tangent, list[Any]()
+
+    def offered(system: SceneSystem) -> None:
+        offer(system)
+        ffi, given = system.engine.ffi, system.system.implicit
+        failing = ffi.new("mstmm_implicit *", given[0])
+
+        def tangent(context: Any, t: float, *rest: Any) -> int:
+            return 1 if t > 0.02 else int(given.tangent(context, t, *rest))
+
+        called = ffi.callback(ffi.typeof(failing.tangent), tangent)
+        failing.tangent, system.system.implicit = called, failing
+        kept.append((failing, called))
+
+    monkeypatch.setattr(SceneSystem, "offer_tangent", offered)
+    model = compiled(scenes.bushed_rods(2, 1e8, 0.1))
+    run = model.simulate(0.1, method="auto", **LOOSE)
+    assert run.success and names(run) == ["dop853", "rodas4p2", "dop853"]
+    assert run.methods[2].why == "rodas4p2 finds no step" and 0.02 < run.methods[2].t < 0.1
+    exact = model.simulate(0.1, rtol=1e-8, atol=1e-10)
+    assert run.q[-1] == pytest.approx(exact.q[-1], abs=1e-5)
+
+
+def test_scenes_without_implicit_methods_stay_explicit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise mstmm.SceneError('hinge "cam" has no derivatives')
+
+    model = compiled(CASES["f"].scene())
+    plain = model.simulate(0.03, **LOOSE)
+    monkeypatch.setattr("mstmm.runtime.run.fastest.Tangent", refused)
+    run = model.simulate(0.03, method="auto", **LOOSE)
+    assert equal(run, plain) and names(run) == ["dop853", "dop853"]
+    assert run.methods[1].why == 'stays: hinge "cam" has no derivatives'
 
 
 def test_trajectories_of_a_batch_choose_for_themselves() -> None:

@@ -26,6 +26,17 @@ int mstmm_is_asked(mstmm_run *run) {
   return (int)run->count.asked;
 }
 
+/* Between two steps, or after a step that could not be made: then as at a start. */
+static int goes_on(mstmm_run *run) {
+  if (run->count.phase <= PHASE_STEP) return 1;
+  if (!run->count.no_step) return 0;
+  run->count.no_step = 0;
+  run->count.phase = PHASE_STEP;
+  run->count.status = MSTMM_RUNNING;
+  run->real.h_next = 0.0;
+  return 1;
+}
+
 /* What belongs to the method is as at a start; the rest of the run is what it was. */
 static void forget_method(mstmm_run *run) {
   mstmm_run_count *count = &run->count;
@@ -45,7 +56,7 @@ int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *works
   const size_t watched = (size_t)mstmm_n_watched(run->system) * sizeof(double);
   mstmm_run changed = *run;
   mstmm_work from, to;
-  if (!size || run->count.phase > PHASE_STEP || run->fixed_step > 0.0 || !tableau->n_errors)
+  if (!size || run->fixed_step > 0.0 || !tableau->n_errors || !goes_on(&changed))
     return MSTMM_BAD_ARGUMENT;
   memset(workspace, 0, (size_t)size * sizeof(double));
   changed.tableau = tableau;

@@ -374,7 +374,10 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
     const int64_t phase = run->count.phase;
     const int status = make_phase(&work);
     run->count.status = status;
-    if (status < 0) run->count.phase = PHASE_END;
+    if (status < 0) {
+      run->count.phase = PHASE_END;
+      run->count.no_step = phase == PHASE_STEP && status != MSTMM_TOO_MANY_STEPS;
+    }
     if (status) return status;
     if (phase != PHASE_SAMPLE || run->count.steps == steps) continue;
     if (mstmm_is_asked(run) || run->count.steps == run->pause_steps || time_is_up(&at))

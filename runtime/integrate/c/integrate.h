@@ -159,6 +159,7 @@ typedef struct mstmm_run_count {
   int64_t history;       /* steps of the length of the last one, at most 2 */
   int64_t sign, sign_against; /* steps that spoke for another kind of method; others since */
   int64_t asked;              /* the last mstmm_advance came back for them or for look_steps */
+  int64_t no_step;            /* the run failed because its method finds no step from here */
 } mstmm_run_count;
 
 typedef struct mstmm_run {
@@ -212,7 +213,8 @@ int mstmm_advance(mstmm_run *run, double wall_seconds);
 /* Goes on with another method from where the run stands between two steps: what has been counted, the
  * proposed step and what is known of events stay.  `workspace` has mstmm_workspace_size doubles for
  * that method and takes the place of the run's.  Returns 0, or MSTMM_BAD_ARGUMENT with the run
- * unchanged: within a step, with fixed steps, for a method that the system does not allow. */
+ * unchanged: within a step, with fixed steps, for a method that the system does not allow.  A run that
+ * failed goes on if it was for want of a step (count.no_step). */
 int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);
