@@ -18,7 +18,7 @@ from mstmm.errors import NumericalFailure
 
 from ..integrate.settings import Settings
 from ..run import engine_choice as compiled_run
-from ..run.simulate import make_run
+from ..run.simulate import advance, choice_of, make_run, said
 from ..run.system import SceneSystem
 
 if TYPE_CHECKING:
@@ -57,10 +57,11 @@ def run_once(model: Model, settings: Settings) -> tuple[Array, int, float]:
     system = SceneSystem(model.looped, code, with_power=False)
     run = make_run(system, settings, q, u)
     start = time.thread_time()
-    run.advance(np.inf)
+    status = advance(run, choice=choice_of(system, settings, run))
     seconds = time.thread_time() - start
-    if run.failure is not None:
-        raise NumericalFailure(f"{settings.method}, rtol {settings.rtol:g}: {run.message()}")
+    if status is None or status < 0:
+        why = said(system, run, status)
+        raise NumericalFailure(f"{settings.method}, rtol {settings.rtol:g}: {why}")
     return run.y[: model.nq + model.nu], run.statistics.evaluations, seconds
 
 

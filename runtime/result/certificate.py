@@ -27,7 +27,8 @@ class Certificate:
         pivot: the worst loss of digits in the sweep: about 1e-16 times its ratio.
         singular: the closest approach to coordinates that fail (gimbal).
         step: the fixed step against the fastest motion at the start; None for adaptive runs.
-        stability_limited: the method's stability, not its accuracy, set many of the steps.
+        stability_limited: the method's stability, not its accuracy, set many of the steps; not told
+            of runs that chose their methods themselves.
         sum_of_local_errors: in the mixed units of q and u; NOT the error of the result, which may
             be larger by any factor.
         error: estimate of the error from a second run; None unless asked for (certify=True).

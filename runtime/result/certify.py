@@ -24,7 +24,9 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         pivot=pivot_loss(result.model, run),
         singular=singular_distance(result.model, run),
         step=step,
-        stability_limited=statistics is not None and statistics.stability_limited,
+        stability_limited=(
+            statistics is not None and statistics.stability_limited and not run.methods
+        ),
         sum_of_local_errors=None if statistics is None else statistics.sum_local_error,
         error=error,
         finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
+from support.result_scenes import motor
 from support.rod_scenes import chain
 
 import mstmm
@@ -39,6 +41,15 @@ def test_the_cheapest_is_accurate_enough() -> None:
         assert best.error <= goal
         surely = [p for p in points() if p.method == best.method and p.tolerance <= best.tolerance]
         assert all(p.error <= goal for p in surely)
+
+
+def test_a_choice_among_methods_is_measured_too() -> None:
+    model = mstmm.compile(motor("sin(t)", damping=3e4), engine="looped")
+    auto = Settings(2.0, method="auto", rtol=1e-4, output_times=(2.0,))
+    plain = replace(auto, method="dop853")
+    (found, evaluations, _), (wanted, many, _) = run_once(model, auto), run_once(model, plain)
+    assert found == pytest.approx(wanted, abs=1e-4)
+    assert evaluations < many / 10
 
 
 def test_a_lucky_hit_is_no_accuracy() -> None:

@@ -279,6 +279,14 @@ def test_a_stiff_scene_is_called_so_by_an_adaptive_method() -> None:
     assert any("stiff" in text for text in run.warnings)
 
 
+def test_no_other_method_is_advised_where_the_run_chose() -> None:
+    """Stability sets the steps, but so few of them that explicit ones cost less."""
+    run = mstmm.compile(motor("sin(t)", damping=100.0)).simulate(2.0, method="auto", rtol=1e-4)
+    assert run.statistics is not None and run.statistics.stability_limited
+    assert [stretch.method for stretch in run.methods] == ["dop853"]
+    assert not any("stiff" in text for text in run.warnings)
+
+
 # --- words ----------------------------------------------------------------------------------------
 
 
