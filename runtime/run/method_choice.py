@@ -64,7 +64,10 @@ class Choice:
             self._ask(run, 2 * self._asked_for[0])
 
     def rescue(self, run: Run) -> bool:
-        """Whether a run that failed for want of an implicit step goes on explicitly, to its end."""
+        """Let a run that failed for want of an implicit step go on explicitly, to its end.
+
+        Returns whether it does.
+        """
         if not (run.tableau.implicit and run.no_step):
             return False
         why = f"{run.tableau.name} finds no step"
