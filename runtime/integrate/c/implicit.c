@@ -52,6 +52,23 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
   return status ? status : mstmm_check_finite(work, t, slope);
 }
 
+/* The same at a state whose accelerations are not known; they go into its row. */
+static int evaluate_slope(const mstmm_work *work, double t, double *row, double *slope) {
+  const int status = mstmm_evaluate(work, t, row, slope);
+  memcpy(mstmm_row_a(work, row), slope + work->implicit->n_q,
+         (size_t)work->implicit->n_u * sizeof *slope);
+  return status ? status : mstmm_check_finite(work, t, slope);
+}
+
+/* Rates of the quadratures at a state inside the step */
+static int rates_of_quadratures(const mstmm_work *work, double t, double *row, double *to) {
+  const int rest = mstmm_n_rest(work);
+  if (work->tableau->kind != MSTMM_ROSENBROCK) return mstmm_step_residual(work, t, row, to);
+  const int status = evaluate_slope(work, t, row, work->y_event);
+  memcpy(to, work->y_event + work->system->n_state - rest, (size_t)rest * sizeof *to);
+  return status;
+}
+
 int mstmm_check_new(const mstmm_work *work) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double *a = mstmm_row_a(work, work->y_new), t = work->run->real.t_new;
@@ -109,8 +126,8 @@ static int integrate_quadratures(const mstmm_work *work) {
   for (int l = 1; l < n - 1; l++) {
     const double c = tableau->inner[l - 1];
     mstmm_dense(work, work->run->real.t + c * h, work->y_stage);
-    const int status = mstmm_step_residual(work, mstmm_time_in(work->run, c), work->y_stage,
-                                      work->nodes + l * rest);
+    const int status = rates_of_quadratures(work, mstmm_time_in(work->run, c), work->y_stage,
+                                            work->nodes + l * rest);
     if (status) return status;
   }
   for (int i = 0; i < rest; i++) {
@@ -129,10 +146,13 @@ static int integrate_quadratures(const mstmm_work *work) {
 int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
   const mstmm_tableau *tableau = work->tableau;
   const int own = tableau->kind != MSTMM_DIRK, rest = own && mstmm_n_rest(work);
+  const double t = mstmm_time_in(work->run, 1.0);
+  double *last = work->k + tableau->n_stages * work->row;
   int status = 0;
-  if (own)
-    status = mstmm_step_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
-                         work->k + tableau->n_stages * work->row);
+  if (tableau->kind == MSTMM_ROSENBROCK)
+    status = evaluate_slope(work, t, work->y_new, last);
+  else if (own)
+    status = mstmm_step_slope(work, t, work->y_new, last);
   if (!status && (rest || wants_dense)) status = mstmm_build_dense(work);
   if (!status && rest) status = integrate_quadratures(work);
   return status;

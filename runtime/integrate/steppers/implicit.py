@@ -93,12 +93,13 @@ class Implicit(Tableau):
 class Rosenbrock(Implicit):
     """A Rosenbrock method in the form without products by the tangent, U_i / h in its stages.
 
-    With Z = K W + C + s M and s = 1 / (gamma h) the stages solve
-    Z U_i = -R(t + C_i h, y + A_ij U_j) - d_i h R_t and what the second set of weights, divided by
-    h, leaves of earlier stages; y + B U is the step.
+    With J the slope of y' = f(t, y) and s = 1 / (gamma h) the stages solve
+    (s - J) U_i = f(t + C_i h, y + A_ij U_j) + d_i h f_t + second_ij U_j / h; y + B U is the step.
+    For mechanisms the mass matrix of the step's start multiplies the rows of speeds, so that
+    Z = K W + C + s M is solved.
 
     Attributes:
-        d: (s,) weights of h times the slope of R in time.
+        d: (s,) weights of h times the slope in time.
     """
 
     kind: ClassVar[int] = ROSENBROCK
