@@ -1,14 +1,24 @@
-"""What a run could not see or locate, one sentence each."""
+"""What a run could not see, locate or resolve, one sentence each."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..integrate.steppers import get
 from ..pack.switches import MOST
 
 if TYPE_CHECKING:
     from ..integrate.settings import Settings
     from .system import SceneSystem
+    from .trajectory import Trajectory
+
+#: Part of the way covered that fixed steps may err by, by their own estimate, without a word.
+_PART = 0.02
+
+#: The step that is named instead is to err by this part of it.
+_SURE = 0.5
 
 
 def unseen(
@@ -28,6 +38,29 @@ def unseen(
     if chatter is not None:
         found.append(endless(system, chatter))
     return tuple(found)
+
+
+def unresolved(run: Trajectory) -> tuple[str, ...]:
+    """That the fixed step of an implicit method is far too long for the motion, by the estimates
+    that adaptive steps go by.  Nothing else bounds such a step, and what it damps away leaves no
+    energy that could tell."""
+    settings, statistics = run.settings, run.statistics
+    error = statistics.sum_local_error
+    if settings.step is None or error is None or len(run.t) < 3:
+        return ()
+    tableau = get(settings.method, settings.radius)
+    if not tableau.implicit:
+        return ()
+    speed = float(np.sqrt(np.mean(run.u**2, axis=1)).mean()) if run.u.size else 0.0
+    way = speed * (run.t[-1] - run.t[0])
+    if not (way > 0.0 and error > _PART * way + settings.atol * statistics.steps):
+        return ()
+    shorter = settings.step * (_SURE * _PART * way / error) ** (1 / tableau.error_order)
+    return (
+        f"step = {settings.step:.4g} s is too long for the motion: by their own estimate its steps "
+        f"err by {error / way:.0%} of the way that is covered; take a step below {shorter:.2g} s, "
+        "or leave step out",
+    )
 
 
 def endless(system: SceneSystem, chatter: tuple[int, float]) -> str:

@@ -17,7 +17,7 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, get
 from .endings import message_of
 from .method_choice import Choice
-from .notes import unseen
+from .notes import unresolved, unseen
 from .system import SceneSystem
 from .trajectory import Trajectory
 
@@ -129,7 +129,8 @@ def trajectory(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
-    return replace(found, unseen=unseen(system, settings, run.chatter))
+    seen = unseen(system, settings, run.chatter)
+    return replace(found, unseen=(*seen, *unresolved(found)))
 
 
 def said(system: SceneSystem, run: Run, status: Status | None) -> str:

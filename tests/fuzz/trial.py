@@ -15,6 +15,7 @@ import numpy as np
 
 import mstmm
 from mstmm.errors import MstmmError
+from mstmm.runtime.integrate.steppers import IMPLICIT
 from mstmm.runtime.model.model import Model
 from mstmm.runtime.result.result import Result
 
@@ -31,7 +32,7 @@ METHODS = (
 )  # fmt: skip
 
 #: Those that take fixed steps.
-FIXED = ("rk4", "dttmm-classical", "dttmm-classical-product")
+FIXED = ("rk4", "wilson", "houbolt", "dttmm-classical", "dttmm-classical-product")
 
 REFUSED, RAN, STOPPED, INTERRUPTED = "refused well", "ran", "stopped with a reason", "interrupted"
 TRACEBACK, CRASH, HANG, SILENT = "traceback", "crash", "hang", "silent non-finite"
@@ -102,9 +103,11 @@ def trial(
 
 
 def _steps(turn: int | None) -> list[tuple[str, Callable[[Model], Outcome]]]:
-    methods, questions = list(METHODS), list(QUESTIONS)
+    methods, questions = [*METHODS, *IMPLICIT], list(QUESTIONS)
     if turn is not None:
-        methods = [methods[turn % len(methods)], methods[(turn // 9 + turn + 4) % len(methods)]]
+        count = len(METHODS)
+        methods = [METHODS[turn % count], METHODS[(turn // 9 + turn + 4) % count]]
+        methods.append(IMPLICIT[turn % len(IMPLICIT)])
         questions = [questions[turn % len(questions)]]
     runs = [(name, partial(_run, method=name)) for name in (FIRST, *methods)]
     asked = [(name, partial(_ask, question=QUESTIONS[name])) for name in questions]

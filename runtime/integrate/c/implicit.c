@@ -212,8 +212,9 @@ static void estimate(const mstmm_work *work) {
 }
 
 double mstmm_implicit_norm(const mstmm_work *work, double *absolute) {
-  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u, n = work->system->n_error;
-  double sum = 0.0;
+  const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
+  const int n = work->system->n_error < n_q + n_u ? work->system->n_error : n_q + n_u;
+  double sum = 0.0; /* of the motion alone: quadratures have units of their own */
   estimate(work);
   for (int i = 0; i < n; i++) {
     const double e = work->error[i] * (i >= n_q && i < n_q + n_u ? work->run->real.h : 1.0);
