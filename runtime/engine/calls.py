@@ -208,7 +208,8 @@ class Calls:
             if int(failure.code) == NEGATIVE:
                 return (
                     f"{what} {at}: a motion leaves by itself faster than the step allows (a "
-                    "negative stiffness, or a body that topples or buckles); take a shorter step"
+                    "negative stiffness, a body that topples or buckles, inertia that vanishes); "
+                    "take a shorter step, or give the motion inertia (law.inertia) or a spring"
                 )
             return (
                 f"{what} {at}: the equations of an implicit step leave a motion undetermined: no "
