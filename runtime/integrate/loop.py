@@ -490,7 +490,7 @@ def failure_text(
         Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {at} (code "
         f"{fail.code}): the motion may be singular there, or leave an unstable position faster "
         "than the step allows; " + (cause or "a smaller step may help"),
-        Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}; "
+        Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}: {what} still changes; "
         + (cause or "a smaller step, or a Rosenbrock method such as rodas4p2, may help"),
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",

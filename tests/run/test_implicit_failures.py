@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from mstmm.runtime.integrate.steppers.implicit import Alpha, Implicit
 ADAPTIVE = [method for method in IMPLICIT if get(method).adaptive]
 
 
-def steps(method: str, step: float = 0.01) -> dict[str, float]:
+def steps(method: str, step: float = 0.01) -> dict[str, Any]:
     """`step` where the method takes no others."""
     return {} if get(method).adaptive else {"step": step}
 
@@ -122,7 +123,9 @@ def test_springs_that_hold_a_chain_allow_every_step(method: str) -> None:
 
 def test_a_method_that_does_not_exist_is_refused_with_those_that_do() -> None:
     model = mstmm.compile(standing(200.0), engine="looped")
-    with pytest.raises(SceneError, match="'rodas4p3' is not known; there are: .*rodas4p2.*houbolt"):
+    with pytest.raises(
+        SceneError, match=r"'rodas4p3' is not known; there are: .*rodas4p2.*houbolt"
+    ):
         model.simulate(1.0, "rodas4p3")
     start = model.initial_state()
     with pytest.raises(SceneError, match="'rodas4p3' is not known"):

@@ -232,18 +232,27 @@ double mstmm_increment_norm(const mstmm_work *work) {
   return norm(work, work->y_stage);
 }
 
-int64_t mstmm_implicit_worst(const mstmm_work *work) {
+/* Which of the first n components of work->error is the largest in units of its tolerance */
+static int64_t worst_of(const mstmm_work *work, const double *other, int64_t n) {
   int64_t worst = -1;
   double most = -1.0;
-  estimate(work);
-  for (int64_t i = 0; i < work->system->n_error; i++) {
-    const double e = scaled(work, work->y_new, i, work->error[i]);
+  for (int64_t i = 0; i < n; i++) {
+    const double e = scaled(work, other, i, work->error[i]);
     if (e > most || e != e) {
       most = e == e ? e : INFINITY;
       worst = i;
     }
   }
   return worst;
+}
+
+int64_t mstmm_implicit_worst(const mstmm_work *work) {
+  estimate(work);
+  return worst_of(work, work->y_new, work->system->n_error);
+}
+
+int64_t mstmm_increment_worst(const mstmm_work *work) {
+  return worst_of(work, work->y_stage, work->implicit->n_q + work->implicit->n_u);
 }
 
 /* A step over which speeds and accelerations of the start displace by 1 % of the tolerance, were they

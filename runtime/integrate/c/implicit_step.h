@@ -55,5 +55,7 @@ typedef struct mstmm_newton_equations {
 int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage);
 /* Size of the increments in work->dq and du in units of the tolerance. */
 double mstmm_increment_norm(const mstmm_work *work);
+/* The component in which the increments are largest, once they have been measured. */
+int64_t mstmm_increment_worst(const mstmm_work *work);
 
 #endif

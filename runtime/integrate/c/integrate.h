@@ -108,7 +108,7 @@ enum {
   MSTMM_EVENT_CHATTER = -8, /* `event` fires without end at one time */
   MSTMM_BAD_ARGUMENT = -9,  /* `code` says which, see mstmm_run_start */
   MSTMM_TANGENT_FAILED = -10, /* with `code`, at `fail_time` */
-  MSTMM_NOT_CONVERGED = -11   /* Newton's iteration, at `fail_time` */
+  MSTMM_NOT_CONVERGED = -11   /* Newton's iteration, at `fail_time`, least of all in `component` */
 };
 
 /* The changing part of a run, only doubles and only 64-bit integers, so that it can be saved. */

@@ -65,7 +65,7 @@ static int improve(const mstmm_work *work, const mstmm_newton_equations *stage, 
 }
 
 static int not_converged(const mstmm_work *work, double t) {
-  return mstmm_note(work->run, MSTMM_NOT_CONVERGED, 0, -1, t);
+  return mstmm_note(work->run, MSTMM_NOT_CONVERGED, 0, mstmm_increment_worst(work), t);
 }
 
 /* What may be left of a stage's equations, in units of the tolerance: with fixed steps of Newmark's
