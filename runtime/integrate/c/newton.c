@@ -10,6 +10,7 @@
 
 static const double ENOUGH = 0.02;  /* of the tolerance: what is left of a stage's equations */
 static const double PART = 1e-3;    /* of the error of a step */
+static const double DAMPED = 1e-2;  /* the same, of the error times the damping gamma - 1/2 */
 static const double SLOW = 0.05;    /* contraction at which a kept tangent is renewed */
 static const double CHANGED = 0.1;  /* of the step: the same */
 static const double SURE = 1e-2;    /* no contraction is trusted to be better */
@@ -69,11 +70,14 @@ static int not_converged(const mstmm_work *work, double t) {
 }
 
 /* What may be left of a stage's equations, in units of the tolerance: with fixed steps of Newmark's
- * family no more is asked than a small part of the error that the last step made anyway. */
+ * family no more is asked than a small part of the error that the last step made anyway.  It is the
+ * smaller the less the method damps: what no step resolves would grow by what is left, from step to
+ * step. */
 static double enough(const mstmm_work *work) {
   const mstmm_run *run = work->run;
-  const int honest = work->tableau->kind == MSTMM_ALPHA && run->fixed_step > 0.0;
-  return fmax(ENOUGH, honest ? PART * run->real.error_previous : 0.0);
+  if (work->tableau->kind != MSTMM_ALPHA || run->fixed_step <= 0.0) return ENOUGH;
+  const double part = fmin(PART, DAMPED * (work->tableau->gamma_n - 0.5));
+  return fmax(ENOUGH, part * run->real.error_previous);
 }
 
 /* What is left of the error after an increment of this size */
