@@ -54,7 +54,7 @@ def angle_error(model: Model, method: str, step: float) -> float:
      ("wilson", 4e-3), ("houbolt", 1e-2)],
 )  # fmt: skip
 def test_double_pendulum_to_second_order(method: str, largest: float) -> None:
-    """The discrete form tends to the motion of the acceleration form with the square of the step."""
+    """The discrete form tends to the motion of the acceleration form as the square of the step."""
     errors = [angle_error(known("double pendulum"), method, step) for step in STEPS]
     assert errors[1] < largest
     assert np.log2(errors[:-1]) - np.log2(errors[1:]) == pytest.approx([2.0] * 3, abs=0.05)
