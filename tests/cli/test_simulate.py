@@ -206,6 +206,10 @@ def test_mass_that_leaves_a_motion_undetermined_is_bad_input(mstmm: Command, fol
         (("--resume",), "checkpoint"),
         (("--hinge", "none.py"), "none.py"),
         (("--nonsense",), "--nonsense"),
+        (("--method", "rodas4p3"), "method 'rodas4p3' is not known"),
+        (("--method", "genalpha", "--radius", "1.5"), "a spectral radius from 0 to 1"),
+        (("--method", "rodas4p2", "--radius", "0.5"), "method 'rodas4p2' takes none"),
+        (("--method", "wilson"), "'wilson' takes fixed steps"),
         (("another.toml",), "another.toml"),
     ],
 )
