@@ -26,6 +26,16 @@ typedef struct {
     int (*accelerations_lanes)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);
+    /* For implicit methods; see derive/fuse/implicit.py. */
+    int (*residual)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r);
+    int (*residual_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r, double *power);
+    int (*residual_slope)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *d_t, const double *d_q, const double *d_u,
+                          const double *d_a, double *d_r);
+    int (*tangent)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, double *factors);
+    int (*solution)(const double *factors, const double *r, double *x);
+    int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
+    int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,
+                       double *dq);
 } mstmm_fused;
 /* cdef end */
 

@@ -43,11 +43,12 @@ PIVOT_FLOOR = Fraction(1, 10**14)
 
 
 class Replay(Slots):
-    """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds."""
+    """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds;
+    `inverse`: accelerations are given."""
 
-    def __init__(self, state: FusionState, staged: bool = True) -> None:
+    def __init__(self, state: FusionState, staged: bool = True, inverse: bool = False) -> None:
         super().__init__(state)
-        self.staged = staged
+        self.staged, self.inverse = staged, inverse
         #: Conditions of guards, which code without failure codes asks for as a whole.
         self.conditions: list[Node] = []
         self._values: Nodes = []
@@ -135,7 +136,8 @@ class Replay(Slots):
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
         known = {
-            "linked": False, "product": False, "balance": True, "efforts": True, "inverse": False,
+            "linked": False, "product": False, "balance": True, "efforts": True,
+            "inverse": self.inverse,
             "driving": True,
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),

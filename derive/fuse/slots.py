@@ -156,9 +156,9 @@ class Slots:
         q, u = slice(body.q, body.q + body.nq), slice(body.u, body.u + body.nu)
         if name == "q":
             return f.q[q]
-        if name in ("u", "efforts", "column"):
-            return (f.u if name == "u" else f.efforts)[u]
-        if name in ("chosen", "answer"):
+        if name in ("u", "efforts", "column", "given"):
+            return {"u": f.u, "given": f.given}.get(name, f.efforts)[u]
+        if name in ("chosen", "answer", "required"):
             return f.zeros(body.nu)
         return f.entries({"p": body.body_p, "rotor": body.rotor}[name])
 
@@ -193,7 +193,7 @@ class Slots:
             return f.entries(modal.stiffness if name == "K" else modal.damping)
         if name == "eta":
             return f.q[modal.q : modal.q + modal.n]
-        source = f.u if name == "etad" else f.efforts
+        source = {"etad": f.u, "given": f.given}.get(name, f.efforts)
         return source[modal.u : modal.u + modal.n]
 
     def _moments(self, name: str) -> Nodes:

@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 3
+ABI = 4
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -21,10 +21,9 @@ FLAGS = (
 #: Those of the flags that some compilers do not know (clang) and that change no result.
 TUNING = ("-fno-tree-slp-vectorize",)
 
-_STATE = (
-    "const double *p, const double *t, const double *q, const double *u, const double *memory, "
-    "const double *efforts, double *qdot, double *udot"
-)
+_AT = "const double *p, const double *t, const double *q, const double *u, const double *memory, "
+_STATE = _AT + "const double *efforts, double *qdot, double *udot"
+_GIVEN = _AT + "const double *a"
 
 #: `failures` holds (reason, element, code) of guard codes 1, 2, ... as mstmm_failure has them.
 #: Functions that a library does not hold are NULL.  A kernel returns 0 or a guard's code; then what
@@ -52,5 +51,15 @@ typedef struct {{
     int (*accelerations_lanes)({_STATE}, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);
+    /* For implicit methods; see derive/fuse/implicit.py. */
+    int (*residual)({_GIVEN}, double *r);
+    int (*residual_power)({_GIVEN}, double *r, double *power);
+    int (*residual_slope)({_GIVEN}, const double *d_t, const double *d_q, const double *d_u,
+                          const double *d_a, double *d_r);
+    int (*tangent)({_GIVEN}, const double *steps, double *factors);
+    int (*solution)(const double *factors, const double *r, double *x);
+    int (*rates)({_GIVEN}, double *dq);
+    int (*coordinates)({_GIVEN}, const double *steps, const double *x, const double *rho,
+                       double *dq);
 }} mstmm_fused;
 """

@@ -40,6 +40,9 @@ MOST_ASKED = 400
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
 _SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.1, 0.03, 0.0015
 _SAVED_PER_BODY = 6e-8
+#: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
+#: costs the square of them.
+_MOST_UNKNOWNS = 20
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
 
@@ -67,6 +70,7 @@ class Fusion:
         self._looped_by_nature = bool(self.obstacle)
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
+        self.implicit: FusedLibrary | None = None
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         if not self.obstacle:
@@ -102,6 +106,7 @@ class Fusion:
             return
         if self.structure == other.structure:
             self.library, self.lanes, self.note = other.library, other.lanes, other.note
+            self.implicit = other.implicit
         elif other.library is not None:
             try:
                 self.build()
@@ -118,9 +123,18 @@ class Fusion:
         After `build` it is made whatever the number of evaluations; raises EnvironmentFailure if
         it cannot be.
         """
+        return self._ready_beside("lanes", evaluations)
+
+    def ready_implicit(self, evaluations: float) -> FusedLibrary | None:
+        """The same for what implicit methods ask of small scenes; None for others."""
+        if self.obstacle or self.structure.nu > _MOST_UNKNOWNS:
+            return None
+        return self._ready_beside("implicit", evaluations)
+
+    def _ready_beside(self, part: str, evaluations: float) -> FusedLibrary | None:
         if self._insisted:
-            return self._get("lanes", build=True)
-        return self._ready("lanes", evaluations)
+            return self._get(part, build=True)
+        return self._ready(part, evaluations)
 
     def _ready(self, part: str, evaluations: float) -> FusedLibrary | None:
         found = self._get(part, build=False)
@@ -138,7 +152,7 @@ class Fusion:
         return seconds / (_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
 
     def _get(self, part: str, build: bool) -> FusedLibrary | None:
-        attribute = "library" if part == "scalar" else "lanes"
+        attribute = "library" if part == "scalar" else part
         found: FusedLibrary | None = getattr(self, attribute)
         if found is not None or self.obstacle:
             return found
@@ -164,7 +178,8 @@ class Fusion:
     def _sources(self, part: str, key: str) -> dict[str, str]:
         from ..derive.print.scene import fused_sources
 
-        return fused_sources(self.fused(self.structure), key, part)
+        make = self.fused_implicit if part == "implicit" else self.fused
+        return fused_sources(make(self.structure), key, part)
 
     def columns(
         self,
@@ -211,6 +226,12 @@ class Fusion:
         from ..derive.fuse.scene import fuse
 
         return fuse(structure, kernels_of(self._definitions))
+
+    def fused_implicit(self, structure: Structure) -> Fused:
+        """The same of what implicit methods ask."""
+        from ..derive.fuse.implicit import fuse_implicit
+
+        return fuse_implicit(structure, kernels_of(self._definitions))
 
 
 def modes_at(structure: Structure) -> list[int]:

@@ -111,6 +111,40 @@ def solve_by_rows(graph: Graph, matrix: NodeMatrix, right: NodeMatrix) -> NodeMa
     return [row[n:width] for row in rows]
 
 
+def lu_from_the_last(
+    graph: Graph, matrix: NodeMatrix, relative_pivot: Fraction = RELATIVE_PIVOT
+) -> NodeMatrix:
+    """A = U L from the last unknown to the first, without row exchange: L below and on the
+    diagonal, whose entries are stored as 1 / L_ii, U with a diagonal of ones above.
+
+    From tips to root a tree fills nothing in.  Every pivot is guarded to be positive, as those of
+    matrices near a positive definite one are.
+    """
+    n = len(matrix)
+    rows = [list(row) for row in matrix]
+    for i in reversed(range(n)):
+        _guard(graph, _pivot_condition(graph, rows[i][i], matrix[i][i], relative_pivot), i, n)
+        rows[i][i] = 1 / rows[i][i]
+        for k in range(i):
+            rows[k][i] = rows[k][i] * rows[i][i]
+            for j in range(i):
+                rows[k][j] = rows[k][j] - rows[k][i] * rows[i][j]
+    return rows
+
+
+def solve_from_the_last(factors: NodeMatrix, right: list[Node]) -> list[Node]:
+    """A^-1 b by what `lu_from_the_last` has left of A."""
+    n, found = len(right), list(right)
+    for i in reversed(range(n)):
+        for k in range(i):
+            found[k] = found[k] - factors[k][i] * found[i]
+    for i in range(n):
+        for j in range(i):
+            found[i] = found[i] - factors[i][j] * found[j]
+        found[i] = found[i] * factors[i][i]
+    return found
+
+
 def _size(graph: Graph, row: list[Node]) -> Node:
     total = graph.constant(0)
     for entry in row:

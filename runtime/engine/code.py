@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 class Fusing(Protocol):
-    """Fused libraries of a scene: `library` for one state, `lanes` for several side by side.
+    """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
+    `implicit` for what implicit methods ask.
 
     `numbers` is the vector p they read; `note` says where the library came from, `obstacle` why
     there can be none.  `ready(n)` gives a library if it is there or if n evaluations are worth a
@@ -26,6 +27,7 @@ class Fusing(Protocol):
 
     library: FusedLibrary | None
     lanes: FusedLibrary | None
+    implicit: FusedLibrary | None
     numbers: Array
     note: str
     obstacle: str
@@ -35,6 +37,7 @@ class Fusing(Protocol):
     def follow(self, other: Any) -> None: ...
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
+    def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
@@ -49,6 +52,7 @@ class NotFused:
     obstacle: str = "this model was made without the means to compile fused code"
     library: FusedLibrary | None = None
     lanes: FusedLibrary | None = None
+    implicit: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -67,6 +71,9 @@ class NotFused:
         return None
 
     def ready_lanes(self, evaluations: float) -> None:
+        return None
+
+    def ready_implicit(self, evaluations: float) -> None:
         return None
 
     def fused(self, structure: Any) -> Any:

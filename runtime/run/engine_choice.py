@@ -71,7 +71,8 @@ def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode 
 def _compiled(
     model: Compiled, settings: Settings, library: FusedLibrary, evaluations: float
 ) -> SceneCode:
-    """Lanes only for methods that have use for them."""
-    iterated = get(settings.first_method).iterated is not None
-    lanes = model.fusion.ready_lanes(evaluations) if iterated else None
-    return SceneCode(library, lanes, model.fusion.numbers)
+    """Lanes and what implicit methods ask only for methods that have use for them."""
+    method, fusion = get(settings.first_method), model.fusion
+    lanes = fusion.ready_lanes(evaluations) if method.iterated is not None else None
+    implicit = fusion.ready_implicit(evaluations) if method.implicit else None
+    return SceneCode(library, lanes, fusion.numbers, implicit)

@@ -24,11 +24,13 @@ from ..pack.switches import MOST
 
 @dataclass(frozen=True)
 class SceneCode:
-    """Code compiled for a scene: for one state, for several side by side, and their numbers."""
+    """Code compiled for a scene: for one state, for several side by side, for what implicit methods
+    ask, and their numbers."""
 
     one: FusedLibrary
     lanes: FusedLibrary | None
     numbers: Array
+    implicit: FusedLibrary | None = None
 
 
 class SceneSystem:
@@ -63,13 +65,15 @@ class SceneSystem:
             self._events(packed.watched.tape, packed.watched.ends, actions)
         self.workspace = np.zeros(packed.workspace)
         run.workspace = engine.pointer(self.workspace)
+        self._code = compiled
         if compiled is not None:
             self._compiled(compiled)
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
 
     def offer_tangent(self) -> None:
-        """Make what implicit methods ask for: residual and tangent, by the looped engine."""
+        """Make what implicit methods ask for: residual and tangent, by code compiled for them where
+        it is given."""
         engine, run = self.engine, self.run
         if self.system.implicit:
             return
@@ -83,6 +87,16 @@ class SceneSystem:
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
         self.kept += [base, stage, work, known, coordinates]
+        if self._code is not None and self._code.implicit is not None:
+            self._implicit_by(self._code.implicit, self._code.numbers)
+
+    def _implicit_by(self, code: FusedLibrary, given: Array) -> None:
+        engine, lib = self.engine, self.engine.lib
+        numbers = np.ascontiguousarray(given)
+        scratch = np.zeros(lib.mstmm_implicit_code_size(code.descriptor))
+        pointers = engine.pointer(numbers), engine.pointer(scratch)
+        lib.mstmm_implicit_by_code(self.run, code.descriptor, *pointers)
+        self.kept += [numbers, scratch, *pointers]
 
     def _compiled(self, code: SceneCode) -> None:
         engine, lib = self.engine, self.engine.lib

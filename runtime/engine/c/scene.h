@@ -48,6 +48,15 @@ typedef struct {
     int release;
 } mstmm_event_action;
 
+/* Code compiled for what implicit methods ask, and the looped engine's way, which it falls back on */
+typedef struct {
+    const mstmm_fused *fused; /* NULL: there is none */
+    const real *p;
+    real *numbers; /* mstmm_implicit_code_size */
+    mstmm_implicit looped;
+    int looped_tangent; /* the last tangent was factored there */
+} mstmm_implicit_code;
+
 /* State y = [q, u] and, with `with_power`, the work of everything not stored. */
 typedef struct {
     const mstmm_model *model;
@@ -74,6 +83,7 @@ typedef struct {
     int steady;       /* nothing in the scene goes by time */
     int *coordinates; /* nu: see mstmm_implicit */
     real *known;      /* nq + 3 nu: scratch */
+    mstmm_implicit_code implicit_code;
 } mstmm_scene_run;
 
 /* Lets implicit methods integrate `run`, whose last fields have been given. */

@@ -1,0 +1,152 @@
+/* A small scene as implicit methods see it, by code compiled for it.  Where its guards fail the looped
+ * engine is asked instead, which names what is wrong or does without the shortcut. */
+#include <string.h>
+
+#include "compiled.h"
+
+#define CODE(run) ((run)->implicit_code.fused)
+
+static const real *parameters(const mstmm_scene_run *run) { return run->implicit_code.p; }
+
+/* Parts of the numbers: the base point (t, q, u, a), steps, factors, and known increments. */
+typedef struct {
+    real *t, *q, *u, *a, *steps, *factors, *known_q, *known_u, *known_a, *right;
+    int64_t used;
+} mstmm_parts;
+
+static mstmm_parts cut(int64_t nq, int64_t nu, real *numbers)
+{
+    mstmm_parts at = {.used = 0};
+    const struct { real **to; int64_t count; } all[] = {
+        {&at.t, 1}, {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.steps, 3}, {&at.factors, nu * nu},
+        {&at.known_q, nq}, {&at.known_u, nu}, {&at.known_a, nu}, {&at.right, nu},
+    };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        if (numbers) *all[i].to = numbers + at.used;
+        at.used += all[i].count;
+    }
+    return at;
+}
+
+int64_t mstmm_implicit_code_size(const mstmm_fused *fused) { return cut(fused->nq, fused->nu, NULL).used; }
+
+static mstmm_parts parts_of(const mstmm_scene_run *run)
+{
+    return cut(CODE(run)->nq, CODE(run)->nu, run->implicit_code.numbers);
+}
+
+static int residual(void *context, double t, const double *y, const double *a, double *r,
+                    double *work)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *code = CODE(run);
+    const real *u = y + code->nq;
+    const int wanted = work && run->with_power;
+    const int failed =
+        wanted ? code->residual_power(parameters(run), &t, y, u, run->memory, a, r, work)
+               : code->residual(parameters(run), &t, y, u, run->memory, a, r);
+    return failed ? run->implicit_code.looped.residual(run, t, y, a, r, work) : 0;
+}
+
+static int residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *code = CODE(run);
+    const mstmm_parts at = parts_of(run);
+    const real one = 1;
+    if (run->steady) {
+        memset(r_t, 0, (size_t)code->nu * sizeof(real));
+        return 0;
+    }
+    memset(at.known_q, 0, (size_t)(code->nq + 2 * code->nu) * sizeof(real));
+    const int failed = code->residual_slope(parameters(run), &t, y, y + code->nq, run->memory, a,
+                                            &one, at.known_q, at.known_u, at.known_a, r_t);
+    return failed ? run->implicit_code.looped.residual_rate(run, t, y, a, r_t) : 0;
+}
+
+/* Rates are asked for at no time in particular, and depend on none. */
+static int rates(void *context, const double *q, const double *u, double *dq)
+{
+    mstmm_scene_run *run = context;
+    const real t = 0;
+    const int failed = CODE(run)->rates(parameters(run), &t, q, u, run->memory, u, dq);
+    return failed ? run->implicit_code.looped.rates(run, q, u, dq) : 0;
+}
+
+static int tangent(void *context, double t, const double *y, const double *a, double s, double sq,
+                   int kappa)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *code = CODE(run);
+    const mstmm_parts at = parts_of(run);
+    *at.t = t;
+    memcpy(at.q, y, (size_t)(code->nq + code->nu) * sizeof(real)); /* u stands behind q */
+    memcpy(at.a, a, (size_t)code->nu * sizeof(real));
+    at.steps[0] = s;
+    at.steps[1] = sq;
+    at.steps[2] = kappa;
+    const int failed = code->tangent(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
+                                     at.factors);
+    run->implicit_code.looped_tangent = failed;
+    return failed ? run->implicit_code.looped.tangent(run, t, y, a, s, sq, kappa) : 0;
+}
+
+static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const real *x,
+                       const real *rho, real *dq)
+{
+    return CODE(run)->coordinates(parameters(run), at->t, at->q, at->u, run->memory, at->a,
+                                  at->steps, x, rho, dq);
+}
+
+/* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
+static int without_known(const mstmm_scene_run *run, const mstmm_parts *at, const double *rho_q,
+                         const double *rho_u, double *slope)
+{
+    const mstmm_fused *code = CODE(run);
+    const real still = 0;
+    memset(at->known_u, 0, (size_t)code->nu * sizeof(real));
+    for (int j = 0; j < code->nu; j++) at->known_a[j] = rho_u ? -rho_u[j] : 0;
+    mstmm_tangent_free(run->base, at->known_a);
+    int failed = coordinates(run, at, at->known_u, rho_q, at->known_q);
+    if (!failed)
+        failed = code->residual_slope(parameters(run), at->t, at->q, at->u, run->memory, at->a,
+                                      &still, at->known_q, at->known_u, at->known_a, slope);
+    for (int j = 0; !failed && j < code->nu; j++) at->right[j] -= slope[j];
+    return failed;
+}
+
+static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
+                 double *dq, double *du, double *da)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_fused *code = CODE(run);
+    const mstmm_implicit *looped = &run->implicit_code.looped;
+    const mstmm_parts at = parts_of(run);
+    if (run->implicit_code.looped_tangent) return looped->solve(run, r, rho_q, rho_u, dq, du, da);
+    memset(at.known_q, 0, (size_t)code->nq * sizeof(real));
+    const real *rho = rho_q ? rho_q : at.known_q;
+    memcpy(at.right, r, (size_t)code->nu * sizeof(real));
+    mstmm_tangent_free(run->base, at.right);
+    int failed = rho_q || rho_u ? without_known(run, &at, rho, rho_u, da) : 0;
+    if (!failed) failed = code->solution(at.factors, at.right, du);
+    if (!failed) failed = coordinates(run, &at, du, rho, dq);
+    if (failed) { /* guards have passed at this point before: not to be expected */
+        run->failure = (mstmm_failure){.reason = MSTMM_FAILED_TANGENT, .element = -1, .code = failed};
+        return MSTMM_FAILED_TANGENT;
+    }
+    for (int j = 0; j < code->nu; j++) da[j] = at.steps[0] * du[j] - (rho_u ? rho_u[j] : 0);
+    mstmm_tangent_free(run->base, da);
+    return 0;
+}
+
+void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, const real *p,
+                            real *numbers)
+{
+    run->implicit_code = (mstmm_implicit_code){.fused = fused, .p = p, .numbers = numbers,
+                                               .looped = run->implicit};
+    run->implicit.residual = residual;
+    run->implicit.residual_rate = residual_rate;
+    run->implicit.rates = rates;
+    run->implicit.tangent = tangent;
+    run->implicit.solve = solve;
+}

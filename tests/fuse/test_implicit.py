@@ -1,0 +1,170 @@
+"""What implicit methods ask of a small scene, as code of its own: the looped engine's numbers.
+
+The kernels are replayed in floats on drawn trees; runs go by the compiled code.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from engine.test_tangent import compiled, rigid, worst
+from flexible import engine_scenes
+from numpy.random import Generator
+from reference.jets import Array
+
+import mstmm
+from mstmm.bridge.fusion import Fusion
+from mstmm.ir.replay import evaluate_floats
+from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.pack.structure import structure_of
+from mstmm.runtime.result.result import Result
+from mstmm.runtime.run.system import SceneSystem
+
+Scene = dict[str, Any]
+
+TIME, STEPS = 0.3, (2000.0, 1500.0, 1.0)
+UNIT = 2.0**-53
+
+
+class Fused:
+    """The kernels of a scene at one state, replayed in floats."""
+
+    def __init__(self, model: mstmm.Model, memory: Array, q: Array, u: Array, a: Array) -> None:
+        assert isinstance(model.fusion, Fusion)
+        structure, p = structure_of(model.packed.system, model.known or {})
+        self.kernels = model.fusion.fused_implicit(structure).kernels
+        self.state: dict[str, Any] = {
+            "p": p, "t": [TIME], "q": q, "u": u, "a": a, "steps": STEPS,
+            "memory": memory[: structure.n_memory],
+        }  # fmt: skip
+
+    def run(self, name: str, **more: Any) -> Array:
+        """The first output of a kernel."""
+        given = self.state | more
+        inputs = {port.name: list(given[port.name]) for port in self.kernels[name].inputs}
+        return np.array(next(iter(evaluate_floats(self.kernels[name], inputs).values())))
+
+
+def check(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
+    """Residual, its directions, coordinates and solutions; entries of imposed speeds are zero."""
+    model, looped = compiled(scene)
+    nq, nu = looped.nq, looped.nu
+    a, d_q, d_u, d_a, right, rho = (rng.normal(size=n) for n in (nu, nq, nu, nu, nu, nq))
+    expected = looped.residual(TIME, q, u, a)
+    fused = Fused(model, looped.memory, q, u, a)
+    assert worst(fused.run("residual"), expected) < 1e-10
+    assert worst(fused.run("residual_power"), expected) < 1e-10
+    along = {"d_t": [1.0], "d_q": d_q, "d_u": d_u, "d_a": d_a}
+    assert worst(fused.run("residual_slope", **along), looped.slope(1.0, d_q, d_u, d_a)) < 1e-10
+    looped.factor(*STEPS)
+    answer = looped.solve(right)
+    free = answer != 0
+    factors = fused.run("tangent")
+    found = fused.run("solution", factors=factors, r=np.where(free, right, 0.0))
+    assert worst(found, answer) < max(1e-11, 100 * UNIT * condition(looped))
+    changes = fused.run("coordinates", x=answer, rho=rho)
+    assert worst(changes, looped.coordinates(answer, rho)) < 1e-11
+
+
+def condition(tangent: Tangent) -> float:
+    """Of the tangent, its rows and columns scaled."""
+    columns = [
+        tangent.slope(0.0, tangent.coordinates(unit), unit, STEPS[0] * unit)
+        for unit in np.eye(tangent.nu)
+    ]
+    matrix = np.array(columns).reshape(tangent.nu, tangent.nu).T
+    rows = np.flatnonzero(np.abs(matrix).max(axis=1, initial=0.0) > 0)
+    matrix = matrix[np.ix_(rows, rows)]
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    return float(np.linalg.cond(matrix / np.outer(size, size))) if len(rows) else 1.0
+
+
+@pytest.mark.parametrize("draw", range(8))
+def test_rigid_trees(draw: int, rng: Generator) -> None:
+    """Every hinge, laws with friction and stops, efforts, loads and springs anywhere."""
+    check(*rigid(rng), rng)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("draw", range(4))
+def test_flexible_trees(draw: int, rng: Generator) -> None:
+    check(*small(rng, draw % 2 == 0), rng)
+
+
+def small(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
+    """A drawn flexible scene of few speeds, as such code is made for."""
+    while True:
+        scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), planar, 2)
+        if len(u) <= 12:
+            return scene, q, u
+
+
+# --- runs by compiled code ------------------------------------------------------------------------
+
+
+def arm(n: int) -> Scene:
+    """Rods on stiff pins, a ball and a driven slider, with damping and a force."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    stiff = {"stiffness": [1e5], "damping": [5.0]}
+    hinges: list[Scene] = [{"type": "pin", "axis": [0, 1, 0], "law": stiff} for _ in range(n)]
+    hinges[1] = {"type": "ball", "law": {"stiffness": [1e5] * 3, "damping": [2.0] * 3}}
+    hinges[2] = {"type": "prismatic", "axis": [1, 0, 0], "drive": "0.1*sin(3*t)"}
+    return {
+        "gravity": [0, 0, -9.81],
+        "body": [{"name": f"rod{k}", **rod} for k in range(n)],
+        "hinge": [
+            {"name": f"joint{k}", "inboard": f"rod{k - 1}.tip" if k else "ground",
+             "outboard": f"rod{k}", **hinge}
+            for k, hinge in enumerate(hinges)
+        ],
+        "load": [{"name": "push", "on": f"rod{n - 1}.tip", "force": [0, "5*sin(9*t)", 0]}],
+    }  # fmt: skip
+
+
+def by(engine: str, scene: Scene, method: str, **options: Any) -> Result:
+    model = mstmm.compile(mstmm.Scene(**scene), engine=engine)
+    return model.simulate(options.pop("t_end", 0.2), method=method, certify=False, **options)
+
+
+@pytest.mark.parametrize("method", ["rodas4p2", "kvaerno5", "genalpha"])
+def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
+    fused, looped = (by(engine, arm(4), method, step=2e-3) for engine in ("fused", "looped"))
+    assert fused.success and looped.success
+    assert fused.q == pytest.approx(looped.q, abs=1e-9)
+    assert fused.u == pytest.approx(looped.u, abs=1e-6)
+    assert fused.work == pytest.approx(looped.work, abs=1e-6)
+
+
+def offered(n: int, engine: str = "fused") -> SceneSystem:
+    """A system of the arm that has run implicitly."""
+    kept = list[SceneSystem]()
+    offer = SceneSystem.offer_tangent
+
+    def noted(system: SceneSystem) -> None:
+        offer(system)
+        kept.append(system)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SceneSystem, "offer_tangent", noted)
+        assert by(engine, arm(n), "genalpha", step=2e-3).success
+    return kept[-1]
+
+
+def test_scenes_of_many_unknowns_stay_with_the_sweep() -> None:
+    assert offered(4).run.implicit_code.fused
+    assert not offered(4, "looped").run.implicit_code.fused
+    assert not offered(20).run.implicit_code.fused
+
+
+def test_the_looped_engine_judges_pivots_that_are_not_positive() -> None:
+    """A rod on end that falls faster than the step can tell: both engines say the same."""
+    scene = arm(3)
+    scene["body"], scene["hinge"], scene["load"] = scene["body"][:1], scene["hinge"][:1], []
+    scene["hinge"][0].pop("law")
+    options: Scene = {"step": 1.0, "t_end": 2.0, "initial": ([-1.57], [0.0])}
+    found = [by(engine, scene, "genalpha", **options) for engine in ("fused", "looped")]
+    assert not found[0].success
+    assert found[0].message == found[1].message and found[0].t[-1] == found[1].t[-1]
