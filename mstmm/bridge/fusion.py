@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from importlib.resources import files
@@ -123,18 +124,22 @@ class Fusion:
         After `build` it is made whatever the number of evaluations; raises EnvironmentFailure if
         it cannot be.
         """
-        return self._ready_beside("lanes", evaluations)
+        if self._insisted:
+            return self._get("lanes", build=True)
+        return self._ready("lanes", evaluations)
 
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None:
-        """The same for what implicit methods ask of small scenes; None for others."""
+        """The same for what implicit methods ask of small scenes, where nobody knows how many
+        evaluations there will be (inf) only after `build`.  None where the looped engine serves:
+        for other scenes, and where it cannot be made.
+        """
         if self.obstacle or self.structure.nu > _MOST_UNKNOWNS:
             return None
-        return self._ready_beside("implicit", evaluations)
-
-    def _ready_beside(self, part: str, evaluations: float) -> FusedLibrary | None:
-        if self._insisted:
-            return self._get(part, build=True)
-        return self._ready(part, evaluations)
+        pays = self._break_even() < evaluations < math.inf
+        try:
+            return self._get("implicit", build=self._insisted or pays)
+        except EnvironmentFailure:
+            return None
 
     def _ready(self, part: str, evaluations: float) -> FusedLibrary | None:
         found = self._get(part, build=False)

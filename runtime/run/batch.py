@@ -184,7 +184,7 @@ def _one_by_one(
     models: list[Compiled], settings: Settings, q: Array, u: Array,
     which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
-    compiled = {id(m): _scalar(m) for m in models}
+    compiled = {id(m): _scalar(m, settings) for m in models}
     stop = threading.Event()
 
     def look(_: Run) -> None:
@@ -206,9 +206,14 @@ class _Stopped(Exception):
     """The batch has ended."""
 
 
-def _scalar(model: Compiled) -> SceneCode | None:
+def _scalar(model: Compiled, settings: Settings) -> SceneCode | None:
+    """Everything that the trajectories share, before they begin on threads of their own."""
     library = model.fusion.ready(math.inf)
-    return None if library is None else SceneCode(library, None, model.fusion.numbers)
+    if library is None:
+        return None
+    asks = settings.method == AUTO or get(settings.method).implicit
+    implicit = model.fusion.ready_implicit(math.inf) if asks else None
+    return SceneCode(library, None, model.fusion.numbers, lambda: implicit)
 
 
 def _alone(

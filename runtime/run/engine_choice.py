@@ -8,6 +8,7 @@ the run starts again on compiled code, so that its numbers do not depend on when
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mstmm.errors import EnvironmentFailure, SceneError
@@ -71,8 +72,7 @@ def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode 
 def _compiled(
     model: Compiled, settings: Settings, library: FusedLibrary, evaluations: float
 ) -> SceneCode:
-    """Lanes and what implicit methods ask only for methods that have use for them."""
-    method, fusion = get(settings.first_method), model.fusion
-    lanes = fusion.ready_lanes(evaluations) if method.iterated is not None else None
-    implicit = fusion.ready_implicit(evaluations) if method.implicit else None
-    return SceneCode(library, lanes, fusion.numbers, implicit)
+    """Lanes only for methods that have use for them; what implicit methods ask once one does."""
+    fusion, iterated = model.fusion, get(settings.first_method).iterated is not None
+    lanes = fusion.ready_lanes(evaluations) if iterated else None
+    return SceneCode(library, lanes, fusion.numbers, partial(fusion.ready_implicit, evaluations))

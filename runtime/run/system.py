@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +24,13 @@ from ..pack.switches import MOST
 
 @dataclass(frozen=True)
 class SceneCode:
-    """Code compiled for a scene: for one state, for several side by side, for what implicit methods
-    ask, and their numbers."""
+    """Code compiled for a scene: for one state, for several side by side, their numbers, and what
+    gives the code for what implicit methods ask, if there is any."""
 
     one: FusedLibrary
     lanes: FusedLibrary | None
     numbers: Array
-    implicit: FusedLibrary | None = None
+    implicit: Callable[[], FusedLibrary | None]
 
 
 class SceneSystem:
@@ -87,8 +87,8 @@ class SceneSystem:
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
         self.kept += [base, stage, work, known, coordinates]
-        if self._code is not None and self._code.implicit is not None:
-            self._implicit_by(self._code.implicit, self._code.numbers)
+        if self._code is not None and (implicit := self._code.implicit()) is not None:
+            self._implicit_by(implicit, self._code.numbers)
 
     def _implicit_by(self, code: FusedLibrary, given: Array) -> None:
         engine, lib = self.engine, self.engine.lib

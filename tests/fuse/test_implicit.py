@@ -16,6 +16,7 @@ from reference.jets import Array
 
 import mstmm
 from mstmm.bridge.fusion import Fusion
+from mstmm.errors import EnvironmentFailure
 from mstmm.ir.replay import evaluate_floats
 from mstmm.runtime.engine.tangent import Tangent
 from mstmm.runtime.pack.structure import structure_of
@@ -104,13 +105,13 @@ def small(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
 # --- runs by compiled code ------------------------------------------------------------------------
 
 
-def arm(n: int) -> Scene:
+def arm(n: int, stiffness: float = 1e5) -> Scene:
     """Rods on stiff pins, a ball and a driven slider, with damping and a force."""
     rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
            "ends": {"tip": [1, 0, 0]}}  # fmt: skip
-    stiff = {"stiffness": [1e5], "damping": [5.0]}
+    stiff = {"stiffness": [stiffness], "damping": [5.0]}
     hinges: list[Scene] = [{"type": "pin", "axis": [0, 1, 0], "law": stiff} for _ in range(n)]
-    hinges[1] = {"type": "ball", "law": {"stiffness": [1e5] * 3, "damping": [2.0] * 3}}
+    hinges[1] = {"type": "ball", "law": {"stiffness": [stiffness] * 3, "damping": [2.0] * 3}}
     hinges[2] = {"type": "prismatic", "axis": [1, 0, 0], "drive": "0.1*sin(3*t)"}
     return {
         "gravity": [0, 0, -9.81],
@@ -138,8 +139,9 @@ def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
     assert fused.work == pytest.approx(looped.work, abs=1e-6)
 
 
-def offered(n: int, engine: str = "fused") -> SceneSystem:
-    """A system of the arm that has run implicitly."""
+def offered(scene: Scene, engine: str = "fused", method: str = "genalpha") -> SceneSystem:
+    """The system of a run that has stepped implicitly."""
+    options = {"step": 2e-3} if method == "genalpha" else {"rtol": 1e-4, "atol": 1e-6}
     kept = list[SceneSystem]()
     offer = SceneSystem.offer_tangent
 
@@ -149,14 +151,29 @@ def offered(n: int, engine: str = "fused") -> SceneSystem:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(SceneSystem, "offer_tangent", noted)
-        assert by(engine, arm(n), "genalpha", step=2e-3).success
+        assert by(engine, scene, method, **options).success
     return kept[-1]
 
 
 def test_scenes_of_many_unknowns_stay_with_the_sweep() -> None:
-    assert offered(4).run.implicit_code.fused
-    assert not offered(4, "looped").run.implicit_code.fused
-    assert not offered(20).run.implicit_code.fused
+    assert offered(arm(4)).run.implicit_code.fused
+    assert not offered(arm(4), "looped").run.implicit_code.fused
+    assert not offered(arm(20)).run.implicit_code.fused
+
+
+def test_a_choice_among_methods_takes_the_code_once_it_steps_implicitly() -> None:
+    system = offered(arm(4, 1e9), method="auto")
+    assert system.run.implicit_code.fused
+
+
+def test_without_a_compiler_the_looped_engine_serves(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = mstmm.compile(mstmm.Scene(**arm(4)), engine="fused")
+
+    def fails(*_: object) -> None:
+        raise EnvironmentFailure("no compiler")
+
+    monkeypatch.setattr("mstmm.bridge.fusion.opened", fails)
+    assert model.simulate(0.01, method="genalpha", step=2e-3, certify=False).success
 
 
 def test_the_looped_engine_judges_pivots_that_are_not_positive() -> None:
