@@ -1,0 +1,116 @@
+"""What one implicit step costs, in evaluations of the accelerations by the same engine.
+
+    python -m benchmarks.stiff.steps [--quick]
+
+By the looped engine: residual R, tangent T with its elimination, solution S and product P of chains
+from 10 to 100 000 bodies.  By code of a scene's own: whole steps of an arm of six pins.  All of a
+row alternate in one process; CPU times, the minimum of the rounds counts.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from argparse import ArgumentParser
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mstmm
+from mstmm.runtime.engine.tangent import Tangent
+
+from ..common import measure
+from . import scenes
+
+HERE = Path(__file__).resolve().parent
+CHAINS: dict[str, Callable[[int], scenes.Scene]] = {
+    "pins": lambda n: scenes.damped_rods(n, 1e3),
+    "bushings": lambda n: scenes.bushed_rods(n, 1e8, 0.01),
+}
+METHODS = ("genalpha", "dttmm", "rodas4p2", "kvaerno5")
+STEP, STEPS = 1e-4, 20_000  # s
+
+
+def least(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """CPU seconds of each call, the least of rounds in turn."""
+    found = dict.fromkeys(calls, float("inf"))
+    for _ in range(rounds):
+        for name, call in calls.items():
+            begin = time.process_time()
+            call()
+            found[name] = min(found[name], time.process_time() - begin)
+    return found
+
+
+def chain(name: str, n: int, rounds: int) -> dict[str, Any]:
+    """Nanoseconds a body of each pass."""
+    model = mstmm.compile(mstmm.Scene(**CHAINS[name](n)), engine="looped")
+    engine, tangent = model.looped, Tangent(model.looped)
+    random = np.random.default_rng(1)
+    q, u = (np.asarray(x, float) for x in model.initial_state())
+    q = q + 1e-3 * random.normal(size=q.shape)
+    a, memory = random.normal(size=engine.nu), engine.start_memory()[None]
+    tangent.residual(0.0, q, u, a)
+    tangent.factor(500.0, 500.0)
+    calls: dict[str, Callable[[], object]] = {
+        "E": lambda: engine.accelerations(0.0, q[None], u[None], memory),
+        "R": lambda: tangent.residual(0.0, q, u, a),
+        "T": lambda: tangent.factor(500.0, 500.0),
+        "S": lambda: tangent.solve(a),
+        "P": lambda: tangent.slope(0.0, q, u, a),
+    }
+    repeats = max(1, 20_000 // n)
+    many = {k: (lambda f=f: [f() for _ in range(repeats)]) for k, f in calls.items()}
+    found = least(many, rounds)
+    return {"chain": name, "bodies": n, **{k: 1e9 * x / n / repeats for k, x in found.items()}}
+
+
+def fused(rounds: int) -> dict[str, Any]:
+    """Microseconds of a step of the arm of six pins, and of one evaluation, by its own code."""
+    model = mstmm.compile(mstmm.Scene(**scenes.rigid_arm()), engine="fused")
+    t_end = STEP * STEPS
+
+    def run(method: str) -> Callable[[], object]:
+        options: dict[str, Any] = {"certify": False, "output_times": [0.0, t_end], "step": STEP}
+        return lambda: model.simulate(t_end, method=method, **options)
+
+    found = least({name: run(name) for name in ("rk4", *METHODS)}, rounds)
+    microseconds = {name: 1e6 * seconds / STEPS for name, seconds in found.items()}
+    return {"E": microseconds.pop("rk4") / 4, **microseconds}
+
+
+def table(result: dict[str, Any]) -> str:
+    """The result as Markdown."""
+    lines = [
+        "| chain | bodies | E, ns a body | R/E | T/E | S/E | P/E |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in result["looped"]:
+        ratios = " | ".join(f"{row[k] / row['E']:.2f}" for k in "RTSP")
+        lines.append(f"| {row['chain']} | {row['bodies']} | {row['E']:.0f} | {ratios} |")
+    arm = result["fused"]
+    lines += ["", f"Arm of six pins by its own code, one evaluation {arm['E']:.3f} us:", ""]
+    lines += ["| method | us a step | evaluations |", "|---|---|---|"]
+    lines += [f"| {m} | {arm[m]:.2f} | {arm[m] / arm['E']:.1f} |" for m in METHODS]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, write steps.json and steps.md, print the table."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="try whether it runs; writes nothing")
+    quick = parser.parse_args().quick
+    sizes, rounds = ((10, 100), 2) if quick else ((10, 100, 1000, 10_000, 100_000), 15)
+    looped = [chain(name, n, rounds) for name in CHAINS for n in sizes]
+    result = {"machine": measure.machine(), "looped": looped, "fused": fused(rounds)}
+    text = table(result)
+    print(text)
+    if not quick:
+        (HERE / "steps.json").write_text(json.dumps(result, indent=1) + "\n")
+        (HERE / "steps.md").write_text(text)
+
+
+if __name__ == "__main__":
+    main()
