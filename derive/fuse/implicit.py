@@ -38,7 +38,8 @@ def fuse_implicit(structure: Structure, kernels: Kernels) -> Fused:
     (nu x nu, see `lu_from_the_last`) of K W + C + s M with a one for every imposed speed; steps are
     s, sq and kappa, and W = (sq - kappa g_q)^-1 N where q' = N u has the slopes g_q in q.
     "solution": x (nu) of such factors and r (nu).  "coordinates": dq (nq) of x and rho (nq),
-    sq dq = kappa g_q dq + N x + rho, zero where it is driven.  "rates": q' alone.
+    sq dq = kappa g_q dq + N x + rho.  "rates": q' alone.  Driven coordinates have
+    neither.
 
     A guard that fails says no more than that the looped engine must be asked.
     """
@@ -72,11 +73,23 @@ def _solution(nu: int) -> KernelIR:
     )
 
 
+def _driven(structure: Structure) -> set[int]:
+    """Coordinates that drives prescribe."""
+    found = set[int]()
+    for body in structure.bodies:
+        if body.nu and all(body.imposed):
+            found |= set(range(body.q, body.q + body.nq))
+        else:  # rates are speeds where some of them alone are driven
+            found |= {body.q + k for k in range(body.nu) if body.imposed[k]}
+    return found
+
+
 class _Lag:
     """How coordinates follow speeds within a step, hinge by hinge: Q dq = N x + rho."""
 
     def __init__(self, state: FusionState) -> None:
         self.graph, q, u = state.graph, state.q, state.u
+        self._driven = _driven(state.structure)
         self.replay = replay = Replay(state, staged=False)
         replay.sweep(_RATES)
         s, sq, kappa = self.graph.vector("steps", 3)
@@ -91,8 +104,7 @@ class _Lag:
             slopes = [derivatives(rates, {one: 1}) for one in first]
             turned = [derivatives(rates, {one: 1}) for one in speeds]
             if body.nq == body.nu and not any(x.value != 0 for row in slopes for x in row):
-                free = [k for k in range(body.nu) if not body.imposed[k]]
-                self._straight |= {body.q + k: body.u + k for k in free}
+                self._straight |= {body.q + k: body.u + k for k in range(body.nu)}
             elif body.nq:
                 self._turning.append((body.q, body.u, _transposed(slopes), _transposed(turned)))
 
@@ -110,7 +122,7 @@ class _Lag:
                 right = [a + b for a, b in zip(right, rho[first : first + n], strict=True)]
             if any(entry.value != 0 for entry in right):
                 found |= dict(enumerate(self._answered(slopes, right), first))
-        return found
+        return {place: change for place, change in found.items() if place not in self._driven}
 
     def _answered(self, slopes: Matrix, right: Nodes) -> Nodes:
         """dq of one hinge: (sq - kappa g_q) dq = right."""
@@ -138,6 +150,8 @@ class _Moving:
         state = FusionState(structure, kernels, None)
         self._graph, self._lag = state.graph, _Lag(state)
         self._rates = gathered(self._lag.replay, "qdot")
+        for place in _driven(structure):
+            self._rates[place] = state.zero
 
     def kernels(self) -> list[KernelIR]:
         return [self._rate(), self._coordinates()]

@@ -134,6 +134,8 @@ def by(engine: str, scene: Scene, method: str, **options: Any) -> Result:
 def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
     fused, looped = (by(engine, arm(4), method, step=2e-3) for engine in ("fused", "looped"))
     assert fused.success and looped.success
+    errors = [run.statistics and run.statistics.sum_local_error for run in (fused, looped)]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-3)
     assert fused.q == pytest.approx(looped.q, abs=1e-9)
     assert fused.u == pytest.approx(looped.u, abs=1e-6)
     assert fused.work == pytest.approx(looped.work, abs=1e-6)

@@ -146,7 +146,7 @@ void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, cons
                                                .looped = run->implicit};
     run->implicit.residual = residual;
     run->implicit.residual_rate = residual_rate;
-    run->implicit.rates = rates;
+    if (run->implicit.rates) run->implicit.rates = rates;
     run->implicit.tangent = tangent;
     run->implicit.solve = solve;
 }

@@ -113,6 +113,15 @@ static int somebody_imposes(const mstmm_model *model)
     return 0;
 }
 
+/* Are the rates of all coordinates the speeds, in the same order?  Driven ones have none. */
+static int is_straight(const mstmm_model *model)
+{
+    if (somebody_imposes(model)) return 0;
+    for (int i = 0; i < model->n_bodies; i++)
+        if (!model->bodies[i].straight) return 0;
+    return 1;
+}
+
 void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
 {
     const mstmm_model *model = run->model;
@@ -126,7 +135,8 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     }
     run->implicit = (mstmm_implicit){
         .n_q = model->nq, .n_u = model->nu, .coordinates = run->coordinates, .residual = residual,
-        .residual_rate = residual_rate, .rates = rates, .tangent = tangent, .solve = solve,
+        .residual_rate = residual_rate, .rates = is_straight(model) ? NULL : rates,
+        .tangent = tangent, .solve = solve,
         .impose = somebody_imposes(model) ? impose : NULL,
     };
     system->implicit = &run->implicit;

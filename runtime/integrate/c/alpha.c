@@ -17,6 +17,10 @@ static int flow(const mstmm_work *work, double t, const double *from, const doub
   static const double nodes[] = {0.0, 0.5, 0.5, 1.0}, weights[] = {1.0, 2.0, 2.0, 1.0};
   const int n = work->implicit->n_q;
   double *q = work->flow, *rate = q + n, *sum = rate + n;
+  if (!work->implicit->rates) {
+    for (int i = 0; i < n; i++) to[i] = from[i] + theta[i];
+    return 0;
+  }
   for (int i = 0; i < n; i++) rate[i] = sum[i] = 0.0;
   for (int j = 0; j < 4; j++) {
     for (int i = 0; i < n; i++) q[i] = from[i] + nodes[j] * rate[i];

@@ -25,7 +25,12 @@ int mstmm_step_residual(const mstmm_work *work, double t, const double *row, dou
 }
 
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq) {
-  const int code = work->implicit->rates(work->system->context, q, u, dq);
+  const mstmm_implicit *at = work->implicit;
+  if (!at->rates) {
+    memcpy(dq, u, (size_t)at->n_q * sizeof *dq);
+    return 0;
+  }
+  const int code = at->rates(work->system->context, q, u, dq);
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 

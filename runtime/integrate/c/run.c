@@ -96,7 +96,7 @@ static int implicit_is_sound(const mstmm_system *system, const mstmm_tableau *ta
   const mstmm_implicit *at = system->implicit;
   if (tableau->kind == MSTMM_EXPLICIT) return 1;
   return at && at->n_q >= 0 && at->n_u >= 0 && at->n_q + at->n_u <= system->n_state &&
-         (at->coordinates || at->n_q == at->n_u) && at->residual && at->rates && at->tangent &&
+         ((at->coordinates && at->rates) || at->n_q == at->n_u) && at->residual && at->tangent &&
          at->solve && (at->residual_rate || tableau->kind != MSTMM_ROSENBROCK) &&
          tableau->n_extra == 0 && tableau->n_nodes == 0 && tableau->n_inner >= 0;
 }
