@@ -33,6 +33,7 @@ class Tangent:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
         self.nq, self.nu = engine.nq, engine.nu
+        self.state = np.zeros(self.nq), np.zeros(self.nu)
         slopes = packed.slopes()
         model = packed.model
         self.memory = engine.start_memory() if memory is None else memory
@@ -51,6 +52,7 @@ class Tangent:
     def residual(self, t: float, q: Array, u: Array, a: Array) -> Array:
         """R (nu,) at a state, to which the other calls refer from now on."""
         r = np.empty(self.nu)
+        self.state = np.array(q, float), np.array(u, float)
         self._call("residual", float(t), q, u, a, r, self.engine.ffi.NULL)
         return r
 
@@ -93,7 +95,7 @@ class Tangent:
         ]
         if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *given):
             t = float(self.record.t)
-            raise self.engine.failed(self.record.failure, t, np.zeros(self.nq), np.zeros(self.nu))
+            raise self.engine.failed(self.record.failure, t, *self.state)
 
 
 def _couplings(engine: Engine) -> tuple[list[Any], int]:

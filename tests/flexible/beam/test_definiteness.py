@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -94,8 +95,8 @@ def test_a_matrix_that_goes_is_named() -> None:
     asked = cantilever(4, 3, frame="tangent", quadrature=False)
     run = asked.simulate(0.6, rtol=1e-6, atol=1e-8)
     assert not run.success
-    assert 'mass matrix of flexible body "p' in run.message
-    assert "not positive definite" in run.message
+    # At the last good state or in the trial behind it: the words differ.
+    assert re.search(r'flexible body "p\d".* is not positive definite', run.message)
 
 
 def test_rigid_bodies_that_ride_along_count() -> None:
