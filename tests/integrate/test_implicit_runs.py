@@ -154,9 +154,16 @@ def test_counts_are_those_of_the_method(lab: Lab) -> None:
     run = problem.solved("rodas4p2", 1.0, start, rtol=1e-5)
     s = run.statistics
     tries = s.steps + s.rejected
-    assert (s.tangents, s.solves, s.iterations) == (tries, 6 * tries, 0)
-    # at the start, at all stages but the first, and for quadratures at the middle and at the end
-    assert (s.evaluations, s.residuals) == (1 + 5 * tries + 2 * s.steps, 0)
+    assert (s.tangents, s.iterations) == (tries, 0)
+    # the first stage is common to both forms; both evaluate at the step's end, quadratures at its
+    # middle; what it matters that accelerations carried to the end are off may take a solution
+    carried, none = divmod(s.residuals, 5)
+    evaluated, nothing = divmod(s.evaluations - 1 - s.steps - carried, 6)
+    assert carried > 0
+    assert evaluated > 0
+    assert (none, nothing) == (0, 0)
+    assert tries <= carried + evaluated < 2 * tries
+    assert 0 <= s.solves - tries - 5 * (carried + evaluated) <= carried
     assert s.sum_local_error is not None
     s = problem.solved("dttmm", 1.0, start, step=0.01).statistics
     assert (s.tangents, s.solves, s.iterations, s.rejected) == (100, 100, 100, 0)

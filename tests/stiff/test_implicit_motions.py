@@ -12,6 +12,8 @@ from stiff import motions
 from stiff.motions import KNOWN
 
 import mstmm
+from benchmarks.stiff import references
+from benchmarks.stiff.cases import CASES
 from mstmm.runtime.model.model import Model
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -112,6 +114,30 @@ def test_bodies_that_turn_by_far_in_a_step(method: str) -> None:
 
 
 # --- bushings -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["rodas4p2", "rodas4", "rodas5p"])
+def test_accelerations_are_carried_where_springs_are_stiff_and_evaluated_elsewhere(
+    method: str,
+) -> None:
+    """A step of the former takes residuals, one of the latter evaluations."""
+    stiff = known("double pendulum, 1e8").simulate(1.0, method, 0.01, output_times=[1.0])
+    turning = known("rods on balls").simulate(1.0, method, 0.01, output_times=[1.0])
+    assert stiff.statistics is not None
+    assert turning.statistics is not None
+    assert stiff.statistics.residuals > 2 * stiff.statistics.evaluations
+    assert turning.statistics.evaluations > 10 * turning.statistics.residuals
+
+
+@pytest.mark.parametrize("rtol, error", [(1e-3, 5e-4), (1e-4, 1e-4), (1e-6, 2e-6)])
+def test_ten_rods_on_stiff_bushings_to_the_tolerance(rtol: float, error: float) -> None:
+    """Evaluated accelerations alone err by up to ten times as much."""
+    case = CASES["a10-1e8"]
+    model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
+    run = model.simulate(1.0, "rodas4p2", rtol=rtol, atol=rtol / 100, output_times=[1.0])
+    assert run.success, run.message
+    exact, _ = references.load(case)
+    assert np.linalg.norm(references.places(run, case) - exact, axis=1).max() < error
 
 
 @pytest.mark.parametrize("k", [1e8, 1e10])

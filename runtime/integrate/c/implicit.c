@@ -57,21 +57,13 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
   return status ? status : mstmm_check_finite(work, t, slope);
 }
 
-/* The same at a state whose accelerations are not known; they go into its row. */
-static int evaluate_slope(const mstmm_work *work, double t, double *row, double *slope) {
-  const int status = mstmm_evaluate(work, t, row, slope);
-  memcpy(mstmm_row_a(work, row), slope + work->implicit->n_q,
-         (size_t)work->implicit->n_u * sizeof *slope);
-  return status ? status : mstmm_check_finite(work, t, slope);
-}
-
 /* Rates of the quadratures at a state inside the step */
 static int rates_of_quadratures(const mstmm_work *work, double t, double *row, double *to) {
   const int rest = mstmm_n_rest(work);
   if (work->tableau->kind != MSTMM_ROSENBROCK) return mstmm_step_residual(work, t, row, to);
-  const int status = evaluate_slope(work, t, row, work->y_event);
+  const int status = mstmm_evaluate(work, t, row, work->y_event);
   memcpy(to, work->y_event + work->system->n_state - rest, (size_t)rest * sizeof *to);
-  return status;
+  return status ? status : mstmm_check_finite(work, t, work->y_event);
 }
 
 int mstmm_check_new(const mstmm_work *work) {
@@ -150,14 +142,11 @@ static int integrate_quadratures(const mstmm_work *work) {
 
 int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
   const mstmm_tableau *tableau = work->tableau;
-  const int own = tableau->kind != MSTMM_DIRK, rest = own && mstmm_n_rest(work);
-  const double t = mstmm_time_in(work->run, 1.0);
-  double *last = work->k + tableau->n_stages * work->row;
+  const int rest = tableau->kind != MSTMM_DIRK && mstmm_n_rest(work);
   int status = 0;
-  if (tableau->kind == MSTMM_ROSENBROCK)
-    status = evaluate_slope(work, t, work->y_new, last);
-  else if (own)
-    status = mstmm_step_slope(work, t, work->y_new, last);
+  if (tableau->kind == MSTMM_ALPHA)
+    status = mstmm_step_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
+                              work->k + tableau->n_stages * work->row);
   if (!status && (rest || wants_dense)) status = mstmm_build_dense(work);
   if (!status && rest) status = integrate_quadratures(work);
   return status;

@@ -156,6 +156,8 @@ typedef struct mstmm_run_count {
   int64_t residuals, tangents, solves, iterations;
   int64_t tangent_valid; /* the workspace holds where it was taken */
   int64_t tangent_held;  /* and the system has it factored */
+  /* Rosenbrock: steps still to be made by evaluated accelerations, and how many in a row last time */
+  int64_t evaluated_left, evaluated_row;
   int64_t history;       /* steps of the length of the last one, at most 2 */
   int64_t sign, sign_against; /* steps that spoke for another kind of method; others since */
   int64_t asked;              /* the last mstmm_advance came back for them or for look_steps */

@@ -96,7 +96,8 @@ class Rosenbrock(Implicit):
     With J the slope of y' = f(t, y) and s = 1 / (gamma h) the stages solve
     (s - J) U_i = f(t + C_i h, y + A_ij U_j) + d_i h f_t + second_ij U_j / h; y + B U is the step.
     For mechanisms the mass matrix of the step's start multiplies the rows of speeds, so that
-    Z = K W + C + s M is solved.
+    Z = K W + C + s M is solved; f is evaluated, or its accelerations are unknowns of the stages
+    and R stands in its place.
 
     Attributes:
         d: (s,) weights of h times the slope in time.
