@@ -24,7 +24,7 @@ Outcome = tuple[Callable[[], Array], dict[str, int]]
 Run = Callable[[], Outcome]
 
 METHODS = (
-    "dop853", "dopri5", "rodas4p2", "rodas5p", "rodas4", "ros34pw2", "genalpha", "dttmm",
+    "dop853", "dopri5", "auto", "rodas4p2", "rodas5p", "rodas4", "ros34pw2", "genalpha", "dttmm",
     "esdirk436", "kvaerno5",
 )  # fmt: skip
 #: rtol; atol is a hundredth of it, for everybody.

@@ -15,6 +15,7 @@ from .counting import frontier, milliseconds
 LOOKS: dict[str, dict[str, Any]] = {
     "dop853": {"color": "#f4791f", "marker": "s", "lw": 1.3},
     "dopri5": {"color": "#f6b26b", "marker": "s", "lw": 1.1, "mfc": "white"},
+    "auto": {"color": "#111111", "marker": "*", "lw": 1.4, "zorder": 6},
     "rodas4p2": {"color": "#c1121f", "marker": "o", "lw": 2.0, "zorder": 5},
     "rodas5p": {"color": "#780000", "marker": "D", "lw": 2.0, "zorder": 5},
     "rodas4": {"color": "#e5677b", "marker": "o", "lw": 1.1, "mfc": "white"},
