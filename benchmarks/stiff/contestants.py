@@ -27,6 +27,8 @@ METHODS = (
     "dop853", "dopri5", "auto", "rodas4p2", "rodas5p", "rodas4", "ros34pw2", "genalpha", "dttmm",
     "esdirk436", "kvaerno5",
 )  # fmt: skip
+#: Those that run on code of the scene's own too, and up to how many speeds there is any.
+FUSED, MOST_FUSED = ("dop853", "rodas4p2", "rodas5p"), 20
 #: rtol; atol is a hundredth of it, for everybody.
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(3, 21))
 #: How many steps where they are fixed.
@@ -49,6 +51,7 @@ def of_case(case: Case, methods: Sequence[str], say: Callable[[str], None]) -> l
     """Everybody who can; `say` hears who cannot."""
     model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
     found = [curve for name in methods if (curve := own(model, case, name, say)) is not None]
+    found += fused(model, case, methods, say)
     return found + radau(model, case) + cvode(model, case, say) + exudyn(case, say)
 
 
@@ -73,6 +76,17 @@ def own(model: mstmm.Model, case: Case, method: str, say: Callable[[str], None])
         steps = [case.t_end / count for count in STEPS]
         return Curve(method, "", [(h, partial(run, 1.0, h)) for h in steps])
     return Curve(method, "", [(t, partial(run, t, None)) for t in TOLERANCES])
+
+
+def fused(
+    model: mstmm.Model, case: Case, methods: Sequence[str], say: Callable[[str], None]
+) -> list[Curve]:
+    """Methods on code of the scene's own, compiled before, where implicit steps have such code."""
+    if model.nu > MOST_FUSED:
+        return []
+    compiled = mstmm.compile(mstmm.Scene(**case.scene()), engine="fused")
+    curves = [own(compiled, case, name, say) for name in FUSED if name in methods]
+    return [dataclasses.replace(c, tool=f"{c.tool}, fused") for c in curves if c is not None]
 
 
 def takes_steps(model: mstmm.Model, method: str) -> bool | str:
