@@ -59,7 +59,7 @@ def draw(record: dict[str, Any], path: Path) -> None:
         axes.tick_params(labelbottom=True)
     shown = [t for t in LOOKS if any(c["tool"] == t for r in results for c in r["curves"])]
     handles = [Line2D([], [], label=tool, **LOOKS[tool]) for tool in shown]
-    figure.legend(handles=handles, loc="upper center", ncol=min(7, len(handles)), fontsize=9)
+    figure.legend(handles=handles, loc="upper center", ncol=min(9, len(handles)), fontsize=8.5)
     style.footer(
         figure, record,
         "Minimum CPU time of warm runs; a point counts if all tighter settings are as accurate.",
