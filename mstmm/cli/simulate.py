@@ -93,7 +93,7 @@ def simulate(
     ] = METHOD,
     step: Annotated[
         float | None,
-        typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s (rk4 needs one)."),
+        typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s; some need it."),
     ] = None,
     rtol: Annotated[
         float, typer.Option("--rtol", metavar="X", parser=positive, help="Relative tolerance.")

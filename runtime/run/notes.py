@@ -45,11 +45,14 @@ def unresolved(run: Trajectory) -> tuple[str, ...]:
     that adaptive steps go by.  Nothing else bounds such a step, and what it damps away leaves no
     energy that could tell."""
     settings, statistics = run.settings, run.statistics
-    error = statistics.sum_local_error
-    if settings.step is None or error is None or len(run.t) < 3:
+    if settings.step is None:
         return ()
-    tableau = get(settings.method, settings.radius)
+    error, tableau = statistics.sum_local_error, get(settings.method, settings.radius)
     if not tableau.implicit:
+        return ()
+    if settings.step > settings.t_end - settings.t_start:
+        return (f"step = {settings.step:.4g} s is longer than the run, which is one step then",)
+    if error is None or len(run.t) < 3:
         return ()
     speed = float(np.sqrt(np.mean(run.u**2, axis=1)).mean()) if run.u.size else 0.0
     way = speed * (run.t[-1] - run.t[0])

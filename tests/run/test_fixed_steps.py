@@ -46,6 +46,13 @@ def test_a_step_that_resolves_the_motion_is_not(method: str) -> None:
     assert not told(result)
 
 
+@pytest.mark.parametrize("method", ["genalpha", "wilson", "rodas4p2"])
+def test_a_step_longer_than_the_run_is_named(method: str) -> None:
+    words = "is longer than the run"
+    assert any(words in text for text in swung(2.1, method).warnings)
+    assert not any(words in text for text in swung(2.0, method).warnings)
+
+
 def test_the_length_of_a_run_does_not_matter() -> None:
     # What is damped and driven forgets its errors, however many there are.
     scene = motor("3*sin(2*t)", stiffness=5.0, damping=0.5)
