@@ -51,7 +51,10 @@ def unresolved(run: Trajectory) -> tuple[str, ...]:
     if not tableau.implicit:
         return ()
     if settings.step > settings.t_end - settings.t_start:
-        return (f"step = {settings.step:.4g} s is longer than the run, which is one step then",)
+        return (
+            f"step = {settings.step:.4g} s is longer than the run, which is one step then; "
+            f"take one below {settings.t_end - settings.t_start:.4g} s",
+        )
     if error is None or len(run.t) < 3:
         return ()
     speed = float(np.sqrt(np.mean(run.u**2, axis=1)).mean()) if run.u.size else 0.0
