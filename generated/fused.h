@@ -29,9 +29,11 @@ typedef struct {
     /* For implicit methods; see derive/fuse/implicit.py. */
     int (*residual)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r);
     int (*residual_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r, double *power);
-    int (*residual_slope)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *d_t, const double *d_q, const double *d_u,
-                          const double *d_a, double *d_r);
+    int (*residual_rate)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r_t);
     int (*tangent)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, double *factors);
+    int (*tangent_slopes)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, double *slopes, double *factors);
+    int (*rest)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *slopes, const double *r, const double *dq,
+                const double *da, double *rest);
     int (*solution)(const double *factors, const double *r, double *x);
     int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
     int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.structure import Structure
-from mstmm.ir.tangent import PREFIX, derivatives
+from mstmm.ir.tangent import derivatives
 from mstmm.ir.unrolled import lu_from_the_last, solve_by_rows, solve_from_the_last
 
 from ..schedule.motion import FORWARD, PRESCRIBED
@@ -23,6 +23,10 @@ from .scene import Fused, gathered, inputs_of
 from .state import FusionState, Kernels
 
 Matrix = list[Nodes]
+#: Speeds up to which K and M are kept apart.  A product by them is then some tenth of R
+#: differentiated along a direction, but the tangent takes ever more code: twice as much for 12
+#: speeds, which a compiler takes four times as long for.
+_MOST_WITH_SLOPES = 8
 #: Guard code of all these kernels: the looped engine names what fails.
 _FAILED = 1
 #: Drives have no say in it: coordinates are what they are.
@@ -34,17 +38,21 @@ def fuse_implicit(structure: Structure, kernels: Kernels) -> Fused:
 
     All read p, t, q, u, memory and the accelerations a.  "residual": R (nu) by inverse dynamics,
     zero where speeds are imposed; "residual_power": and the power of everything that is not
-    stored.  "residual_slope": its derivative along d_t, d_q, d_u, d_a.  "tangent": the factors
-    (nu x nu, see `lu_from_the_last`) of K W + C + s M with a one for every imposed speed; steps are
-    s, sq and kappa, and W = (sq - kappa g_q)^-1 N where q' = N u has the slopes g_q in q.
-    "solution": x (nu) of such factors and r (nu).  "coordinates": dq (nq) of x and rho (nq),
-    sq dq = kappa g_q dq + N x + rho.  "rates": q' alone.  Driven coordinates have
-    neither.
+    stored.  "residual_rate": its derivative in t.  "tangent": the factors (nu x nu, see
+    `lu_from_the_last`) of K W + C + s M with a one for every imposed speed, where K, C and M are
+    the slopes of R in q, u and a, steps are s, sq and kappa, and W = (sq - kappa g_q)^-1 N where
+    q' = N u has the slopes g_q in q.  "tangent_slopes", of very small scenes: the factors, and K
+    and M (nu x (nq + nu)).  "rest": r - K dq - M da, of those slopes where there are any.
+    "solution": x (nu) of factors and r.  "coordinates": dq (nq) of x and rho (nq),
+    sq dq = kappa g_q dq + N x + rho.  "rates": q' alone.  Driven coordinates have neither.
 
     A guard that fails says no more than that the looped engine must be asked.
     """
-    residual, moving = _Residual(structure, kernels), _Moving(structure, kernels)
-    found = [*residual.kernels(), _solution(structure.nu), *moving.kernels()]
+    with_slopes = structure.nu <= _MOST_WITH_SLOPES
+    found = _Residual(structure, kernels).kernels(rest=not with_slopes)
+    if with_slopes:
+        found += _Residual(structure, kernels).by_slopes()
+    found += [_solution(structure.nu), *_Moving(structure, kernels).kernels()]
     return Fused({kernel.name: balance(kernel) for kernel in found}, ((0, -1, _FAILED),))
 
 
@@ -62,6 +70,16 @@ def _imposed(structure: Structure) -> list[bool]:
 
 def _factors(nu: int) -> Port:
     return Port("factors", (nu, nu))
+
+
+def _slopes_port(structure: Structure) -> Port:
+    return Port("slopes", (structure.nu, structure.nq + structure.nu))
+
+
+def _known(structure: Structure) -> list[Port]:
+    """What is known of an equation: its right-hand side, and parts of the increments."""
+    nq, nu = structure.nq, structure.nu
+    return [_slopes_port(structure), Port("r", (nu,)), Port("dq", (nq,)), Port("da", (nu,))]
 
 
 def _solution(nu: int) -> KernelIR:
@@ -117,7 +135,7 @@ class _Lag:
                 found[place] = change / self._sq
         for first, speed, slopes, turned in self._turning:
             n, own = len(slopes), x[speed : speed + len(turned[0])]
-            right = [self._product(row, own) for row in turned]
+            right = [_product(self.graph, row, dict(enumerate(own))) for row in turned]
             if rho is not None:
                 right = [a + b for a, b in zip(right, rho[first : first + n], strict=True)]
             if any(entry.value != 0 for entry in right):
@@ -131,15 +149,17 @@ class _Lag:
             matrix[i][i] = matrix[i][i] + self._sq
         return [row[0] for row in solve_by_rows(self.graph, matrix, [[x] for x in right])]
 
-    def _product(self, row: Nodes, column: Nodes) -> Node:
-        total = self.graph.constant(0)
-        for a, b in zip(row, column, strict=True):
-            total = total + a * b
-        return total
-
 
 def _transposed(rows: Matrix) -> Matrix:
     return [list(column) for column in zip(*rows, strict=True)]
+
+
+def _product(graph: Graph, row: Nodes, column: dict[int, Node]) -> Node:
+    """Of a row and a column, whose entries that are not there are zero."""
+    total = graph.constant(0)
+    for place, entry in column.items():
+        total = total + row[place] * entry
+    return total
 
 
 class _Moving:
@@ -196,38 +216,26 @@ class _Residual:
         for condition in replay.conditions:
             state.graph.guard(condition, _FAILED, "the looped engine names what fails")
 
-    def kernels(self) -> list[KernelIR]:
+    def kernels(self, rest: bool = False) -> list[KernelIR]:
+        """All but those of the slopes; the tangent last, whose pivots are guards of the graph."""
         s, ports = self._structure, _inputs(self._structure)
         graph, r, power = self._graph, Port("r", (s.nu,)), Port("power", (1,))
         values: dict[str, object] = {"r": self._r, "power": [self._power]}
+        rate: dict[str, object] = {"r_t": derivatives(self._r, {self._t: 1})}
         return [
             graph.kernel("residual", ports, [r], {"r": self._r}, as_made=True),
             graph.kernel("residual_power", ports, [r, power], values, as_made=True),
-            self._slope(ports),
+            graph.kernel("residual_rate", ports, [Port("r_t", (s.nu,))], rate, as_made=True),
+            *([self._rest(ports)] if rest else []),
             self._tangent(ports),
         ]
 
-    def _slope(self, ports: list[Port]) -> KernelIR:
-        graph, s = self._graph, self._structure
-        leaves = {"t": [self._t], "q": self._q, "u": self._u, "a": self._a}
-        seeds: dict[Node, Node | float] = {
-            leaf: graph.element(PREFIX + name, i)
-            for name, entries in leaves.items()
-            for i, leaf in enumerate(entries)
-        }
-        more = [Port(PREFIX + name, (len(entries),)) for name, entries in leaves.items()]
-        return graph.kernel(
-            "residual_slope", [*ports, *more], [Port("d_r", (s.nu,))],
-            {"d_r": derivatives(self._r, seeds)}, as_made=True,
-        )  # fmt: skip
-
     def _tangent(self, ports: list[Port]) -> KernelIR:
         graph, s = self._graph, self._structure
-        columns = [self._along(j) for j in range(s.nu)]
-        factors = lu_from_the_last(graph, _transposed(columns))
+        matrix = _transposed([self._along(j) for j in range(s.nu)])
         return graph.kernel(
-            "tangent", [*ports, Port("steps", (3,))], [_factors(s.nu)], {"factors": factors},
-            as_made=True,
+            "tangent", [*ports, Port("steps", (3,))], [_factors(s.nu)],
+            {"factors": lu_from_the_last(graph, matrix)}, as_made=True,
         )  # fmt: skip
 
     def _along(self, j: int) -> Nodes:
@@ -240,3 +248,54 @@ class _Residual:
         for place, change in self._lag.changes(unit, None).items():
             seeds[self._q[place]] = change
         return derivatives(self._r, seeds)
+
+    def _rest(self, ports: list[Port]) -> KernelIR:
+        """R differentiated along the increments that are known."""
+        graph, s = self._graph, self._structure
+        moved = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
+        slope = derivatives(self._r, dict(zip([*self._q, *self._a], moved, strict=True)))
+        rest = [a - b for a, b in zip(graph.vector("r", s.nu), slope, strict=True)]
+        return graph.kernel(
+            "rest", [*ports, *_known(s)], [Port("rest", (s.nu,))], {"rest": rest}, as_made=True
+        )
+
+    def by_slopes(self) -> list[KernelIR]:
+        """The same where K and M are kept, and the tangent that is made of them."""
+        graph, s, ports = self._graph, self._structure, _inputs(self._structure)
+        known, speeds = self._slopes([*self._q, *self._a]), self._slopes(self._u)
+        matrix = _transposed([self._sum(j, known, speeds) for j in range(s.nu)])
+        slopes = [_slopes_port(s), _factors(s.nu)]
+        values: dict[str, object] = {"slopes": known, "factors": lu_from_the_last(graph, matrix)}
+        both = graph.kernel(
+            "tangent_slopes", [*ports, Port("steps", (3,))], slopes, values, as_made=True
+        )
+        return [both, self._product_kernel(ports, known)]
+
+    def _slopes(self, leaves: Nodes) -> Matrix:
+        """Of R, a row for each of its entries."""
+        return _transposed([derivatives(self._r, {leaf: 1}) for leaf in leaves])
+
+    def _sum(self, j: int, known: Matrix, speeds: Matrix) -> Nodes:
+        """Column j of K W + C + s M."""
+        graph, s = self._graph, self._structure
+        unit = [graph.constant(int(i == j)) for i in range(s.nu)]
+        if self._imposed[j]:
+            return unit
+        changes = {s.nq + j: self._lag.s, **self._lag.changes(unit, None)}
+        return [
+            by_speed[j] + _product(graph, row, changes)
+            for row, by_speed in zip(known, speeds, strict=True)
+        ]
+
+    def _product_kernel(self, ports: list[Port], known: Matrix) -> KernelIR:
+        """Where K and M are zero whatever the numbers, nothing is read."""
+        s, graph = self._structure, Graph()
+        moved = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
+        rest = []
+        for i, row in enumerate(known):
+            there = {k: moved[k] for k, slope in enumerate(row) if slope.value != 0}
+            slopes = [graph.element("slopes", i, k) for k in range(len(row))]
+            rest.append(graph.element("r", i) - _product(graph, slopes, there))
+        return graph.kernel(
+            "rest", [*ports, *_known(s)], [Port("rest", (s.nu,))], {"rest": rest}, as_made=True
+        )

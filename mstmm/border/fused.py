@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 4
+ABI = 5
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -54,9 +54,11 @@ typedef struct {{
     /* For implicit methods; see derive/fuse/implicit.py. */
     int (*residual)({_GIVEN}, double *r);
     int (*residual_power)({_GIVEN}, double *r, double *power);
-    int (*residual_slope)({_GIVEN}, const double *d_t, const double *d_q, const double *d_u,
-                          const double *d_a, double *d_r);
+    int (*residual_rate)({_GIVEN}, double *r_t);
     int (*tangent)({_GIVEN}, const double *steps, double *factors);
+    int (*tangent_slopes)({_GIVEN}, const double *steps, double *slopes, double *factors);
+    int (*rest)({_GIVEN}, const double *slopes, const double *r, const double *dq,
+                const double *da, double *rest);
     int (*solution)(const double *factors, const double *r, double *x);
     int (*rates)({_GIVEN}, double *dq);
     int (*coordinates)({_GIVEN}, const double *steps, const double *x, const double *rho,

@@ -8,9 +8,9 @@
 
 static const real *parameters(const mstmm_scene_run *run) { return run->implicit_code.p; }
 
-/* Parts of the numbers: the base point (t, q, u, a), steps, factors, and known increments. */
+/* Parts of the numbers: the base point (t, q, u, a), steps, slopes, factors, known increments. */
 typedef struct {
-    real *t, *q, *u, *a, *steps, *factors, *known_q, *known_u, *known_a, *right;
+    real *t, *q, *u, *a, *steps, *slopes, *factors, *still_q, *still_u, *known_q, *known_a, *right;
     int64_t used;
 } mstmm_parts;
 
@@ -18,8 +18,9 @@ static mstmm_parts cut(int64_t nq, int64_t nu, real *numbers)
 {
     mstmm_parts at = {.used = 0};
     const struct { real **to; int64_t count; } all[] = {
-        {&at.t, 1}, {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.steps, 3}, {&at.factors, nu * nu},
-        {&at.known_q, nq}, {&at.known_u, nu}, {&at.known_a, nu}, {&at.right, nu},
+        {&at.t, 1}, {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.steps, 3},
+        {&at.slopes, nu * (nq + nu)}, {&at.factors, nu * nu}, {&at.still_q, nq}, {&at.still_u, nu},
+        {&at.known_q, nq}, {&at.known_a, nu}, {&at.right, nu},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         if (numbers) *all[i].to = numbers + at.used;
@@ -52,15 +53,11 @@ static int residual_rate(void *context, double t, const double *y, const double 
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
-    const mstmm_parts at = parts_of(run);
-    const real one = 1;
     if (run->steady) {
         memset(r_t, 0, (size_t)code->nu * sizeof(real));
         return 0;
     }
-    memset(at.known_q, 0, (size_t)(code->nq + 2 * code->nu) * sizeof(real));
-    const int failed = code->residual_slope(parameters(run), &t, y, y + code->nq, run->memory, a,
-                                            &one, at.known_q, at.known_u, at.known_a, r_t);
+    const int failed = code->residual_rate(parameters(run), &t, y, y + code->nq, run->memory, a, r_t);
     return failed ? run->implicit_code.looped.residual_rate(run, t, y, a, r_t) : 0;
 }
 
@@ -85,8 +82,13 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     at.steps[0] = s;
     at.steps[1] = sq;
     at.steps[2] = kappa;
-    const int failed = code->tangent(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
-                                     at.factors);
+    /* Without kappa no increments are known, and no slopes are wanted. */
+    const int failed =
+        kappa && code->tangent_slopes
+            ? code->tangent_slopes(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
+                                   at.slopes, at.factors)
+            : code->tangent(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
+                            at.factors);
     run->implicit_code.looped_tangent = failed;
     return failed ? run->implicit_code.looped.tangent(run, t, y, a, s, sq, kappa) : 0;
 }
@@ -100,19 +102,15 @@ static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const 
 
 /* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
 static int without_known(const mstmm_scene_run *run, const mstmm_parts *at, const double *rho_q,
-                         const double *rho_u, double *slope)
+                         const double *rho_u, const double *r)
 {
     const mstmm_fused *code = CODE(run);
-    const real still = 0;
-    memset(at->known_u, 0, (size_t)code->nu * sizeof(real));
     for (int j = 0; j < code->nu; j++) at->known_a[j] = rho_u ? -rho_u[j] : 0;
     mstmm_tangent_free(run->base, at->known_a);
-    int failed = coordinates(run, at, at->known_u, rho_q, at->known_q);
-    if (!failed)
-        failed = code->residual_slope(parameters(run), at->t, at->q, at->u, run->memory, at->a,
-                                      &still, at->known_q, at->known_u, at->known_a, slope);
-    for (int j = 0; !failed && j < code->nu; j++) at->right[j] -= slope[j];
-    return failed;
+    const int failed = coordinates(run, at, at->still_u, rho_q, at->known_q);
+    if (failed) return failed;
+    return code->rest(parameters(run), at->t, at->q, at->u, run->memory, at->a, at->slopes, r,
+                      at->known_q, at->known_a, at->right);
 }
 
 static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
@@ -123,11 +121,13 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     const mstmm_implicit *looped = &run->implicit_code.looped;
     const mstmm_parts at = parts_of(run);
     if (run->implicit_code.looped_tangent) return looped->solve(run, r, rho_q, rho_u, dq, du, da);
-    memset(at.known_q, 0, (size_t)code->nq * sizeof(real));
-    const real *rho = rho_q ? rho_q : at.known_q;
-    memcpy(at.right, r, (size_t)code->nu * sizeof(real));
+    const real *rho = rho_q ? rho_q : at.still_q;
+    int failed = 0;
+    if (rho_q || rho_u)
+        failed = without_known(run, &at, rho, rho_u, r);
+    else
+        memcpy(at.right, r, (size_t)code->nu * sizeof(real));
     mstmm_tangent_free(run->base, at.right);
-    int failed = rho_q || rho_u ? without_known(run, &at, rho, rho_u, da) : 0;
     if (!failed) failed = code->solution(at.factors, at.right, du);
     if (!failed) failed = coordinates(run, &at, du, rho, dq);
     if (failed) { /* guards have passed at this point before: not to be expected */

@@ -20,7 +20,8 @@ typedef struct mstmm_implicit {
   /* dq = N(q) u; NULL: dq = u, entry by entry */
   int (*rates)(void *context, const double *q, const double *u, double *dq);
   /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du, dq = W du,
-   * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base. */
+   * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base.  With kappa
+   * 0 solutions are asked for without rho. */
   int (*tangent)(void *context, double t, const double *y, const double *a, double s, double sq,
                  int kappa);
   /* K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,  s du = da + rho_u, at the base
