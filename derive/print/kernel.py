@@ -6,6 +6,7 @@ floats, operation by operation, and so that a NaN is never hidden by min, max, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -25,6 +26,8 @@ from mstmm.ir import (
     Sum,
     Temporary,
 )
+
+from .alike import Alike, Loop, Value
 
 
 def literal(text: str) -> str:
@@ -64,17 +67,86 @@ def comment(text: str) -> str:
 
 
 class KernelText:
-    """C text of one kernel's statements, in the form the templates lay out."""
+    """C text of one kernel's statements, in the form the templates lay out.
 
-    def __init__(self, kernel: KernelIR) -> None:
+    `alike` names outputs whose entries along an axis are printed as a loop (`.alike`).
+    """
+
+    def __init__(self, kernel: KernelIR, alike: Sequence[tuple[str, int]] = ()) -> None:
         self.kernel = kernel
+        self.alike = Alike(kernel, alike) if alike else None
         self.names = parameter_names(kernel)
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
         self._truths: set[int] = set()
 
     def statements(self) -> list[dict[str, Any]]:
-        """One dictionary a statement; its `kind` is assign, sum, store, guard or solve."""
+        """One dictionary a statement; its `kind` is assign, sum, store, guard, solve or alike."""
+        if self.alike is not None:
+            return self._loops(self.alike)
         return [self._statement(statement) for statement in self.kernel.statements]
+
+    def _loops(self, alike: Alike) -> list[dict[str, Any]]:
+        """Loops over what is alike, each behind what its entries share; first what is not."""
+        found: list[dict[str, Any]] = []
+        known: set[int] = set()
+
+        def shared(operands: Sequence[Operand]) -> None:
+            for assign in alike.needed(operands):
+                if assign.number not in known:
+                    known.add(assign.number)
+                    found.append(self._statement(assign))
+
+        for statement in alike.others:
+            shared(_operands(statement))
+            found.append(self._statement(statement))
+        for loop in alike.loops:
+            shared([Temporary(number) for number in loop.shared])
+            found.append({"kind": "alike", "lines": self._loop(loop)})
+        return found
+
+    def _loop(self, loop: Loop) -> list[str]:
+        """A pair of entries at a time; of an odd number the last comes with itself."""
+        odd = loop.count % 2 == 1
+        lines = [f"for (int k = 0; k < {loop.count}; k += 2) {{"]
+        if odd:
+            lines.append(f"    const int next = k + 1 < {loop.count};")
+        for value in loop.values:
+            lines.append(f"    const two_t v{value.number} = {self._pair(value, odd)};")
+        port = self.ports[loop.port.name]
+        sign = "+=" if port.accumulate else "="
+        second = []
+        for index, value in loop.stores:
+            place, stride = self._moving(port, index, loop.axis)
+            if stride == 1 and not odd:
+                lines.append(f"    *(two_free_t *)({place}) {sign} v{value.number};")
+                continue
+            array, start = self.names[port.name], port.offset(index)
+            moved = f"{stride} * k" if stride != 1 else "k"
+            lines.append(f"    {array}[{start} + {moved}] {sign} v{value.number}[0];")
+            second.append(f"{array}[{start + stride} + {moved}] {sign} v{value.number}[1];")
+        if second and odd:
+            second = ["if (next) {", *(f"    {line}" for line in second), "}"]
+        return [*lines, *(f"    {line}" for line in second), "}"]
+
+    def _pair(self, value: Value, odd: bool) -> str:
+        """A value of two neighbouring entries."""
+        if value.place is not None:
+            port = self.ports[value.place.port]
+            index = tuple(int(entry) for entry in value.place.index)
+            place, stride = self._moving(port, index, value.axis)
+            if stride == 1 and not odd:
+                return f"mstmm_beside({place})"
+            other = f"{stride} * next" if odd else str(stride)
+            return f"mstmm_apart({place}, {other})"
+        words = [f"v{a.number}" if isinstance(a, Value) else self.operand(a) for a in value.args]
+        return OPERATIONS[value.op].c.format(*words)
+
+    def _moving(self, port: Port, index: tuple[int, ...], axis: int) -> tuple[str, int]:
+        """Pointer to the entry of the loop's k, and how far it is to the next one's."""
+        stride = port.offset((*index[:axis], index[axis] + 1, *index[axis + 1 :]))
+        stride -= port.offset(index)
+        moved = f"{stride} * k" if stride != 1 else "k"
+        return f"{self.names[port.name]} + {port.offset(index)} + {moved}", stride
 
     def used_names(self) -> set[str]:
         """C names of the input arrays that the statements read."""

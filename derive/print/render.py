@@ -26,6 +26,7 @@ from mstmm.ir.statements import NEGATIVE
 from mstmm.ir.stored import element_to_json
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
+from .alike import ALIKE
 from .callers import calls_header
 from .kernel import KernelText, comment, solver, string
 from .storage import layout_header
@@ -242,6 +243,7 @@ def _element_view(spec: ElementSpec) -> dict[str, Any]:
         "nq": len(spec.coordinates),
         "nu": len(spec.speeds),
         "np": len(spec.parameters),
+        "two": any((spec.name, kernel.name) in ALIKE for kernel in kernels),
         "kernels": [_kernel_view(spec, kernel) for kernel in kernels],
     }
 
@@ -254,7 +256,7 @@ def _name_tables(letter: str, group: Sequence[Param]) -> list[dict[str, Any]]:
 
 
 def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
-    text = KernelText(kernel)
+    text = KernelText(kernel, ALIKE.get((spec.name, kernel.name), ()))
     outputs = abi.c_outputs(kernel)
     used = text.used_names()
     arguments = ["n"] if kernel.size_symbol else []
