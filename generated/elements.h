@@ -610,6 +610,19 @@ int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -650,6 +663,19 @@ int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -690,6 +716,19 @@ int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -730,6 +769,19 @@ int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -770,6 +822,19 @@ int mstmm_sweep_generic5_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -810,6 +875,19 @@ int mstmm_sweep_generic6_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1029,11 +1107,9 @@ int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const re
     const real *restrict d_e_f, real *restrict d_tau);
 
 extern const mstmm_element mstmm_sweep_tangent;
+int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
+    real *restrict inverse, real *restrict work);
 int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, real *restrict V,
-    real *restrict D, real *restrict right, real *restrict gain, real *restrict S_c,
-    real *restrict work);
-int mstmm_sweep_tangent_node_own(int n, const real *restrict H, const real *restrict B,
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);

@@ -1122,28 +1122,21 @@ static inline int mstmm_modal_modal_effort_slope_by(struct mstmm_modal_modal_eff
 }
 #define mstmm_modal_modal_effort_slope(...) mstmm_modal_modal_effort_slope_by((struct mstmm_modal_modal_effort_slope){__VA_ARGS__})
 
-struct mstmm_tangent_node {
+struct mstmm_tangent_invert {
     int n;
-    const real *H;
-    const real *B;
-    const real *G;
-    const real *W;
-    const real *S;
-    real *V;
-    real *D;
-    real *right;
-    real *gain;
-    real *S_c;
+    const real *D;
+    const real *one;
+    real *inverse;
     real *work;
 };
-static inline int mstmm_tangent_node_by(struct mstmm_tangent_node to)
+static inline int mstmm_tangent_invert_by(struct mstmm_tangent_invert to)
 {
-    return mstmm_sweep_tangent_node(
-        to.n, to.H, to.B, to.G, to.W, to.S, to.V, to.D, to.right, to.gain, to.S_c, to.work);
+    return mstmm_sweep_tangent_invert(
+        to.n, to.D, to.one, to.inverse, to.work);
 }
-#define mstmm_tangent_node(...) mstmm_tangent_node_by((struct mstmm_tangent_node){__VA_ARGS__})
+#define mstmm_tangent_invert(...) mstmm_tangent_invert_by((struct mstmm_tangent_invert){__VA_ARGS__})
 
-struct mstmm_tangent_node_own {
+struct mstmm_tangent_node {
     int n;
     const real *H;
     const real *B;
@@ -1160,13 +1153,13 @@ struct mstmm_tangent_node_own {
     real *S_c;
     real *work;
 };
-static inline int mstmm_tangent_node_own_by(struct mstmm_tangent_node_own to)
+static inline int mstmm_tangent_node_by(struct mstmm_tangent_node to)
 {
-    return mstmm_sweep_tangent_node_own(
+    return mstmm_sweep_tangent_node(
         to.n, to.H, to.B, to.G, to.W, to.S, to.K, to.Z_z, to.Z_x, to.V, to.D, to.right, to.gain,
         to.S_c, to.work);
 }
-#define mstmm_tangent_node_own(...) mstmm_tangent_node_own_by((struct mstmm_tangent_node_own){__VA_ARGS__})
+#define mstmm_tangent_node(...) mstmm_tangent_node_by((struct mstmm_tangent_node){__VA_ARGS__})
 
 struct mstmm_tangent_absorb {
     int n;
@@ -2194,6 +2187,95 @@ static inline int mstmm_generic_tangent_column_by(int speeds, struct mstmm_gener
         to.d_w, to.d_c, to.d_s, to.B, to.G, to.d_tau);
 }
 #define mstmm_generic_tangent_column(speeds, ...) mstmm_generic_tangent_column_by(speeds, (struct mstmm_generic_tangent_column){__VA_ARGS__})
+
+struct mstmm_generic_tangent_rows {
+    const real *H;
+    const real *B;
+    const real *W;
+    const real *S;
+    real *K;
+    real *right;
+    real *D;
+    real *one;
+};
+typedef int mstmm_generic_tangent_rows_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict, real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[];
+static inline int mstmm_generic_tangent_rows_by(int speeds, struct mstmm_generic_tangent_rows to)
+{
+    return mstmm_generic_tangent_rows_table[speeds](
+        to.H, to.B, to.W, to.S, to.K, to.right, to.D, to.one);
+}
+#define mstmm_generic_tangent_rows(speeds, ...) mstmm_generic_tangent_rows_by(speeds, (struct mstmm_generic_tangent_rows){__VA_ARGS__})
+
+struct mstmm_generic_tangent_reduce {
+    const real *inverse;
+    const real *right;
+    const real *K;
+    const real *G;
+    real *gain;
+    real *V;
+    real *S;
+};
+typedef int mstmm_generic_tangent_reduce_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_reduce_kernel *const mstmm_generic_tangent_reduce_table[];
+static inline int mstmm_generic_tangent_reduce_by(int speeds, struct mstmm_generic_tangent_reduce to)
+{
+    return mstmm_generic_tangent_reduce_table[speeds](
+        to.inverse, to.right, to.K, to.G, to.gain, to.V, to.S);
+}
+#define mstmm_generic_tangent_reduce(speeds, ...) mstmm_generic_tangent_reduce_by(speeds, (struct mstmm_generic_tangent_reduce){__VA_ARGS__})
+
+struct mstmm_generic_tangent_push {
+    const real *Rc;
+    const real *r;
+    const real *H;
+    const real *V;
+    const real *inverse;
+    const real *e;
+    const real *e_f;
+    real *y;
+    real *e_I;
+};
+typedef int mstmm_generic_tangent_push_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict);
+extern mstmm_generic_tangent_push_kernel *const mstmm_generic_tangent_push_table[];
+static inline int mstmm_generic_tangent_push_by(int speeds, struct mstmm_generic_tangent_push to)
+{
+    return mstmm_generic_tangent_push_table[speeds](
+        to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.y, to.e_I);
+}
+#define mstmm_generic_tangent_push(speeds, ...) mstmm_generic_tangent_push_by(speeds, (struct mstmm_generic_tangent_push){__VA_ARGS__})
+
+struct mstmm_generic_tangent_answer {
+    const real *Rc;
+    const real *r;
+    const real *w_I;
+    const real *v;
+    const real *w;
+    const real *z_I;
+    const real *B;
+    const real *gain;
+    const real *y;
+    real *x;
+    real *z;
+};
+typedef int mstmm_generic_tangent_answer_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_answer_kernel *const mstmm_generic_tangent_answer_table[];
+static inline int mstmm_generic_tangent_answer_by(int speeds, struct mstmm_generic_tangent_answer to)
+{
+    return mstmm_generic_tangent_answer_table[speeds](
+        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
+}
+#define mstmm_generic_tangent_answer(speeds, ...) mstmm_generic_tangent_answer_by(speeds, (struct mstmm_generic_tangent_answer){__VA_ARGS__})
 
 struct mstmm_hinge_hinge {
     const real *p;

@@ -40,6 +40,19 @@ int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2030,6 +2060,552 @@ static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
     {"d_tau", 1, "", 0, 0},
 };
 
+/* rows of a hinge with 1 free speed
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6] motion subspace of the unknowns
+ * in  B[1][9] motion along the unknowns
+ * in  W[1] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[1][6] S B, a row a direction
+ * out right[1][9] rows by the motion
+ * out D[1] rows by unknowns
+ * out one[1] unit matrix
+ */
+int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        *(two_free_t *)(K + 0 + k) = v25;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[5] * v14;
+        const two_t v16 = v13 + v15;
+        right[0 + k] = v16[0];
+        if (next) {
+            right[1 + k] = v16[1];
+        }
+    }
+    const real t201 = H[0] * K[0];
+    const real t202 = H[1] * K[1];
+    const real t203 = t201 + t202;
+    const real t204 = H[2] * K[2];
+    const real t205 = t203 + t204;
+    const real t206 = H[3] * K[3];
+    const real t207 = t205 + t206;
+    const real t208 = H[4] * K[4];
+    const real t209 = t207 + t208;
+    const real t210 = H[5] * K[5];
+    const real t211 = t209 + t210;
+    const real t212 = W[0] + t211;
+    D[0] = t212;
+    one[0] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_rows_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"B", 9, "", 0, 0},
+    {"W", 1, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_rows_outputs[] = {
+    {"K", 6, "", 0, 0},
+    {"right", 9, "", 0, 0},
+    {"D", 1, "", 0, 0},
+    {"one", 1, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 1 free speed
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[1] D^-1
+ * in  right[1][9] rows by the motion
+ * in  K[1][6] S B, a row a direction
+ * in  G[1][6] change of the load that is carried
+ * out gain[1][9] D^-1 times the rows by the motion
+ * out V[1][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        gain[0 + k] = v1[0];
+        if (next) {
+            gain[1 + k] = v1[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        *(two_free_t *)(V + 0 + k) = v2;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v3 = gain[1] * v0;
+        const two_t v5 = gain[2] * v0;
+        const two_t v7 = gain[3] * v0;
+        const two_t v9 = gain[4] * v0;
+        const two_t v11 = gain[5] * v0;
+        const two_t v13 = gain[6] * v0;
+        const two_t v15 = gain[7] * v0;
+        const two_t v17 = gain[8] * v0;
+        *(two_free_t *)(S + 0 + k) -= v1;
+        *(two_free_t *)(S + 6 + k) -= v3;
+        *(two_free_t *)(S + 12 + k) -= v5;
+        *(two_free_t *)(S + 18 + k) -= v7;
+        *(two_free_t *)(S + 24 + k) -= v9;
+        *(two_free_t *)(S + 30 + k) -= v11;
+        *(two_free_t *)(S + 36 + k) -= v13;
+        *(two_free_t *)(S + 42 + k) -= v15;
+        *(two_free_t *)(S + 48 + k) -= v17;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_reduce_inputs[] = {
+    {"inverse", 1, "", 0, 0},
+    {"right", 9, "", 0, 0},
+    {"K", 6, "", 0, 0},
+    {"G", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_reduce_outputs[] = {
+    {"gain", 9, "", 0, 0},
+    {"V", 6, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 1 free speed
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace of the unknowns
+ * in  V[1][6] K + G, a row a direction
+ * in  inverse[1] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[1] load of the rows
+ * out y[1] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[1] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = -t12;
+    y[0] = t13;
+    const real t14 = V[0] * t12;
+    const real t15 = e[0] - t14;
+    const real t16 = Rc[0] * t15;
+    const real t17 = V[1] * t12;
+    const real t18 = e[1] - t17;
+    const real t19 = Rc[1] * t18;
+    const real t20 = t16 + t19;
+    const real t21 = V[2] * t12;
+    const real t22 = e[2] - t21;
+    const real t23 = Rc[2] * t22;
+    const real t24 = t20 + t23;
+    e_I[0] += t24;
+    const real t25 = Rc[3] * t15;
+    const real t26 = Rc[4] * t18;
+    const real t27 = t25 + t26;
+    const real t28 = Rc[5] * t22;
+    const real t29 = t27 + t28;
+    e_I[1] += t29;
+    const real t30 = Rc[6] * t15;
+    const real t31 = Rc[7] * t18;
+    const real t32 = t30 + t31;
+    const real t33 = Rc[8] * t22;
+    const real t34 = t32 + t33;
+    e_I[2] += t34;
+    const real t35 = V[3] * t12;
+    const real t36 = e[3] - t35;
+    const real t37 = Rc[0] * t36;
+    const real t38 = V[4] * t12;
+    const real t39 = e[4] - t38;
+    const real t40 = Rc[1] * t39;
+    const real t41 = t37 + t40;
+    const real t42 = V[5] * t12;
+    const real t43 = e[5] - t42;
+    const real t44 = Rc[2] * t43;
+    const real t45 = t41 + t44;
+    const real t46 = Rc[6] * r[1];
+    const real t47 = Rc[3] * r[2];
+    const real t48 = t46 - t47;
+    const real t49 = t15 * t48;
+    const real t50 = Rc[7] * r[1];
+    const real t51 = Rc[4] * r[2];
+    const real t52 = t50 - t51;
+    const real t53 = t18 * t52;
+    const real t54 = t49 + t53;
+    const real t55 = Rc[8] * r[1];
+    const real t56 = Rc[5] * r[2];
+    const real t57 = t55 - t56;
+    const real t58 = t22 * t57;
+    const real t59 = t54 + t58;
+    const real t60 = t45 + t59;
+    e_I[3] += t60;
+    const real t61 = Rc[3] * t36;
+    const real t62 = Rc[4] * t39;
+    const real t63 = t61 + t62;
+    const real t64 = Rc[5] * t43;
+    const real t65 = t63 + t64;
+    const real t66 = Rc[0] * r[2];
+    const real t67 = Rc[6] * r[0];
+    const real t68 = t66 - t67;
+    const real t69 = t15 * t68;
+    const real t70 = Rc[1] * r[2];
+    const real t71 = Rc[7] * r[0];
+    const real t72 = t70 - t71;
+    const real t73 = t18 * t72;
+    const real t74 = t69 + t73;
+    const real t75 = Rc[2] * r[2];
+    const real t76 = Rc[8] * r[0];
+    const real t77 = t75 - t76;
+    const real t78 = t22 * t77;
+    const real t79 = t74 + t78;
+    const real t80 = t65 + t79;
+    e_I[4] += t80;
+    const real t81 = Rc[6] * t36;
+    const real t82 = Rc[7] * t39;
+    const real t83 = t81 + t82;
+    const real t84 = Rc[8] * t43;
+    const real t85 = t83 + t84;
+    const real t86 = Rc[3] * r[0];
+    const real t87 = Rc[0] * r[1];
+    const real t88 = t86 - t87;
+    const real t89 = t15 * t88;
+    const real t90 = Rc[4] * r[0];
+    const real t91 = Rc[1] * r[1];
+    const real t92 = t90 - t91;
+    const real t93 = t18 * t92;
+    const real t94 = t89 + t93;
+    const real t95 = Rc[5] * r[0];
+    const real t96 = Rc[2] * r[1];
+    const real t97 = t95 - t96;
+    const real t98 = t22 * t97;
+    const real t99 = t94 + t98;
+    const real t100 = t85 + t99;
+    e_I[5] += t100;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"V", 6, "", 0, 0},
+    {"inverse", 1, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_push_outputs[] = {
+    {"y", 1, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 1 free speed that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[1][9] motion along the unknowns
+ * in  gain[1][9] D^-1 times the rows by the motion
+ * in  y[1] D^-1 times what is left of the rows
+ * out x[1] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = B[0] * t143;
+    const real t145 = t4 + t144;
+    z[0] = t145;
+    const real t146 = B[1] * t143;
+    const real t147 = t10 + t146;
+    z[1] = t147;
+    const real t148 = B[2] * t143;
+    const real t149 = t17 + t148;
+    z[2] = t149;
+    const real t150 = B[3] * t143;
+    const real t151 = t28 + t150;
+    z[3] = t151;
+    const real t152 = B[4] * t143;
+    const real t153 = t39 + t152;
+    z[4] = t153;
+    const real t154 = B[5] * t143;
+    const real t155 = t50 + t154;
+    z[5] = t155;
+    const real t156 = B[6] * t143;
+    const real t157 = t117 + t156;
+    z[6] = t157;
+    const real t158 = B[7] * t143;
+    const real t159 = t129 + t158;
+    z[7] = t159;
+    const real t160 = B[8] * t143;
+    const real t161 = t140 + t160;
+    z[8] = t161;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 9, "", 0, 0},
+    {"gain", 9, "", 0, 0},
+    {"y", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_answer_outputs[] = {
+    {"x", 1, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -2702,6 +3278,54 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_rows,
+        .call = mstmm_sweep_generic1_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic1_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_rows_outputs,
+        .ir_hash = "3c174e8635b7d58f6266cf8964dd73652df3a67002de24802f9e50df5bc55503",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_reduce,
+        .call = mstmm_sweep_generic1_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic1_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_reduce_outputs,
+        .ir_hash = "133177d11f175a0e459e42d80c13018938437a97ca181f4ef732216ed18c9588",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_push,
+        .call = mstmm_sweep_generic1_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_push_outputs,
+        .ir_hash = "497b67229d2d80a2c7bcef411da3968a7d029ee94d624f654eee0dacd1cf2b22",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_answer,
+        .call = mstmm_sweep_generic1_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_answer_outputs,
+        .ir_hash = "1ca9ca5f194feb8eb7471ac4145ac220cbbde99bd3f5e5df8c4fabc86d6dcc30",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
         .call = mstmm_sweep_generic1_forward_slope_call,
@@ -2731,7 +3355,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "a5882223aaee1b7bbf4ba133b9718e59f02435fe62bb0da937bda31d64728bff",
+    .hash = "1a9c26bd8c82ac4021467bbad579c0e74a01351cfd26122273956cb8b3dc094a",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2741,6 +3365,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -40,6 +40,19 @@ int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2552,6 +2582,724 @@ static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
     {"d_tau", 2, "", 0, 0},
 };
 
+/* rows of a hinge with 2 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][2] motion subspace of the unknowns
+ * in  B[2][9] motion along the unknowns
+ * in  W[2][2] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[2][6] S B, a row a direction
+ * out right[2][9] rows by the motion
+ * out D[2][2] rows by unknowns
+ * out one[2][2] unit matrix
+ */
+int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        const two_t v26 = B[9] * v0;
+        const two_t v27 = B[10] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v29 = B[11] * v5;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = B[12] * v8;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = B[13] * v11;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = B[14] * v14;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = B[15] * v17;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = B[16] * v20;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = B[17] * v23;
+        const two_t v42 = v40 + v41;
+        *(two_free_t *)(K + 0 + k) = v25;
+        *(two_free_t *)(K + 6 + k) = v42;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[2] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[4] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[6] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[8] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[10] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = H[1] * v0;
+        const two_t v18 = H[3] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = H[5] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = H[7] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = H[9] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = H[11] * v14;
+        const two_t v27 = v25 + v26;
+        right[0 + k] = v16[0];
+        right[9 + k] = v27[0];
+        if (next) {
+            right[1 + k] = v16[1];
+            right[10 + k] = v27[1];
+        }
+    }
+    const real t402 = H[0] * K[0];
+    const real t403 = H[2] * K[1];
+    const real t404 = t402 + t403;
+    const real t405 = H[4] * K[2];
+    const real t406 = t404 + t405;
+    const real t407 = H[6] * K[3];
+    const real t408 = t406 + t407;
+    const real t409 = H[8] * K[4];
+    const real t410 = t408 + t409;
+    const real t411 = H[10] * K[5];
+    const real t412 = t410 + t411;
+    const real t413 = W[0] + t412;
+    D[0] = t413;
+    const real t414 = H[0] * K[6];
+    const real t415 = H[2] * K[7];
+    const real t416 = t414 + t415;
+    const real t417 = H[4] * K[8];
+    const real t418 = t416 + t417;
+    const real t419 = H[6] * K[9];
+    const real t420 = t418 + t419;
+    const real t421 = H[8] * K[10];
+    const real t422 = t420 + t421;
+    const real t423 = H[10] * K[11];
+    const real t424 = t422 + t423;
+    const real t425 = W[2] + t424;
+    D[1] = t425;
+    const real t426 = H[1] * K[0];
+    const real t427 = H[3] * K[1];
+    const real t428 = t426 + t427;
+    const real t429 = H[5] * K[2];
+    const real t430 = t428 + t429;
+    const real t431 = H[7] * K[3];
+    const real t432 = t430 + t431;
+    const real t433 = H[9] * K[4];
+    const real t434 = t432 + t433;
+    const real t435 = H[11] * K[5];
+    const real t436 = t434 + t435;
+    const real t437 = W[1] + t436;
+    D[2] = t437;
+    const real t438 = H[1] * K[6];
+    const real t439 = H[3] * K[7];
+    const real t440 = t438 + t439;
+    const real t441 = H[5] * K[8];
+    const real t442 = t440 + t441;
+    const real t443 = H[7] * K[9];
+    const real t444 = t442 + t443;
+    const real t445 = H[9] * K[10];
+    const real t446 = t444 + t445;
+    const real t447 = H[11] * K[11];
+    const real t448 = t446 + t447;
+    const real t449 = W[3] + t448;
+    D[3] = t449;
+    one[0] = 1.0;
+    one[1] = 0.0;
+    one[2] = 0.0;
+    one[3] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_rows_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"B", 18, "", 0, 0},
+    {"W", 4, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_rows_outputs[] = {
+    {"K", 12, "", 0, 0},
+    {"right", 18, "", 0, 0},
+    {"D", 4, "", 0, 0},
+    {"one", 4, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 2 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[2][2] D^-1
+ * in  right[2][9] rows by the motion
+ * in  K[2][6] S B, a row a direction
+ * in  G[2][6] change of the load that is carried
+ * out gain[2][9] D^-1 times the rows by the motion
+ * out V[2][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v3 = inverse[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = inverse[2] * v0;
+        const two_t v6 = inverse[3] * v2;
+        const two_t v7 = v5 + v6;
+        gain[0 + k] = v4[0];
+        gain[9 + k] = v7[0];
+        if (next) {
+            gain[1 + k] = v4[1];
+            gain[10 + k] = v7[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        const two_t v3 = mstmm_beside(K + 6 + k);
+        const two_t v4 = mstmm_beside(G + 6 + k);
+        const two_t v5 = v3 + v4;
+        *(two_free_t *)(V + 0 + k) = v2;
+        *(two_free_t *)(V + 6 + k) = v5;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v2 = mstmm_beside(V + 6 + k);
+        const two_t v3 = gain[9] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v6 = gain[1] * v0;
+        const two_t v7 = gain[10] * v2;
+        const two_t v8 = v6 + v7;
+        const two_t v10 = gain[2] * v0;
+        const two_t v11 = gain[11] * v2;
+        const two_t v12 = v10 + v11;
+        const two_t v14 = gain[3] * v0;
+        const two_t v15 = gain[12] * v2;
+        const two_t v16 = v14 + v15;
+        const two_t v18 = gain[4] * v0;
+        const two_t v19 = gain[13] * v2;
+        const two_t v20 = v18 + v19;
+        const two_t v22 = gain[5] * v0;
+        const two_t v23 = gain[14] * v2;
+        const two_t v24 = v22 + v23;
+        const two_t v26 = gain[6] * v0;
+        const two_t v27 = gain[15] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v30 = gain[7] * v0;
+        const two_t v31 = gain[16] * v2;
+        const two_t v32 = v30 + v31;
+        const two_t v34 = gain[8] * v0;
+        const two_t v35 = gain[17] * v2;
+        const two_t v36 = v34 + v35;
+        *(two_free_t *)(S + 0 + k) -= v4;
+        *(two_free_t *)(S + 6 + k) -= v8;
+        *(two_free_t *)(S + 12 + k) -= v12;
+        *(two_free_t *)(S + 18 + k) -= v16;
+        *(two_free_t *)(S + 24 + k) -= v20;
+        *(two_free_t *)(S + 30 + k) -= v24;
+        *(two_free_t *)(S + 36 + k) -= v28;
+        *(two_free_t *)(S + 42 + k) -= v32;
+        *(two_free_t *)(S + 48 + k) -= v36;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_reduce_inputs[] = {
+    {"inverse", 4, "", 0, 0},
+    {"right", 18, "", 0, 0},
+    {"K", 12, "", 0, 0},
+    {"G", 12, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_reduce_outputs[] = {
+    {"gain", 18, "", 0, 0},
+    {"V", 12, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 2 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][2] motion subspace of the unknowns
+ * in  V[2][6] K + G, a row a direction
+ * in  inverse[2][2] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[2] load of the rows
+ * out y[2] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[2] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[3] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[5] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[7] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[9] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[11] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = -t26;
+    y[0] = t27;
+    const real t28 = inverse[2] * t11;
+    const real t29 = inverse[3] * t24;
+    const real t30 = t28 + t29;
+    const real t31 = -t30;
+    y[1] = t31;
+    const real t32 = V[0] * t26;
+    const real t33 = V[6] * t30;
+    const real t34 = t32 + t33;
+    const real t35 = e[0] - t34;
+    const real t36 = Rc[0] * t35;
+    const real t37 = V[1] * t26;
+    const real t38 = V[7] * t30;
+    const real t39 = t37 + t38;
+    const real t40 = e[1] - t39;
+    const real t41 = Rc[1] * t40;
+    const real t42 = t36 + t41;
+    const real t43 = V[2] * t26;
+    const real t44 = V[8] * t30;
+    const real t45 = t43 + t44;
+    const real t46 = e[2] - t45;
+    const real t47 = Rc[2] * t46;
+    const real t48 = t42 + t47;
+    e_I[0] += t48;
+    const real t49 = Rc[3] * t35;
+    const real t50 = Rc[4] * t40;
+    const real t51 = t49 + t50;
+    const real t52 = Rc[5] * t46;
+    const real t53 = t51 + t52;
+    e_I[1] += t53;
+    const real t54 = Rc[6] * t35;
+    const real t55 = Rc[7] * t40;
+    const real t56 = t54 + t55;
+    const real t57 = Rc[8] * t46;
+    const real t58 = t56 + t57;
+    e_I[2] += t58;
+    const real t59 = V[3] * t26;
+    const real t60 = V[9] * t30;
+    const real t61 = t59 + t60;
+    const real t62 = e[3] - t61;
+    const real t63 = Rc[0] * t62;
+    const real t64 = V[4] * t26;
+    const real t65 = V[10] * t30;
+    const real t66 = t64 + t65;
+    const real t67 = e[4] - t66;
+    const real t68 = Rc[1] * t67;
+    const real t69 = t63 + t68;
+    const real t70 = V[5] * t26;
+    const real t71 = V[11] * t30;
+    const real t72 = t70 + t71;
+    const real t73 = e[5] - t72;
+    const real t74 = Rc[2] * t73;
+    const real t75 = t69 + t74;
+    const real t76 = Rc[6] * r[1];
+    const real t77 = Rc[3] * r[2];
+    const real t78 = t76 - t77;
+    const real t79 = t35 * t78;
+    const real t80 = Rc[7] * r[1];
+    const real t81 = Rc[4] * r[2];
+    const real t82 = t80 - t81;
+    const real t83 = t40 * t82;
+    const real t84 = t79 + t83;
+    const real t85 = Rc[8] * r[1];
+    const real t86 = Rc[5] * r[2];
+    const real t87 = t85 - t86;
+    const real t88 = t46 * t87;
+    const real t89 = t84 + t88;
+    const real t90 = t75 + t89;
+    e_I[3] += t90;
+    const real t91 = Rc[3] * t62;
+    const real t92 = Rc[4] * t67;
+    const real t93 = t91 + t92;
+    const real t94 = Rc[5] * t73;
+    const real t95 = t93 + t94;
+    const real t96 = Rc[0] * r[2];
+    const real t97 = Rc[6] * r[0];
+    const real t98 = t96 - t97;
+    const real t99 = t35 * t98;
+    const real t100 = Rc[1] * r[2];
+    const real t101 = Rc[7] * r[0];
+    const real t102 = t100 - t101;
+    const real t103 = t40 * t102;
+    const real t104 = t99 + t103;
+    const real t105 = Rc[2] * r[2];
+    const real t106 = Rc[8] * r[0];
+    const real t107 = t105 - t106;
+    const real t108 = t46 * t107;
+    const real t109 = t104 + t108;
+    const real t110 = t95 + t109;
+    e_I[4] += t110;
+    const real t111 = Rc[6] * t62;
+    const real t112 = Rc[7] * t67;
+    const real t113 = t111 + t112;
+    const real t114 = Rc[8] * t73;
+    const real t115 = t113 + t114;
+    const real t116 = Rc[3] * r[0];
+    const real t117 = Rc[0] * r[1];
+    const real t118 = t116 - t117;
+    const real t119 = t35 * t118;
+    const real t120 = Rc[4] * r[0];
+    const real t121 = Rc[1] * r[1];
+    const real t122 = t120 - t121;
+    const real t123 = t40 * t122;
+    const real t124 = t119 + t123;
+    const real t125 = Rc[5] * r[0];
+    const real t126 = Rc[2] * r[1];
+    const real t127 = t125 - t126;
+    const real t128 = t46 * t127;
+    const real t129 = t124 + t128;
+    const real t130 = t115 + t129;
+    e_I[5] += t130;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"V", 12, "", 0, 0},
+    {"inverse", 4, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_push_outputs[] = {
+    {"y", 2, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 2 free speeds that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[2][9] motion along the unknowns
+ * in  gain[2][9] D^-1 times the rows by the motion
+ * in  y[2] D^-1 times what is left of the rows
+ * out x[2] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = gain[9] * t4;
+    const real t145 = gain[10] * t10;
+    const real t146 = t144 + t145;
+    const real t147 = gain[11] * t17;
+    const real t148 = t146 + t147;
+    const real t149 = gain[12] * t28;
+    const real t150 = t148 + t149;
+    const real t151 = gain[13] * t39;
+    const real t152 = t150 + t151;
+    const real t153 = gain[14] * t50;
+    const real t154 = t152 + t153;
+    const real t155 = gain[15] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = gain[16] * t129;
+    const real t158 = t156 + t157;
+    const real t159 = gain[17] * t140;
+    const real t160 = t158 + t159;
+    const real t161 = y[1] - t160;
+    x[1] = t161;
+    const real t162 = B[0] * t143;
+    const real t163 = B[9] * t161;
+    const real t164 = t162 + t163;
+    const real t165 = t4 + t164;
+    z[0] = t165;
+    const real t166 = B[1] * t143;
+    const real t167 = B[10] * t161;
+    const real t168 = t166 + t167;
+    const real t169 = t10 + t168;
+    z[1] = t169;
+    const real t170 = B[2] * t143;
+    const real t171 = B[11] * t161;
+    const real t172 = t170 + t171;
+    const real t173 = t17 + t172;
+    z[2] = t173;
+    const real t174 = B[3] * t143;
+    const real t175 = B[12] * t161;
+    const real t176 = t174 + t175;
+    const real t177 = t28 + t176;
+    z[3] = t177;
+    const real t178 = B[4] * t143;
+    const real t179 = B[13] * t161;
+    const real t180 = t178 + t179;
+    const real t181 = t39 + t180;
+    z[4] = t181;
+    const real t182 = B[5] * t143;
+    const real t183 = B[14] * t161;
+    const real t184 = t182 + t183;
+    const real t185 = t50 + t184;
+    z[5] = t185;
+    const real t186 = B[6] * t143;
+    const real t187 = B[15] * t161;
+    const real t188 = t186 + t187;
+    const real t189 = t117 + t188;
+    z[6] = t189;
+    const real t190 = B[7] * t143;
+    const real t191 = B[16] * t161;
+    const real t192 = t190 + t191;
+    const real t193 = t129 + t192;
+    z[7] = t193;
+    const real t194 = B[8] * t143;
+    const real t195 = B[17] * t161;
+    const real t196 = t194 + t195;
+    const real t197 = t140 + t196;
+    z[8] = t197;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 18, "", 0, 0},
+    {"gain", 18, "", 0, 0},
+    {"y", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_answer_outputs[] = {
+    {"x", 2, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -3272,6 +4020,54 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_rows,
+        .call = mstmm_sweep_generic2_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic2_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_rows_outputs,
+        .ir_hash = "c31a4175300f6d392330a5f6353c7d2ed73e8d06c3e63613d95f3561d36cc604",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_reduce,
+        .call = mstmm_sweep_generic2_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic2_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_reduce_outputs,
+        .ir_hash = "06d7d4f131b1fb4e98959d167222bbfad7690237485fa1b479b21ba78847dc9b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_push,
+        .call = mstmm_sweep_generic2_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_push_outputs,
+        .ir_hash = "a530c818b996bdeb5f366c67ccc968f3f51be061f2acce53076646dde98ffcc8",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_answer,
+        .call = mstmm_sweep_generic2_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_answer_outputs,
+        .ir_hash = "92dec4193dac3ae643ee525674280445b421c91384f041de005f9f6e38a6a54c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
         .call = mstmm_sweep_generic2_forward_slope_call,
@@ -3301,7 +4097,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "03a43e2fbaadbb4d153534d9cf77d92fe6d163f9cbeff0c4fb417a4b36384451",
+    .hash = "2509ef57264953ec1f251e5b09902442967924b3fc1426c04664c81e440df4ea",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3311,6 +4107,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic2_kernels,
 };

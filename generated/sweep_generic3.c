@@ -40,6 +40,19 @@ int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3160,6 +3190,932 @@ static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
     {"d_tau", 3, "", 0, 0},
 };
 
+/* rows of a hinge with 3 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][3] motion subspace of the unknowns
+ * in  B[3][9] motion along the unknowns
+ * in  W[3][3] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[3][6] S B, a row a direction
+ * out right[3][9] rows by the motion
+ * out D[3][3] rows by unknowns
+ * out one[3][3] unit matrix
+ */
+int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        const two_t v26 = B[9] * v0;
+        const two_t v27 = B[10] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v29 = B[11] * v5;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = B[12] * v8;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = B[13] * v11;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = B[14] * v14;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = B[15] * v17;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = B[16] * v20;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = B[17] * v23;
+        const two_t v42 = v40 + v41;
+        const two_t v43 = B[18] * v0;
+        const two_t v44 = B[19] * v2;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = B[20] * v5;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = B[21] * v8;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = B[22] * v11;
+        const two_t v51 = v49 + v50;
+        const two_t v52 = B[23] * v14;
+        const two_t v53 = v51 + v52;
+        const two_t v54 = B[24] * v17;
+        const two_t v55 = v53 + v54;
+        const two_t v56 = B[25] * v20;
+        const two_t v57 = v55 + v56;
+        const two_t v58 = B[26] * v23;
+        const two_t v59 = v57 + v58;
+        *(two_free_t *)(K + 0 + k) = v25;
+        *(two_free_t *)(K + 6 + k) = v42;
+        *(two_free_t *)(K + 12 + k) = v59;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[3] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[6] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[9] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[12] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[15] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = H[1] * v0;
+        const two_t v18 = H[4] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = H[7] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = H[10] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = H[13] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = H[16] * v14;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = H[2] * v0;
+        const two_t v29 = H[5] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = H[8] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = H[11] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = H[14] * v11;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = H[17] * v14;
+        const two_t v38 = v36 + v37;
+        right[0 + k] = v16[0];
+        right[9 + k] = v27[0];
+        right[18 + k] = v38[0];
+        if (next) {
+            right[1 + k] = v16[1];
+            right[10 + k] = v27[1];
+            right[19 + k] = v38[1];
+        }
+    }
+    const real t603 = H[0] * K[0];
+    const real t604 = H[3] * K[1];
+    const real t605 = t603 + t604;
+    const real t606 = H[6] * K[2];
+    const real t607 = t605 + t606;
+    const real t608 = H[9] * K[3];
+    const real t609 = t607 + t608;
+    const real t610 = H[12] * K[4];
+    const real t611 = t609 + t610;
+    const real t612 = H[15] * K[5];
+    const real t613 = t611 + t612;
+    const real t614 = W[0] + t613;
+    D[0] = t614;
+    const real t615 = H[0] * K[6];
+    const real t616 = H[3] * K[7];
+    const real t617 = t615 + t616;
+    const real t618 = H[6] * K[8];
+    const real t619 = t617 + t618;
+    const real t620 = H[9] * K[9];
+    const real t621 = t619 + t620;
+    const real t622 = H[12] * K[10];
+    const real t623 = t621 + t622;
+    const real t624 = H[15] * K[11];
+    const real t625 = t623 + t624;
+    const real t626 = W[3] + t625;
+    D[1] = t626;
+    const real t627 = H[0] * K[12];
+    const real t628 = H[3] * K[13];
+    const real t629 = t627 + t628;
+    const real t630 = H[6] * K[14];
+    const real t631 = t629 + t630;
+    const real t632 = H[9] * K[15];
+    const real t633 = t631 + t632;
+    const real t634 = H[12] * K[16];
+    const real t635 = t633 + t634;
+    const real t636 = H[15] * K[17];
+    const real t637 = t635 + t636;
+    const real t638 = W[6] + t637;
+    D[2] = t638;
+    const real t639 = H[1] * K[0];
+    const real t640 = H[4] * K[1];
+    const real t641 = t639 + t640;
+    const real t642 = H[7] * K[2];
+    const real t643 = t641 + t642;
+    const real t644 = H[10] * K[3];
+    const real t645 = t643 + t644;
+    const real t646 = H[13] * K[4];
+    const real t647 = t645 + t646;
+    const real t648 = H[16] * K[5];
+    const real t649 = t647 + t648;
+    const real t650 = W[1] + t649;
+    D[3] = t650;
+    const real t651 = H[1] * K[6];
+    const real t652 = H[4] * K[7];
+    const real t653 = t651 + t652;
+    const real t654 = H[7] * K[8];
+    const real t655 = t653 + t654;
+    const real t656 = H[10] * K[9];
+    const real t657 = t655 + t656;
+    const real t658 = H[13] * K[10];
+    const real t659 = t657 + t658;
+    const real t660 = H[16] * K[11];
+    const real t661 = t659 + t660;
+    const real t662 = W[4] + t661;
+    D[4] = t662;
+    const real t663 = H[1] * K[12];
+    const real t664 = H[4] * K[13];
+    const real t665 = t663 + t664;
+    const real t666 = H[7] * K[14];
+    const real t667 = t665 + t666;
+    const real t668 = H[10] * K[15];
+    const real t669 = t667 + t668;
+    const real t670 = H[13] * K[16];
+    const real t671 = t669 + t670;
+    const real t672 = H[16] * K[17];
+    const real t673 = t671 + t672;
+    const real t674 = W[7] + t673;
+    D[5] = t674;
+    const real t675 = H[2] * K[0];
+    const real t676 = H[5] * K[1];
+    const real t677 = t675 + t676;
+    const real t678 = H[8] * K[2];
+    const real t679 = t677 + t678;
+    const real t680 = H[11] * K[3];
+    const real t681 = t679 + t680;
+    const real t682 = H[14] * K[4];
+    const real t683 = t681 + t682;
+    const real t684 = H[17] * K[5];
+    const real t685 = t683 + t684;
+    const real t686 = W[2] + t685;
+    D[6] = t686;
+    const real t687 = H[2] * K[6];
+    const real t688 = H[5] * K[7];
+    const real t689 = t687 + t688;
+    const real t690 = H[8] * K[8];
+    const real t691 = t689 + t690;
+    const real t692 = H[11] * K[9];
+    const real t693 = t691 + t692;
+    const real t694 = H[14] * K[10];
+    const real t695 = t693 + t694;
+    const real t696 = H[17] * K[11];
+    const real t697 = t695 + t696;
+    const real t698 = W[5] + t697;
+    D[7] = t698;
+    const real t699 = H[2] * K[12];
+    const real t700 = H[5] * K[13];
+    const real t701 = t699 + t700;
+    const real t702 = H[8] * K[14];
+    const real t703 = t701 + t702;
+    const real t704 = H[11] * K[15];
+    const real t705 = t703 + t704;
+    const real t706 = H[14] * K[16];
+    const real t707 = t705 + t706;
+    const real t708 = H[17] * K[17];
+    const real t709 = t707 + t708;
+    const real t710 = W[8] + t709;
+    D[8] = t710;
+    one[0] = 1.0;
+    one[1] = 0.0;
+    one[2] = 0.0;
+    one[3] = 0.0;
+    one[4] = 1.0;
+    one[5] = 0.0;
+    one[6] = 0.0;
+    one[7] = 0.0;
+    one[8] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_rows_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"B", 27, "", 0, 0},
+    {"W", 9, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_rows_outputs[] = {
+    {"K", 18, "", 0, 0},
+    {"right", 27, "", 0, 0},
+    {"D", 9, "", 0, 0},
+    {"one", 9, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 3 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[3][3] D^-1
+ * in  right[3][9] rows by the motion
+ * in  K[3][6] S B, a row a direction
+ * in  G[3][6] change of the load that is carried
+ * out gain[3][9] D^-1 times the rows by the motion
+ * out V[3][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v3 = inverse[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v6 = inverse[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = inverse[3] * v0;
+        const two_t v9 = inverse[4] * v2;
+        const two_t v10 = v8 + v9;
+        const two_t v11 = inverse[5] * v5;
+        const two_t v12 = v10 + v11;
+        const two_t v13 = inverse[6] * v0;
+        const two_t v14 = inverse[7] * v2;
+        const two_t v15 = v13 + v14;
+        const two_t v16 = inverse[8] * v5;
+        const two_t v17 = v15 + v16;
+        gain[0 + k] = v7[0];
+        gain[9 + k] = v12[0];
+        gain[18 + k] = v17[0];
+        if (next) {
+            gain[1 + k] = v7[1];
+            gain[10 + k] = v12[1];
+            gain[19 + k] = v17[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        const two_t v3 = mstmm_beside(K + 6 + k);
+        const two_t v4 = mstmm_beside(G + 6 + k);
+        const two_t v5 = v3 + v4;
+        const two_t v6 = mstmm_beside(K + 12 + k);
+        const two_t v7 = mstmm_beside(G + 12 + k);
+        const two_t v8 = v6 + v7;
+        *(two_free_t *)(V + 0 + k) = v2;
+        *(two_free_t *)(V + 6 + k) = v5;
+        *(two_free_t *)(V + 12 + k) = v8;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v2 = mstmm_beside(V + 6 + k);
+        const two_t v3 = gain[9] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(V + 12 + k);
+        const two_t v6 = gain[18] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v9 = gain[1] * v0;
+        const two_t v10 = gain[10] * v2;
+        const two_t v11 = v9 + v10;
+        const two_t v12 = gain[19] * v5;
+        const two_t v13 = v11 + v12;
+        const two_t v15 = gain[2] * v0;
+        const two_t v16 = gain[11] * v2;
+        const two_t v17 = v15 + v16;
+        const two_t v18 = gain[20] * v5;
+        const two_t v19 = v17 + v18;
+        const two_t v21 = gain[3] * v0;
+        const two_t v22 = gain[12] * v2;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = gain[21] * v5;
+        const two_t v25 = v23 + v24;
+        const two_t v27 = gain[4] * v0;
+        const two_t v28 = gain[13] * v2;
+        const two_t v29 = v27 + v28;
+        const two_t v30 = gain[22] * v5;
+        const two_t v31 = v29 + v30;
+        const two_t v33 = gain[5] * v0;
+        const two_t v34 = gain[14] * v2;
+        const two_t v35 = v33 + v34;
+        const two_t v36 = gain[23] * v5;
+        const two_t v37 = v35 + v36;
+        const two_t v39 = gain[6] * v0;
+        const two_t v40 = gain[15] * v2;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = gain[24] * v5;
+        const two_t v43 = v41 + v42;
+        const two_t v45 = gain[7] * v0;
+        const two_t v46 = gain[16] * v2;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = gain[25] * v5;
+        const two_t v49 = v47 + v48;
+        const two_t v51 = gain[8] * v0;
+        const two_t v52 = gain[17] * v2;
+        const two_t v53 = v51 + v52;
+        const two_t v54 = gain[26] * v5;
+        const two_t v55 = v53 + v54;
+        *(two_free_t *)(S + 0 + k) -= v7;
+        *(two_free_t *)(S + 6 + k) -= v13;
+        *(two_free_t *)(S + 12 + k) -= v19;
+        *(two_free_t *)(S + 18 + k) -= v25;
+        *(two_free_t *)(S + 24 + k) -= v31;
+        *(two_free_t *)(S + 30 + k) -= v37;
+        *(two_free_t *)(S + 36 + k) -= v43;
+        *(two_free_t *)(S + 42 + k) -= v49;
+        *(two_free_t *)(S + 48 + k) -= v55;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_reduce_inputs[] = {
+    {"inverse", 9, "", 0, 0},
+    {"right", 27, "", 0, 0},
+    {"K", 18, "", 0, 0},
+    {"G", 18, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_reduce_outputs[] = {
+    {"gain", 27, "", 0, 0},
+    {"V", 18, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 3 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace of the unknowns
+ * in  V[3][6] K + G, a row a direction
+ * in  inverse[3][3] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[3] load of the rows
+ * out y[3] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[3] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[4] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[7] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[10] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[13] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[16] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[5] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[8] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[11] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[14] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[17] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = -t40;
+    y[0] = t41;
+    const real t42 = inverse[3] * t11;
+    const real t43 = inverse[4] * t24;
+    const real t44 = t42 + t43;
+    const real t45 = inverse[5] * t38;
+    const real t46 = t44 + t45;
+    const real t47 = -t46;
+    y[1] = t47;
+    const real t48 = inverse[6] * t11;
+    const real t49 = inverse[7] * t24;
+    const real t50 = t48 + t49;
+    const real t51 = inverse[8] * t38;
+    const real t52 = t50 + t51;
+    const real t53 = -t52;
+    y[2] = t53;
+    const real t54 = V[0] * t40;
+    const real t55 = V[6] * t46;
+    const real t56 = t54 + t55;
+    const real t57 = V[12] * t52;
+    const real t58 = t56 + t57;
+    const real t59 = e[0] - t58;
+    const real t60 = Rc[0] * t59;
+    const real t61 = V[1] * t40;
+    const real t62 = V[7] * t46;
+    const real t63 = t61 + t62;
+    const real t64 = V[13] * t52;
+    const real t65 = t63 + t64;
+    const real t66 = e[1] - t65;
+    const real t67 = Rc[1] * t66;
+    const real t68 = t60 + t67;
+    const real t69 = V[2] * t40;
+    const real t70 = V[8] * t46;
+    const real t71 = t69 + t70;
+    const real t72 = V[14] * t52;
+    const real t73 = t71 + t72;
+    const real t74 = e[2] - t73;
+    const real t75 = Rc[2] * t74;
+    const real t76 = t68 + t75;
+    e_I[0] += t76;
+    const real t77 = Rc[3] * t59;
+    const real t78 = Rc[4] * t66;
+    const real t79 = t77 + t78;
+    const real t80 = Rc[5] * t74;
+    const real t81 = t79 + t80;
+    e_I[1] += t81;
+    const real t82 = Rc[6] * t59;
+    const real t83 = Rc[7] * t66;
+    const real t84 = t82 + t83;
+    const real t85 = Rc[8] * t74;
+    const real t86 = t84 + t85;
+    e_I[2] += t86;
+    const real t87 = V[3] * t40;
+    const real t88 = V[9] * t46;
+    const real t89 = t87 + t88;
+    const real t90 = V[15] * t52;
+    const real t91 = t89 + t90;
+    const real t92 = e[3] - t91;
+    const real t93 = Rc[0] * t92;
+    const real t94 = V[4] * t40;
+    const real t95 = V[10] * t46;
+    const real t96 = t94 + t95;
+    const real t97 = V[16] * t52;
+    const real t98 = t96 + t97;
+    const real t99 = e[4] - t98;
+    const real t100 = Rc[1] * t99;
+    const real t101 = t93 + t100;
+    const real t102 = V[5] * t40;
+    const real t103 = V[11] * t46;
+    const real t104 = t102 + t103;
+    const real t105 = V[17] * t52;
+    const real t106 = t104 + t105;
+    const real t107 = e[5] - t106;
+    const real t108 = Rc[2] * t107;
+    const real t109 = t101 + t108;
+    const real t110 = Rc[6] * r[1];
+    const real t111 = Rc[3] * r[2];
+    const real t112 = t110 - t111;
+    const real t113 = t59 * t112;
+    const real t114 = Rc[7] * r[1];
+    const real t115 = Rc[4] * r[2];
+    const real t116 = t114 - t115;
+    const real t117 = t66 * t116;
+    const real t118 = t113 + t117;
+    const real t119 = Rc[8] * r[1];
+    const real t120 = Rc[5] * r[2];
+    const real t121 = t119 - t120;
+    const real t122 = t74 * t121;
+    const real t123 = t118 + t122;
+    const real t124 = t109 + t123;
+    e_I[3] += t124;
+    const real t125 = Rc[3] * t92;
+    const real t126 = Rc[4] * t99;
+    const real t127 = t125 + t126;
+    const real t128 = Rc[5] * t107;
+    const real t129 = t127 + t128;
+    const real t130 = Rc[0] * r[2];
+    const real t131 = Rc[6] * r[0];
+    const real t132 = t130 - t131;
+    const real t133 = t59 * t132;
+    const real t134 = Rc[1] * r[2];
+    const real t135 = Rc[7] * r[0];
+    const real t136 = t134 - t135;
+    const real t137 = t66 * t136;
+    const real t138 = t133 + t137;
+    const real t139 = Rc[2] * r[2];
+    const real t140 = Rc[8] * r[0];
+    const real t141 = t139 - t140;
+    const real t142 = t74 * t141;
+    const real t143 = t138 + t142;
+    const real t144 = t129 + t143;
+    e_I[4] += t144;
+    const real t145 = Rc[6] * t92;
+    const real t146 = Rc[7] * t99;
+    const real t147 = t145 + t146;
+    const real t148 = Rc[8] * t107;
+    const real t149 = t147 + t148;
+    const real t150 = Rc[3] * r[0];
+    const real t151 = Rc[0] * r[1];
+    const real t152 = t150 - t151;
+    const real t153 = t59 * t152;
+    const real t154 = Rc[4] * r[0];
+    const real t155 = Rc[1] * r[1];
+    const real t156 = t154 - t155;
+    const real t157 = t66 * t156;
+    const real t158 = t153 + t157;
+    const real t159 = Rc[5] * r[0];
+    const real t160 = Rc[2] * r[1];
+    const real t161 = t159 - t160;
+    const real t162 = t74 * t161;
+    const real t163 = t158 + t162;
+    const real t164 = t149 + t163;
+    e_I[5] += t164;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"V", 18, "", 0, 0},
+    {"inverse", 9, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_push_outputs[] = {
+    {"y", 3, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 3 free speeds that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[3][9] motion along the unknowns
+ * in  gain[3][9] D^-1 times the rows by the motion
+ * in  y[3] D^-1 times what is left of the rows
+ * out x[3] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = gain[9] * t4;
+    const real t145 = gain[10] * t10;
+    const real t146 = t144 + t145;
+    const real t147 = gain[11] * t17;
+    const real t148 = t146 + t147;
+    const real t149 = gain[12] * t28;
+    const real t150 = t148 + t149;
+    const real t151 = gain[13] * t39;
+    const real t152 = t150 + t151;
+    const real t153 = gain[14] * t50;
+    const real t154 = t152 + t153;
+    const real t155 = gain[15] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = gain[16] * t129;
+    const real t158 = t156 + t157;
+    const real t159 = gain[17] * t140;
+    const real t160 = t158 + t159;
+    const real t161 = y[1] - t160;
+    x[1] = t161;
+    const real t162 = gain[18] * t4;
+    const real t163 = gain[19] * t10;
+    const real t164 = t162 + t163;
+    const real t165 = gain[20] * t17;
+    const real t166 = t164 + t165;
+    const real t167 = gain[21] * t28;
+    const real t168 = t166 + t167;
+    const real t169 = gain[22] * t39;
+    const real t170 = t168 + t169;
+    const real t171 = gain[23] * t50;
+    const real t172 = t170 + t171;
+    const real t173 = gain[24] * t117;
+    const real t174 = t172 + t173;
+    const real t175 = gain[25] * t129;
+    const real t176 = t174 + t175;
+    const real t177 = gain[26] * t140;
+    const real t178 = t176 + t177;
+    const real t179 = y[2] - t178;
+    x[2] = t179;
+    const real t180 = B[0] * t143;
+    const real t181 = B[9] * t161;
+    const real t182 = t180 + t181;
+    const real t183 = B[18] * t179;
+    const real t184 = t182 + t183;
+    const real t185 = t4 + t184;
+    z[0] = t185;
+    const real t186 = B[1] * t143;
+    const real t187 = B[10] * t161;
+    const real t188 = t186 + t187;
+    const real t189 = B[19] * t179;
+    const real t190 = t188 + t189;
+    const real t191 = t10 + t190;
+    z[1] = t191;
+    const real t192 = B[2] * t143;
+    const real t193 = B[11] * t161;
+    const real t194 = t192 + t193;
+    const real t195 = B[20] * t179;
+    const real t196 = t194 + t195;
+    const real t197 = t17 + t196;
+    z[2] = t197;
+    const real t198 = B[3] * t143;
+    const real t199 = B[12] * t161;
+    const real t200 = t198 + t199;
+    const real t201 = B[21] * t179;
+    const real t202 = t200 + t201;
+    const real t203 = t28 + t202;
+    z[3] = t203;
+    const real t204 = B[4] * t143;
+    const real t205 = B[13] * t161;
+    const real t206 = t204 + t205;
+    const real t207 = B[22] * t179;
+    const real t208 = t206 + t207;
+    const real t209 = t39 + t208;
+    z[4] = t209;
+    const real t210 = B[5] * t143;
+    const real t211 = B[14] * t161;
+    const real t212 = t210 + t211;
+    const real t213 = B[23] * t179;
+    const real t214 = t212 + t213;
+    const real t215 = t50 + t214;
+    z[5] = t215;
+    const real t216 = B[6] * t143;
+    const real t217 = B[15] * t161;
+    const real t218 = t216 + t217;
+    const real t219 = B[24] * t179;
+    const real t220 = t218 + t219;
+    const real t221 = t117 + t220;
+    z[6] = t221;
+    const real t222 = B[7] * t143;
+    const real t223 = B[16] * t161;
+    const real t224 = t222 + t223;
+    const real t225 = B[25] * t179;
+    const real t226 = t224 + t225;
+    const real t227 = t129 + t226;
+    z[7] = t227;
+    const real t228 = B[8] * t143;
+    const real t229 = B[17] * t161;
+    const real t230 = t228 + t229;
+    const real t231 = B[26] * t179;
+    const real t232 = t230 + t231;
+    const real t233 = t140 + t232;
+    z[8] = t233;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 27, "", 0, 0},
+    {"gain", 27, "", 0, 0},
+    {"y", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_answer_outputs[] = {
+    {"x", 3, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -3928,6 +4884,54 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_rows,
+        .call = mstmm_sweep_generic3_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic3_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_rows_outputs,
+        .ir_hash = "0a1a0190fbc29c67175c79f2b2e191590490d2cf77a4782ba2f2b9b9e17e267e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_reduce,
+        .call = mstmm_sweep_generic3_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic3_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_reduce_outputs,
+        .ir_hash = "3d1a65009d43524312057b02773ce0ff2750e79b55e329bbaab2ee32af857eec",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_push,
+        .call = mstmm_sweep_generic3_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_push_outputs,
+        .ir_hash = "9d01cfeff5963f0ea5e153acff2e2c9e3c942b5804a8e386e253464965126a51",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_answer,
+        .call = mstmm_sweep_generic3_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_answer_outputs,
+        .ir_hash = "b49a170586f2e3b57ab30615d197f6e963404b94688db12cdaa45b531d0eb681",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
         .call = mstmm_sweep_generic3_forward_slope_call,
@@ -3957,7 +4961,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "9f672a513e1287eba8aefd0d8b802c1bbab0f6763d756b1edb8bca5128d1b4a0",
+    .hash = "240e4d281fc143971fe9ef945abb8ddfbc284a287ab478ef14371b669d8eb421",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3967,6 +4971,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic3_kernels,
 };

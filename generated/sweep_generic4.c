@@ -40,6 +40,19 @@ int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 4 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3860,6 +3890,1176 @@ static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
     {"d_tau", 4, "", 0, 0},
 };
 
+/* rows of a hinge with 4 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][4] motion subspace of the unknowns
+ * in  B[4][9] motion along the unknowns
+ * in  W[4][4] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[4][6] S B, a row a direction
+ * out right[4][9] rows by the motion
+ * out D[4][4] rows by unknowns
+ * out one[4][4] unit matrix
+ */
+int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        const two_t v26 = B[9] * v0;
+        const two_t v27 = B[10] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v29 = B[11] * v5;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = B[12] * v8;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = B[13] * v11;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = B[14] * v14;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = B[15] * v17;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = B[16] * v20;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = B[17] * v23;
+        const two_t v42 = v40 + v41;
+        const two_t v43 = B[18] * v0;
+        const two_t v44 = B[19] * v2;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = B[20] * v5;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = B[21] * v8;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = B[22] * v11;
+        const two_t v51 = v49 + v50;
+        const two_t v52 = B[23] * v14;
+        const two_t v53 = v51 + v52;
+        const two_t v54 = B[24] * v17;
+        const two_t v55 = v53 + v54;
+        const two_t v56 = B[25] * v20;
+        const two_t v57 = v55 + v56;
+        const two_t v58 = B[26] * v23;
+        const two_t v59 = v57 + v58;
+        const two_t v60 = B[27] * v0;
+        const two_t v61 = B[28] * v2;
+        const two_t v62 = v60 + v61;
+        const two_t v63 = B[29] * v5;
+        const two_t v64 = v62 + v63;
+        const two_t v65 = B[30] * v8;
+        const two_t v66 = v64 + v65;
+        const two_t v67 = B[31] * v11;
+        const two_t v68 = v66 + v67;
+        const two_t v69 = B[32] * v14;
+        const two_t v70 = v68 + v69;
+        const two_t v71 = B[33] * v17;
+        const two_t v72 = v70 + v71;
+        const two_t v73 = B[34] * v20;
+        const two_t v74 = v72 + v73;
+        const two_t v75 = B[35] * v23;
+        const two_t v76 = v74 + v75;
+        *(two_free_t *)(K + 0 + k) = v25;
+        *(two_free_t *)(K + 6 + k) = v42;
+        *(two_free_t *)(K + 12 + k) = v59;
+        *(two_free_t *)(K + 18 + k) = v76;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[4] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[8] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[12] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[16] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[20] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = H[1] * v0;
+        const two_t v18 = H[5] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = H[9] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = H[13] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = H[17] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = H[21] * v14;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = H[2] * v0;
+        const two_t v29 = H[6] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = H[10] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = H[14] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = H[18] * v11;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = H[22] * v14;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = H[3] * v0;
+        const two_t v40 = H[7] * v2;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = H[11] * v5;
+        const two_t v43 = v41 + v42;
+        const two_t v44 = H[15] * v8;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = H[19] * v11;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = H[23] * v14;
+        const two_t v49 = v47 + v48;
+        right[0 + k] = v16[0];
+        right[9 + k] = v27[0];
+        right[18 + k] = v38[0];
+        right[27 + k] = v49[0];
+        if (next) {
+            right[1 + k] = v16[1];
+            right[10 + k] = v27[1];
+            right[19 + k] = v38[1];
+            right[28 + k] = v49[1];
+        }
+    }
+    const real t804 = H[0] * K[0];
+    const real t805 = H[4] * K[1];
+    const real t806 = t804 + t805;
+    const real t807 = H[8] * K[2];
+    const real t808 = t806 + t807;
+    const real t809 = H[12] * K[3];
+    const real t810 = t808 + t809;
+    const real t811 = H[16] * K[4];
+    const real t812 = t810 + t811;
+    const real t813 = H[20] * K[5];
+    const real t814 = t812 + t813;
+    const real t815 = W[0] + t814;
+    D[0] = t815;
+    const real t816 = H[0] * K[6];
+    const real t817 = H[4] * K[7];
+    const real t818 = t816 + t817;
+    const real t819 = H[8] * K[8];
+    const real t820 = t818 + t819;
+    const real t821 = H[12] * K[9];
+    const real t822 = t820 + t821;
+    const real t823 = H[16] * K[10];
+    const real t824 = t822 + t823;
+    const real t825 = H[20] * K[11];
+    const real t826 = t824 + t825;
+    const real t827 = W[4] + t826;
+    D[1] = t827;
+    const real t828 = H[0] * K[12];
+    const real t829 = H[4] * K[13];
+    const real t830 = t828 + t829;
+    const real t831 = H[8] * K[14];
+    const real t832 = t830 + t831;
+    const real t833 = H[12] * K[15];
+    const real t834 = t832 + t833;
+    const real t835 = H[16] * K[16];
+    const real t836 = t834 + t835;
+    const real t837 = H[20] * K[17];
+    const real t838 = t836 + t837;
+    const real t839 = W[8] + t838;
+    D[2] = t839;
+    const real t840 = H[0] * K[18];
+    const real t841 = H[4] * K[19];
+    const real t842 = t840 + t841;
+    const real t843 = H[8] * K[20];
+    const real t844 = t842 + t843;
+    const real t845 = H[12] * K[21];
+    const real t846 = t844 + t845;
+    const real t847 = H[16] * K[22];
+    const real t848 = t846 + t847;
+    const real t849 = H[20] * K[23];
+    const real t850 = t848 + t849;
+    const real t851 = W[12] + t850;
+    D[3] = t851;
+    const real t852 = H[1] * K[0];
+    const real t853 = H[5] * K[1];
+    const real t854 = t852 + t853;
+    const real t855 = H[9] * K[2];
+    const real t856 = t854 + t855;
+    const real t857 = H[13] * K[3];
+    const real t858 = t856 + t857;
+    const real t859 = H[17] * K[4];
+    const real t860 = t858 + t859;
+    const real t861 = H[21] * K[5];
+    const real t862 = t860 + t861;
+    const real t863 = W[1] + t862;
+    D[4] = t863;
+    const real t864 = H[1] * K[6];
+    const real t865 = H[5] * K[7];
+    const real t866 = t864 + t865;
+    const real t867 = H[9] * K[8];
+    const real t868 = t866 + t867;
+    const real t869 = H[13] * K[9];
+    const real t870 = t868 + t869;
+    const real t871 = H[17] * K[10];
+    const real t872 = t870 + t871;
+    const real t873 = H[21] * K[11];
+    const real t874 = t872 + t873;
+    const real t875 = W[5] + t874;
+    D[5] = t875;
+    const real t876 = H[1] * K[12];
+    const real t877 = H[5] * K[13];
+    const real t878 = t876 + t877;
+    const real t879 = H[9] * K[14];
+    const real t880 = t878 + t879;
+    const real t881 = H[13] * K[15];
+    const real t882 = t880 + t881;
+    const real t883 = H[17] * K[16];
+    const real t884 = t882 + t883;
+    const real t885 = H[21] * K[17];
+    const real t886 = t884 + t885;
+    const real t887 = W[9] + t886;
+    D[6] = t887;
+    const real t888 = H[1] * K[18];
+    const real t889 = H[5] * K[19];
+    const real t890 = t888 + t889;
+    const real t891 = H[9] * K[20];
+    const real t892 = t890 + t891;
+    const real t893 = H[13] * K[21];
+    const real t894 = t892 + t893;
+    const real t895 = H[17] * K[22];
+    const real t896 = t894 + t895;
+    const real t897 = H[21] * K[23];
+    const real t898 = t896 + t897;
+    const real t899 = W[13] + t898;
+    D[7] = t899;
+    const real t900 = H[2] * K[0];
+    const real t901 = H[6] * K[1];
+    const real t902 = t900 + t901;
+    const real t903 = H[10] * K[2];
+    const real t904 = t902 + t903;
+    const real t905 = H[14] * K[3];
+    const real t906 = t904 + t905;
+    const real t907 = H[18] * K[4];
+    const real t908 = t906 + t907;
+    const real t909 = H[22] * K[5];
+    const real t910 = t908 + t909;
+    const real t911 = W[2] + t910;
+    D[8] = t911;
+    const real t912 = H[2] * K[6];
+    const real t913 = H[6] * K[7];
+    const real t914 = t912 + t913;
+    const real t915 = H[10] * K[8];
+    const real t916 = t914 + t915;
+    const real t917 = H[14] * K[9];
+    const real t918 = t916 + t917;
+    const real t919 = H[18] * K[10];
+    const real t920 = t918 + t919;
+    const real t921 = H[22] * K[11];
+    const real t922 = t920 + t921;
+    const real t923 = W[6] + t922;
+    D[9] = t923;
+    const real t924 = H[2] * K[12];
+    const real t925 = H[6] * K[13];
+    const real t926 = t924 + t925;
+    const real t927 = H[10] * K[14];
+    const real t928 = t926 + t927;
+    const real t929 = H[14] * K[15];
+    const real t930 = t928 + t929;
+    const real t931 = H[18] * K[16];
+    const real t932 = t930 + t931;
+    const real t933 = H[22] * K[17];
+    const real t934 = t932 + t933;
+    const real t935 = W[10] + t934;
+    D[10] = t935;
+    const real t936 = H[2] * K[18];
+    const real t937 = H[6] * K[19];
+    const real t938 = t936 + t937;
+    const real t939 = H[10] * K[20];
+    const real t940 = t938 + t939;
+    const real t941 = H[14] * K[21];
+    const real t942 = t940 + t941;
+    const real t943 = H[18] * K[22];
+    const real t944 = t942 + t943;
+    const real t945 = H[22] * K[23];
+    const real t946 = t944 + t945;
+    const real t947 = W[14] + t946;
+    D[11] = t947;
+    const real t948 = H[3] * K[0];
+    const real t949 = H[7] * K[1];
+    const real t950 = t948 + t949;
+    const real t951 = H[11] * K[2];
+    const real t952 = t950 + t951;
+    const real t953 = H[15] * K[3];
+    const real t954 = t952 + t953;
+    const real t955 = H[19] * K[4];
+    const real t956 = t954 + t955;
+    const real t957 = H[23] * K[5];
+    const real t958 = t956 + t957;
+    const real t959 = W[3] + t958;
+    D[12] = t959;
+    const real t960 = H[3] * K[6];
+    const real t961 = H[7] * K[7];
+    const real t962 = t960 + t961;
+    const real t963 = H[11] * K[8];
+    const real t964 = t962 + t963;
+    const real t965 = H[15] * K[9];
+    const real t966 = t964 + t965;
+    const real t967 = H[19] * K[10];
+    const real t968 = t966 + t967;
+    const real t969 = H[23] * K[11];
+    const real t970 = t968 + t969;
+    const real t971 = W[7] + t970;
+    D[13] = t971;
+    const real t972 = H[3] * K[12];
+    const real t973 = H[7] * K[13];
+    const real t974 = t972 + t973;
+    const real t975 = H[11] * K[14];
+    const real t976 = t974 + t975;
+    const real t977 = H[15] * K[15];
+    const real t978 = t976 + t977;
+    const real t979 = H[19] * K[16];
+    const real t980 = t978 + t979;
+    const real t981 = H[23] * K[17];
+    const real t982 = t980 + t981;
+    const real t983 = W[11] + t982;
+    D[14] = t983;
+    const real t984 = H[3] * K[18];
+    const real t985 = H[7] * K[19];
+    const real t986 = t984 + t985;
+    const real t987 = H[11] * K[20];
+    const real t988 = t986 + t987;
+    const real t989 = H[15] * K[21];
+    const real t990 = t988 + t989;
+    const real t991 = H[19] * K[22];
+    const real t992 = t990 + t991;
+    const real t993 = H[23] * K[23];
+    const real t994 = t992 + t993;
+    const real t995 = W[15] + t994;
+    D[15] = t995;
+    one[0] = 1.0;
+    one[1] = 0.0;
+    one[2] = 0.0;
+    one[3] = 0.0;
+    one[4] = 0.0;
+    one[5] = 1.0;
+    one[6] = 0.0;
+    one[7] = 0.0;
+    one[8] = 0.0;
+    one[9] = 0.0;
+    one[10] = 1.0;
+    one[11] = 0.0;
+    one[12] = 0.0;
+    one[13] = 0.0;
+    one[14] = 0.0;
+    one[15] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_rows_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"B", 36, "", 0, 0},
+    {"W", 16, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_rows_outputs[] = {
+    {"K", 24, "", 0, 0},
+    {"right", 36, "", 0, 0},
+    {"D", 16, "", 0, 0},
+    {"one", 16, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 4 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[4][4] D^-1
+ * in  right[4][9] rows by the motion
+ * in  K[4][6] S B, a row a direction
+ * in  G[4][6] change of the load that is carried
+ * out gain[4][9] D^-1 times the rows by the motion
+ * out V[4][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v3 = inverse[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v6 = inverse[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v9 = inverse[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = inverse[4] * v0;
+        const two_t v12 = inverse[5] * v2;
+        const two_t v13 = v11 + v12;
+        const two_t v14 = inverse[6] * v5;
+        const two_t v15 = v13 + v14;
+        const two_t v16 = inverse[7] * v8;
+        const two_t v17 = v15 + v16;
+        const two_t v18 = inverse[8] * v0;
+        const two_t v19 = inverse[9] * v2;
+        const two_t v20 = v18 + v19;
+        const two_t v21 = inverse[10] * v5;
+        const two_t v22 = v20 + v21;
+        const two_t v23 = inverse[11] * v8;
+        const two_t v24 = v22 + v23;
+        const two_t v25 = inverse[12] * v0;
+        const two_t v26 = inverse[13] * v2;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = inverse[14] * v5;
+        const two_t v29 = v27 + v28;
+        const two_t v30 = inverse[15] * v8;
+        const two_t v31 = v29 + v30;
+        gain[0 + k] = v10[0];
+        gain[9 + k] = v17[0];
+        gain[18 + k] = v24[0];
+        gain[27 + k] = v31[0];
+        if (next) {
+            gain[1 + k] = v10[1];
+            gain[10 + k] = v17[1];
+            gain[19 + k] = v24[1];
+            gain[28 + k] = v31[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        const two_t v3 = mstmm_beside(K + 6 + k);
+        const two_t v4 = mstmm_beside(G + 6 + k);
+        const two_t v5 = v3 + v4;
+        const two_t v6 = mstmm_beside(K + 12 + k);
+        const two_t v7 = mstmm_beside(G + 12 + k);
+        const two_t v8 = v6 + v7;
+        const two_t v9 = mstmm_beside(K + 18 + k);
+        const two_t v10 = mstmm_beside(G + 18 + k);
+        const two_t v11 = v9 + v10;
+        *(two_free_t *)(V + 0 + k) = v2;
+        *(two_free_t *)(V + 6 + k) = v5;
+        *(two_free_t *)(V + 12 + k) = v8;
+        *(two_free_t *)(V + 18 + k) = v11;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v2 = mstmm_beside(V + 6 + k);
+        const two_t v3 = gain[9] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(V + 12 + k);
+        const two_t v6 = gain[18] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(V + 18 + k);
+        const two_t v9 = gain[27] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v12 = gain[1] * v0;
+        const two_t v13 = gain[10] * v2;
+        const two_t v14 = v12 + v13;
+        const two_t v15 = gain[19] * v5;
+        const two_t v16 = v14 + v15;
+        const two_t v17 = gain[28] * v8;
+        const two_t v18 = v16 + v17;
+        const two_t v20 = gain[2] * v0;
+        const two_t v21 = gain[11] * v2;
+        const two_t v22 = v20 + v21;
+        const two_t v23 = gain[20] * v5;
+        const two_t v24 = v22 + v23;
+        const two_t v25 = gain[29] * v8;
+        const two_t v26 = v24 + v25;
+        const two_t v28 = gain[3] * v0;
+        const two_t v29 = gain[12] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = gain[21] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = gain[30] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v36 = gain[4] * v0;
+        const two_t v37 = gain[13] * v2;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = gain[22] * v5;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = gain[31] * v8;
+        const two_t v42 = v40 + v41;
+        const two_t v44 = gain[5] * v0;
+        const two_t v45 = gain[14] * v2;
+        const two_t v46 = v44 + v45;
+        const two_t v47 = gain[23] * v5;
+        const two_t v48 = v46 + v47;
+        const two_t v49 = gain[32] * v8;
+        const two_t v50 = v48 + v49;
+        const two_t v52 = gain[6] * v0;
+        const two_t v53 = gain[15] * v2;
+        const two_t v54 = v52 + v53;
+        const two_t v55 = gain[24] * v5;
+        const two_t v56 = v54 + v55;
+        const two_t v57 = gain[33] * v8;
+        const two_t v58 = v56 + v57;
+        const two_t v60 = gain[7] * v0;
+        const two_t v61 = gain[16] * v2;
+        const two_t v62 = v60 + v61;
+        const two_t v63 = gain[25] * v5;
+        const two_t v64 = v62 + v63;
+        const two_t v65 = gain[34] * v8;
+        const two_t v66 = v64 + v65;
+        const two_t v68 = gain[8] * v0;
+        const two_t v69 = gain[17] * v2;
+        const two_t v70 = v68 + v69;
+        const two_t v71 = gain[26] * v5;
+        const two_t v72 = v70 + v71;
+        const two_t v73 = gain[35] * v8;
+        const two_t v74 = v72 + v73;
+        *(two_free_t *)(S + 0 + k) -= v10;
+        *(two_free_t *)(S + 6 + k) -= v18;
+        *(two_free_t *)(S + 12 + k) -= v26;
+        *(two_free_t *)(S + 18 + k) -= v34;
+        *(two_free_t *)(S + 24 + k) -= v42;
+        *(two_free_t *)(S + 30 + k) -= v50;
+        *(two_free_t *)(S + 36 + k) -= v58;
+        *(two_free_t *)(S + 42 + k) -= v66;
+        *(two_free_t *)(S + 48 + k) -= v74;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_reduce_inputs[] = {
+    {"inverse", 16, "", 0, 0},
+    {"right", 36, "", 0, 0},
+    {"K", 24, "", 0, 0},
+    {"G", 24, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_reduce_outputs[] = {
+    {"gain", 36, "", 0, 0},
+    {"V", 24, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 4 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][4] motion subspace of the unknowns
+ * in  V[4][6] K + G, a row a direction
+ * in  inverse[4][4] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[4] load of the rows
+ * out y[4] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[4] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[8] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[12] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[16] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[5] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[9] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[13] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[17] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[21] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[6] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[10] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[14] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[18] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[22] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = H[3] * e[0];
+    const real t42 = H[7] * e[1];
+    const real t43 = t41 + t42;
+    const real t44 = H[11] * e[2];
+    const real t45 = t43 + t44;
+    const real t46 = H[15] * e[3];
+    const real t47 = t45 + t46;
+    const real t48 = H[19] * e[4];
+    const real t49 = t47 + t48;
+    const real t50 = H[23] * e[5];
+    const real t51 = t49 + t50;
+    const real t52 = e_f[3] + t51;
+    const real t53 = inverse[3] * t52;
+    const real t54 = t40 + t53;
+    const real t55 = -t54;
+    y[0] = t55;
+    const real t56 = inverse[4] * t11;
+    const real t57 = inverse[5] * t24;
+    const real t58 = t56 + t57;
+    const real t59 = inverse[6] * t38;
+    const real t60 = t58 + t59;
+    const real t61 = inverse[7] * t52;
+    const real t62 = t60 + t61;
+    const real t63 = -t62;
+    y[1] = t63;
+    const real t64 = inverse[8] * t11;
+    const real t65 = inverse[9] * t24;
+    const real t66 = t64 + t65;
+    const real t67 = inverse[10] * t38;
+    const real t68 = t66 + t67;
+    const real t69 = inverse[11] * t52;
+    const real t70 = t68 + t69;
+    const real t71 = -t70;
+    y[2] = t71;
+    const real t72 = inverse[12] * t11;
+    const real t73 = inverse[13] * t24;
+    const real t74 = t72 + t73;
+    const real t75 = inverse[14] * t38;
+    const real t76 = t74 + t75;
+    const real t77 = inverse[15] * t52;
+    const real t78 = t76 + t77;
+    const real t79 = -t78;
+    y[3] = t79;
+    const real t80 = V[0] * t54;
+    const real t81 = V[6] * t62;
+    const real t82 = t80 + t81;
+    const real t83 = V[12] * t70;
+    const real t84 = t82 + t83;
+    const real t85 = V[18] * t78;
+    const real t86 = t84 + t85;
+    const real t87 = e[0] - t86;
+    const real t88 = Rc[0] * t87;
+    const real t89 = V[1] * t54;
+    const real t90 = V[7] * t62;
+    const real t91 = t89 + t90;
+    const real t92 = V[13] * t70;
+    const real t93 = t91 + t92;
+    const real t94 = V[19] * t78;
+    const real t95 = t93 + t94;
+    const real t96 = e[1] - t95;
+    const real t97 = Rc[1] * t96;
+    const real t98 = t88 + t97;
+    const real t99 = V[2] * t54;
+    const real t100 = V[8] * t62;
+    const real t101 = t99 + t100;
+    const real t102 = V[14] * t70;
+    const real t103 = t101 + t102;
+    const real t104 = V[20] * t78;
+    const real t105 = t103 + t104;
+    const real t106 = e[2] - t105;
+    const real t107 = Rc[2] * t106;
+    const real t108 = t98 + t107;
+    e_I[0] += t108;
+    const real t109 = Rc[3] * t87;
+    const real t110 = Rc[4] * t96;
+    const real t111 = t109 + t110;
+    const real t112 = Rc[5] * t106;
+    const real t113 = t111 + t112;
+    e_I[1] += t113;
+    const real t114 = Rc[6] * t87;
+    const real t115 = Rc[7] * t96;
+    const real t116 = t114 + t115;
+    const real t117 = Rc[8] * t106;
+    const real t118 = t116 + t117;
+    e_I[2] += t118;
+    const real t119 = V[3] * t54;
+    const real t120 = V[9] * t62;
+    const real t121 = t119 + t120;
+    const real t122 = V[15] * t70;
+    const real t123 = t121 + t122;
+    const real t124 = V[21] * t78;
+    const real t125 = t123 + t124;
+    const real t126 = e[3] - t125;
+    const real t127 = Rc[0] * t126;
+    const real t128 = V[4] * t54;
+    const real t129 = V[10] * t62;
+    const real t130 = t128 + t129;
+    const real t131 = V[16] * t70;
+    const real t132 = t130 + t131;
+    const real t133 = V[22] * t78;
+    const real t134 = t132 + t133;
+    const real t135 = e[4] - t134;
+    const real t136 = Rc[1] * t135;
+    const real t137 = t127 + t136;
+    const real t138 = V[5] * t54;
+    const real t139 = V[11] * t62;
+    const real t140 = t138 + t139;
+    const real t141 = V[17] * t70;
+    const real t142 = t140 + t141;
+    const real t143 = V[23] * t78;
+    const real t144 = t142 + t143;
+    const real t145 = e[5] - t144;
+    const real t146 = Rc[2] * t145;
+    const real t147 = t137 + t146;
+    const real t148 = Rc[6] * r[1];
+    const real t149 = Rc[3] * r[2];
+    const real t150 = t148 - t149;
+    const real t151 = t87 * t150;
+    const real t152 = Rc[7] * r[1];
+    const real t153 = Rc[4] * r[2];
+    const real t154 = t152 - t153;
+    const real t155 = t96 * t154;
+    const real t156 = t151 + t155;
+    const real t157 = Rc[8] * r[1];
+    const real t158 = Rc[5] * r[2];
+    const real t159 = t157 - t158;
+    const real t160 = t106 * t159;
+    const real t161 = t156 + t160;
+    const real t162 = t147 + t161;
+    e_I[3] += t162;
+    const real t163 = Rc[3] * t126;
+    const real t164 = Rc[4] * t135;
+    const real t165 = t163 + t164;
+    const real t166 = Rc[5] * t145;
+    const real t167 = t165 + t166;
+    const real t168 = Rc[0] * r[2];
+    const real t169 = Rc[6] * r[0];
+    const real t170 = t168 - t169;
+    const real t171 = t87 * t170;
+    const real t172 = Rc[1] * r[2];
+    const real t173 = Rc[7] * r[0];
+    const real t174 = t172 - t173;
+    const real t175 = t96 * t174;
+    const real t176 = t171 + t175;
+    const real t177 = Rc[2] * r[2];
+    const real t178 = Rc[8] * r[0];
+    const real t179 = t177 - t178;
+    const real t180 = t106 * t179;
+    const real t181 = t176 + t180;
+    const real t182 = t167 + t181;
+    e_I[4] += t182;
+    const real t183 = Rc[6] * t126;
+    const real t184 = Rc[7] * t135;
+    const real t185 = t183 + t184;
+    const real t186 = Rc[8] * t145;
+    const real t187 = t185 + t186;
+    const real t188 = Rc[3] * r[0];
+    const real t189 = Rc[0] * r[1];
+    const real t190 = t188 - t189;
+    const real t191 = t87 * t190;
+    const real t192 = Rc[4] * r[0];
+    const real t193 = Rc[1] * r[1];
+    const real t194 = t192 - t193;
+    const real t195 = t96 * t194;
+    const real t196 = t191 + t195;
+    const real t197 = Rc[5] * r[0];
+    const real t198 = Rc[2] * r[1];
+    const real t199 = t197 - t198;
+    const real t200 = t106 * t199;
+    const real t201 = t196 + t200;
+    const real t202 = t187 + t201;
+    e_I[5] += t202;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"V", 24, "", 0, 0},
+    {"inverse", 16, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_push_outputs[] = {
+    {"y", 4, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 4 free speeds that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[4][9] motion along the unknowns
+ * in  gain[4][9] D^-1 times the rows by the motion
+ * in  y[4] D^-1 times what is left of the rows
+ * out x[4] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = gain[9] * t4;
+    const real t145 = gain[10] * t10;
+    const real t146 = t144 + t145;
+    const real t147 = gain[11] * t17;
+    const real t148 = t146 + t147;
+    const real t149 = gain[12] * t28;
+    const real t150 = t148 + t149;
+    const real t151 = gain[13] * t39;
+    const real t152 = t150 + t151;
+    const real t153 = gain[14] * t50;
+    const real t154 = t152 + t153;
+    const real t155 = gain[15] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = gain[16] * t129;
+    const real t158 = t156 + t157;
+    const real t159 = gain[17] * t140;
+    const real t160 = t158 + t159;
+    const real t161 = y[1] - t160;
+    x[1] = t161;
+    const real t162 = gain[18] * t4;
+    const real t163 = gain[19] * t10;
+    const real t164 = t162 + t163;
+    const real t165 = gain[20] * t17;
+    const real t166 = t164 + t165;
+    const real t167 = gain[21] * t28;
+    const real t168 = t166 + t167;
+    const real t169 = gain[22] * t39;
+    const real t170 = t168 + t169;
+    const real t171 = gain[23] * t50;
+    const real t172 = t170 + t171;
+    const real t173 = gain[24] * t117;
+    const real t174 = t172 + t173;
+    const real t175 = gain[25] * t129;
+    const real t176 = t174 + t175;
+    const real t177 = gain[26] * t140;
+    const real t178 = t176 + t177;
+    const real t179 = y[2] - t178;
+    x[2] = t179;
+    const real t180 = gain[27] * t4;
+    const real t181 = gain[28] * t10;
+    const real t182 = t180 + t181;
+    const real t183 = gain[29] * t17;
+    const real t184 = t182 + t183;
+    const real t185 = gain[30] * t28;
+    const real t186 = t184 + t185;
+    const real t187 = gain[31] * t39;
+    const real t188 = t186 + t187;
+    const real t189 = gain[32] * t50;
+    const real t190 = t188 + t189;
+    const real t191 = gain[33] * t117;
+    const real t192 = t190 + t191;
+    const real t193 = gain[34] * t129;
+    const real t194 = t192 + t193;
+    const real t195 = gain[35] * t140;
+    const real t196 = t194 + t195;
+    const real t197 = y[3] - t196;
+    x[3] = t197;
+    const real t198 = B[0] * t143;
+    const real t199 = B[9] * t161;
+    const real t200 = t198 + t199;
+    const real t201 = B[18] * t179;
+    const real t202 = t200 + t201;
+    const real t203 = B[27] * t197;
+    const real t204 = t202 + t203;
+    const real t205 = t4 + t204;
+    z[0] = t205;
+    const real t206 = B[1] * t143;
+    const real t207 = B[10] * t161;
+    const real t208 = t206 + t207;
+    const real t209 = B[19] * t179;
+    const real t210 = t208 + t209;
+    const real t211 = B[28] * t197;
+    const real t212 = t210 + t211;
+    const real t213 = t10 + t212;
+    z[1] = t213;
+    const real t214 = B[2] * t143;
+    const real t215 = B[11] * t161;
+    const real t216 = t214 + t215;
+    const real t217 = B[20] * t179;
+    const real t218 = t216 + t217;
+    const real t219 = B[29] * t197;
+    const real t220 = t218 + t219;
+    const real t221 = t17 + t220;
+    z[2] = t221;
+    const real t222 = B[3] * t143;
+    const real t223 = B[12] * t161;
+    const real t224 = t222 + t223;
+    const real t225 = B[21] * t179;
+    const real t226 = t224 + t225;
+    const real t227 = B[30] * t197;
+    const real t228 = t226 + t227;
+    const real t229 = t28 + t228;
+    z[3] = t229;
+    const real t230 = B[4] * t143;
+    const real t231 = B[13] * t161;
+    const real t232 = t230 + t231;
+    const real t233 = B[22] * t179;
+    const real t234 = t232 + t233;
+    const real t235 = B[31] * t197;
+    const real t236 = t234 + t235;
+    const real t237 = t39 + t236;
+    z[4] = t237;
+    const real t238 = B[5] * t143;
+    const real t239 = B[14] * t161;
+    const real t240 = t238 + t239;
+    const real t241 = B[23] * t179;
+    const real t242 = t240 + t241;
+    const real t243 = B[32] * t197;
+    const real t244 = t242 + t243;
+    const real t245 = t50 + t244;
+    z[5] = t245;
+    const real t246 = B[6] * t143;
+    const real t247 = B[15] * t161;
+    const real t248 = t246 + t247;
+    const real t249 = B[24] * t179;
+    const real t250 = t248 + t249;
+    const real t251 = B[33] * t197;
+    const real t252 = t250 + t251;
+    const real t253 = t117 + t252;
+    z[6] = t253;
+    const real t254 = B[7] * t143;
+    const real t255 = B[16] * t161;
+    const real t256 = t254 + t255;
+    const real t257 = B[25] * t179;
+    const real t258 = t256 + t257;
+    const real t259 = B[34] * t197;
+    const real t260 = t258 + t259;
+    const real t261 = t129 + t260;
+    z[7] = t261;
+    const real t262 = B[8] * t143;
+    const real t263 = B[17] * t161;
+    const real t264 = t262 + t263;
+    const real t265 = B[26] * t179;
+    const real t266 = t264 + t265;
+    const real t267 = B[35] * t197;
+    const real t268 = t266 + t267;
+    const real t269 = t140 + t268;
+    z[8] = t269;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 36, "", 0, 0},
+    {"gain", 36, "", 0, 0},
+    {"y", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_answer_outputs[] = {
+    {"x", 4, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -4676,6 +5876,54 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_rows,
+        .call = mstmm_sweep_generic4_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic4_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_rows_outputs,
+        .ir_hash = "8b204576966947000bb7adcb7edc47e4a0963ba54e15bb5d81da8ff8e7f18209",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_reduce,
+        .call = mstmm_sweep_generic4_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic4_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_reduce_outputs,
+        .ir_hash = "478a0844e173a9a011e2f092834e3ac75dfdb928124de3a79a51f45ecbcf7881",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_push,
+        .call = mstmm_sweep_generic4_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic4_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_push_outputs,
+        .ir_hash = "7cc7f6963ceea313550eca604a8dc1c6824875da36284c5a7bb2763bebf5090a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_answer,
+        .call = mstmm_sweep_generic4_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic4_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_answer_outputs,
+        .ir_hash = "12a66bb105693834b0a07535603f63d46c4a29d5c6abe42a0f3651d07a8153a5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
         .call = mstmm_sweep_generic4_forward_slope_call,
@@ -4705,7 +5953,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "ca4c70b8577087e058165b8f1c524eed9b80c77ac8f816b5b558784c5953de35",
+    .hash = "0c8ccc6a3b08da32ac70ee2e9b7466c12084ccb2f9306cae8ee2e5c3cd90157a",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4715,6 +5963,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic4_kernels,
 };

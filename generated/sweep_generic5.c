@@ -40,6 +40,19 @@ int mstmm_sweep_generic5_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 5 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4658,6 +4688,1456 @@ static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
     {"d_tau", 5, "", 0, 0},
 };
 
+/* rows of a hinge with 5 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][5] motion subspace of the unknowns
+ * in  B[5][9] motion along the unknowns
+ * in  W[5][5] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[5][6] S B, a row a direction
+ * out right[5][9] rows by the motion
+ * out D[5][5] rows by unknowns
+ * out one[5][5] unit matrix
+ */
+int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        const two_t v26 = B[9] * v0;
+        const two_t v27 = B[10] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v29 = B[11] * v5;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = B[12] * v8;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = B[13] * v11;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = B[14] * v14;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = B[15] * v17;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = B[16] * v20;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = B[17] * v23;
+        const two_t v42 = v40 + v41;
+        const two_t v43 = B[18] * v0;
+        const two_t v44 = B[19] * v2;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = B[20] * v5;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = B[21] * v8;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = B[22] * v11;
+        const two_t v51 = v49 + v50;
+        const two_t v52 = B[23] * v14;
+        const two_t v53 = v51 + v52;
+        const two_t v54 = B[24] * v17;
+        const two_t v55 = v53 + v54;
+        const two_t v56 = B[25] * v20;
+        const two_t v57 = v55 + v56;
+        const two_t v58 = B[26] * v23;
+        const two_t v59 = v57 + v58;
+        const two_t v60 = B[27] * v0;
+        const two_t v61 = B[28] * v2;
+        const two_t v62 = v60 + v61;
+        const two_t v63 = B[29] * v5;
+        const two_t v64 = v62 + v63;
+        const two_t v65 = B[30] * v8;
+        const two_t v66 = v64 + v65;
+        const two_t v67 = B[31] * v11;
+        const two_t v68 = v66 + v67;
+        const two_t v69 = B[32] * v14;
+        const two_t v70 = v68 + v69;
+        const two_t v71 = B[33] * v17;
+        const two_t v72 = v70 + v71;
+        const two_t v73 = B[34] * v20;
+        const two_t v74 = v72 + v73;
+        const two_t v75 = B[35] * v23;
+        const two_t v76 = v74 + v75;
+        const two_t v77 = B[36] * v0;
+        const two_t v78 = B[37] * v2;
+        const two_t v79 = v77 + v78;
+        const two_t v80 = B[38] * v5;
+        const two_t v81 = v79 + v80;
+        const two_t v82 = B[39] * v8;
+        const two_t v83 = v81 + v82;
+        const two_t v84 = B[40] * v11;
+        const two_t v85 = v83 + v84;
+        const two_t v86 = B[41] * v14;
+        const two_t v87 = v85 + v86;
+        const two_t v88 = B[42] * v17;
+        const two_t v89 = v87 + v88;
+        const two_t v90 = B[43] * v20;
+        const two_t v91 = v89 + v90;
+        const two_t v92 = B[44] * v23;
+        const two_t v93 = v91 + v92;
+        *(two_free_t *)(K + 0 + k) = v25;
+        *(two_free_t *)(K + 6 + k) = v42;
+        *(two_free_t *)(K + 12 + k) = v59;
+        *(two_free_t *)(K + 18 + k) = v76;
+        *(two_free_t *)(K + 24 + k) = v93;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[5] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[10] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[15] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[20] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[25] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = H[1] * v0;
+        const two_t v18 = H[6] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = H[11] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = H[16] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = H[21] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = H[26] * v14;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = H[2] * v0;
+        const two_t v29 = H[7] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = H[12] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = H[17] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = H[22] * v11;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = H[27] * v14;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = H[3] * v0;
+        const two_t v40 = H[8] * v2;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = H[13] * v5;
+        const two_t v43 = v41 + v42;
+        const two_t v44 = H[18] * v8;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = H[23] * v11;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = H[28] * v14;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = H[4] * v0;
+        const two_t v51 = H[9] * v2;
+        const two_t v52 = v50 + v51;
+        const two_t v53 = H[14] * v5;
+        const two_t v54 = v52 + v53;
+        const two_t v55 = H[19] * v8;
+        const two_t v56 = v54 + v55;
+        const two_t v57 = H[24] * v11;
+        const two_t v58 = v56 + v57;
+        const two_t v59 = H[29] * v14;
+        const two_t v60 = v58 + v59;
+        right[0 + k] = v16[0];
+        right[9 + k] = v27[0];
+        right[18 + k] = v38[0];
+        right[27 + k] = v49[0];
+        right[36 + k] = v60[0];
+        if (next) {
+            right[1 + k] = v16[1];
+            right[10 + k] = v27[1];
+            right[19 + k] = v38[1];
+            right[28 + k] = v49[1];
+            right[37 + k] = v60[1];
+        }
+    }
+    const real t1005 = H[0] * K[0];
+    const real t1006 = H[5] * K[1];
+    const real t1007 = t1005 + t1006;
+    const real t1008 = H[10] * K[2];
+    const real t1009 = t1007 + t1008;
+    const real t1010 = H[15] * K[3];
+    const real t1011 = t1009 + t1010;
+    const real t1012 = H[20] * K[4];
+    const real t1013 = t1011 + t1012;
+    const real t1014 = H[25] * K[5];
+    const real t1015 = t1013 + t1014;
+    const real t1016 = W[0] + t1015;
+    D[0] = t1016;
+    const real t1017 = H[0] * K[6];
+    const real t1018 = H[5] * K[7];
+    const real t1019 = t1017 + t1018;
+    const real t1020 = H[10] * K[8];
+    const real t1021 = t1019 + t1020;
+    const real t1022 = H[15] * K[9];
+    const real t1023 = t1021 + t1022;
+    const real t1024 = H[20] * K[10];
+    const real t1025 = t1023 + t1024;
+    const real t1026 = H[25] * K[11];
+    const real t1027 = t1025 + t1026;
+    const real t1028 = W[5] + t1027;
+    D[1] = t1028;
+    const real t1029 = H[0] * K[12];
+    const real t1030 = H[5] * K[13];
+    const real t1031 = t1029 + t1030;
+    const real t1032 = H[10] * K[14];
+    const real t1033 = t1031 + t1032;
+    const real t1034 = H[15] * K[15];
+    const real t1035 = t1033 + t1034;
+    const real t1036 = H[20] * K[16];
+    const real t1037 = t1035 + t1036;
+    const real t1038 = H[25] * K[17];
+    const real t1039 = t1037 + t1038;
+    const real t1040 = W[10] + t1039;
+    D[2] = t1040;
+    const real t1041 = H[0] * K[18];
+    const real t1042 = H[5] * K[19];
+    const real t1043 = t1041 + t1042;
+    const real t1044 = H[10] * K[20];
+    const real t1045 = t1043 + t1044;
+    const real t1046 = H[15] * K[21];
+    const real t1047 = t1045 + t1046;
+    const real t1048 = H[20] * K[22];
+    const real t1049 = t1047 + t1048;
+    const real t1050 = H[25] * K[23];
+    const real t1051 = t1049 + t1050;
+    const real t1052 = W[15] + t1051;
+    D[3] = t1052;
+    const real t1053 = H[0] * K[24];
+    const real t1054 = H[5] * K[25];
+    const real t1055 = t1053 + t1054;
+    const real t1056 = H[10] * K[26];
+    const real t1057 = t1055 + t1056;
+    const real t1058 = H[15] * K[27];
+    const real t1059 = t1057 + t1058;
+    const real t1060 = H[20] * K[28];
+    const real t1061 = t1059 + t1060;
+    const real t1062 = H[25] * K[29];
+    const real t1063 = t1061 + t1062;
+    const real t1064 = W[20] + t1063;
+    D[4] = t1064;
+    const real t1065 = H[1] * K[0];
+    const real t1066 = H[6] * K[1];
+    const real t1067 = t1065 + t1066;
+    const real t1068 = H[11] * K[2];
+    const real t1069 = t1067 + t1068;
+    const real t1070 = H[16] * K[3];
+    const real t1071 = t1069 + t1070;
+    const real t1072 = H[21] * K[4];
+    const real t1073 = t1071 + t1072;
+    const real t1074 = H[26] * K[5];
+    const real t1075 = t1073 + t1074;
+    const real t1076 = W[1] + t1075;
+    D[5] = t1076;
+    const real t1077 = H[1] * K[6];
+    const real t1078 = H[6] * K[7];
+    const real t1079 = t1077 + t1078;
+    const real t1080 = H[11] * K[8];
+    const real t1081 = t1079 + t1080;
+    const real t1082 = H[16] * K[9];
+    const real t1083 = t1081 + t1082;
+    const real t1084 = H[21] * K[10];
+    const real t1085 = t1083 + t1084;
+    const real t1086 = H[26] * K[11];
+    const real t1087 = t1085 + t1086;
+    const real t1088 = W[6] + t1087;
+    D[6] = t1088;
+    const real t1089 = H[1] * K[12];
+    const real t1090 = H[6] * K[13];
+    const real t1091 = t1089 + t1090;
+    const real t1092 = H[11] * K[14];
+    const real t1093 = t1091 + t1092;
+    const real t1094 = H[16] * K[15];
+    const real t1095 = t1093 + t1094;
+    const real t1096 = H[21] * K[16];
+    const real t1097 = t1095 + t1096;
+    const real t1098 = H[26] * K[17];
+    const real t1099 = t1097 + t1098;
+    const real t1100 = W[11] + t1099;
+    D[7] = t1100;
+    const real t1101 = H[1] * K[18];
+    const real t1102 = H[6] * K[19];
+    const real t1103 = t1101 + t1102;
+    const real t1104 = H[11] * K[20];
+    const real t1105 = t1103 + t1104;
+    const real t1106 = H[16] * K[21];
+    const real t1107 = t1105 + t1106;
+    const real t1108 = H[21] * K[22];
+    const real t1109 = t1107 + t1108;
+    const real t1110 = H[26] * K[23];
+    const real t1111 = t1109 + t1110;
+    const real t1112 = W[16] + t1111;
+    D[8] = t1112;
+    const real t1113 = H[1] * K[24];
+    const real t1114 = H[6] * K[25];
+    const real t1115 = t1113 + t1114;
+    const real t1116 = H[11] * K[26];
+    const real t1117 = t1115 + t1116;
+    const real t1118 = H[16] * K[27];
+    const real t1119 = t1117 + t1118;
+    const real t1120 = H[21] * K[28];
+    const real t1121 = t1119 + t1120;
+    const real t1122 = H[26] * K[29];
+    const real t1123 = t1121 + t1122;
+    const real t1124 = W[21] + t1123;
+    D[9] = t1124;
+    const real t1125 = H[2] * K[0];
+    const real t1126 = H[7] * K[1];
+    const real t1127 = t1125 + t1126;
+    const real t1128 = H[12] * K[2];
+    const real t1129 = t1127 + t1128;
+    const real t1130 = H[17] * K[3];
+    const real t1131 = t1129 + t1130;
+    const real t1132 = H[22] * K[4];
+    const real t1133 = t1131 + t1132;
+    const real t1134 = H[27] * K[5];
+    const real t1135 = t1133 + t1134;
+    const real t1136 = W[2] + t1135;
+    D[10] = t1136;
+    const real t1137 = H[2] * K[6];
+    const real t1138 = H[7] * K[7];
+    const real t1139 = t1137 + t1138;
+    const real t1140 = H[12] * K[8];
+    const real t1141 = t1139 + t1140;
+    const real t1142 = H[17] * K[9];
+    const real t1143 = t1141 + t1142;
+    const real t1144 = H[22] * K[10];
+    const real t1145 = t1143 + t1144;
+    const real t1146 = H[27] * K[11];
+    const real t1147 = t1145 + t1146;
+    const real t1148 = W[7] + t1147;
+    D[11] = t1148;
+    const real t1149 = H[2] * K[12];
+    const real t1150 = H[7] * K[13];
+    const real t1151 = t1149 + t1150;
+    const real t1152 = H[12] * K[14];
+    const real t1153 = t1151 + t1152;
+    const real t1154 = H[17] * K[15];
+    const real t1155 = t1153 + t1154;
+    const real t1156 = H[22] * K[16];
+    const real t1157 = t1155 + t1156;
+    const real t1158 = H[27] * K[17];
+    const real t1159 = t1157 + t1158;
+    const real t1160 = W[12] + t1159;
+    D[12] = t1160;
+    const real t1161 = H[2] * K[18];
+    const real t1162 = H[7] * K[19];
+    const real t1163 = t1161 + t1162;
+    const real t1164 = H[12] * K[20];
+    const real t1165 = t1163 + t1164;
+    const real t1166 = H[17] * K[21];
+    const real t1167 = t1165 + t1166;
+    const real t1168 = H[22] * K[22];
+    const real t1169 = t1167 + t1168;
+    const real t1170 = H[27] * K[23];
+    const real t1171 = t1169 + t1170;
+    const real t1172 = W[17] + t1171;
+    D[13] = t1172;
+    const real t1173 = H[2] * K[24];
+    const real t1174 = H[7] * K[25];
+    const real t1175 = t1173 + t1174;
+    const real t1176 = H[12] * K[26];
+    const real t1177 = t1175 + t1176;
+    const real t1178 = H[17] * K[27];
+    const real t1179 = t1177 + t1178;
+    const real t1180 = H[22] * K[28];
+    const real t1181 = t1179 + t1180;
+    const real t1182 = H[27] * K[29];
+    const real t1183 = t1181 + t1182;
+    const real t1184 = W[22] + t1183;
+    D[14] = t1184;
+    const real t1185 = H[3] * K[0];
+    const real t1186 = H[8] * K[1];
+    const real t1187 = t1185 + t1186;
+    const real t1188 = H[13] * K[2];
+    const real t1189 = t1187 + t1188;
+    const real t1190 = H[18] * K[3];
+    const real t1191 = t1189 + t1190;
+    const real t1192 = H[23] * K[4];
+    const real t1193 = t1191 + t1192;
+    const real t1194 = H[28] * K[5];
+    const real t1195 = t1193 + t1194;
+    const real t1196 = W[3] + t1195;
+    D[15] = t1196;
+    const real t1197 = H[3] * K[6];
+    const real t1198 = H[8] * K[7];
+    const real t1199 = t1197 + t1198;
+    const real t1200 = H[13] * K[8];
+    const real t1201 = t1199 + t1200;
+    const real t1202 = H[18] * K[9];
+    const real t1203 = t1201 + t1202;
+    const real t1204 = H[23] * K[10];
+    const real t1205 = t1203 + t1204;
+    const real t1206 = H[28] * K[11];
+    const real t1207 = t1205 + t1206;
+    const real t1208 = W[8] + t1207;
+    D[16] = t1208;
+    const real t1209 = H[3] * K[12];
+    const real t1210 = H[8] * K[13];
+    const real t1211 = t1209 + t1210;
+    const real t1212 = H[13] * K[14];
+    const real t1213 = t1211 + t1212;
+    const real t1214 = H[18] * K[15];
+    const real t1215 = t1213 + t1214;
+    const real t1216 = H[23] * K[16];
+    const real t1217 = t1215 + t1216;
+    const real t1218 = H[28] * K[17];
+    const real t1219 = t1217 + t1218;
+    const real t1220 = W[13] + t1219;
+    D[17] = t1220;
+    const real t1221 = H[3] * K[18];
+    const real t1222 = H[8] * K[19];
+    const real t1223 = t1221 + t1222;
+    const real t1224 = H[13] * K[20];
+    const real t1225 = t1223 + t1224;
+    const real t1226 = H[18] * K[21];
+    const real t1227 = t1225 + t1226;
+    const real t1228 = H[23] * K[22];
+    const real t1229 = t1227 + t1228;
+    const real t1230 = H[28] * K[23];
+    const real t1231 = t1229 + t1230;
+    const real t1232 = W[18] + t1231;
+    D[18] = t1232;
+    const real t1233 = H[3] * K[24];
+    const real t1234 = H[8] * K[25];
+    const real t1235 = t1233 + t1234;
+    const real t1236 = H[13] * K[26];
+    const real t1237 = t1235 + t1236;
+    const real t1238 = H[18] * K[27];
+    const real t1239 = t1237 + t1238;
+    const real t1240 = H[23] * K[28];
+    const real t1241 = t1239 + t1240;
+    const real t1242 = H[28] * K[29];
+    const real t1243 = t1241 + t1242;
+    const real t1244 = W[23] + t1243;
+    D[19] = t1244;
+    const real t1245 = H[4] * K[0];
+    const real t1246 = H[9] * K[1];
+    const real t1247 = t1245 + t1246;
+    const real t1248 = H[14] * K[2];
+    const real t1249 = t1247 + t1248;
+    const real t1250 = H[19] * K[3];
+    const real t1251 = t1249 + t1250;
+    const real t1252 = H[24] * K[4];
+    const real t1253 = t1251 + t1252;
+    const real t1254 = H[29] * K[5];
+    const real t1255 = t1253 + t1254;
+    const real t1256 = W[4] + t1255;
+    D[20] = t1256;
+    const real t1257 = H[4] * K[6];
+    const real t1258 = H[9] * K[7];
+    const real t1259 = t1257 + t1258;
+    const real t1260 = H[14] * K[8];
+    const real t1261 = t1259 + t1260;
+    const real t1262 = H[19] * K[9];
+    const real t1263 = t1261 + t1262;
+    const real t1264 = H[24] * K[10];
+    const real t1265 = t1263 + t1264;
+    const real t1266 = H[29] * K[11];
+    const real t1267 = t1265 + t1266;
+    const real t1268 = W[9] + t1267;
+    D[21] = t1268;
+    const real t1269 = H[4] * K[12];
+    const real t1270 = H[9] * K[13];
+    const real t1271 = t1269 + t1270;
+    const real t1272 = H[14] * K[14];
+    const real t1273 = t1271 + t1272;
+    const real t1274 = H[19] * K[15];
+    const real t1275 = t1273 + t1274;
+    const real t1276 = H[24] * K[16];
+    const real t1277 = t1275 + t1276;
+    const real t1278 = H[29] * K[17];
+    const real t1279 = t1277 + t1278;
+    const real t1280 = W[14] + t1279;
+    D[22] = t1280;
+    const real t1281 = H[4] * K[18];
+    const real t1282 = H[9] * K[19];
+    const real t1283 = t1281 + t1282;
+    const real t1284 = H[14] * K[20];
+    const real t1285 = t1283 + t1284;
+    const real t1286 = H[19] * K[21];
+    const real t1287 = t1285 + t1286;
+    const real t1288 = H[24] * K[22];
+    const real t1289 = t1287 + t1288;
+    const real t1290 = H[29] * K[23];
+    const real t1291 = t1289 + t1290;
+    const real t1292 = W[19] + t1291;
+    D[23] = t1292;
+    const real t1293 = H[4] * K[24];
+    const real t1294 = H[9] * K[25];
+    const real t1295 = t1293 + t1294;
+    const real t1296 = H[14] * K[26];
+    const real t1297 = t1295 + t1296;
+    const real t1298 = H[19] * K[27];
+    const real t1299 = t1297 + t1298;
+    const real t1300 = H[24] * K[28];
+    const real t1301 = t1299 + t1300;
+    const real t1302 = H[29] * K[29];
+    const real t1303 = t1301 + t1302;
+    const real t1304 = W[24] + t1303;
+    D[24] = t1304;
+    one[0] = 1.0;
+    one[1] = 0.0;
+    one[2] = 0.0;
+    one[3] = 0.0;
+    one[4] = 0.0;
+    one[5] = 0.0;
+    one[6] = 1.0;
+    one[7] = 0.0;
+    one[8] = 0.0;
+    one[9] = 0.0;
+    one[10] = 0.0;
+    one[11] = 0.0;
+    one[12] = 1.0;
+    one[13] = 0.0;
+    one[14] = 0.0;
+    one[15] = 0.0;
+    one[16] = 0.0;
+    one[17] = 0.0;
+    one[18] = 1.0;
+    one[19] = 0.0;
+    one[20] = 0.0;
+    one[21] = 0.0;
+    one[22] = 0.0;
+    one[23] = 0.0;
+    one[24] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_rows_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"B", 45, "", 0, 0},
+    {"W", 25, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_rows_outputs[] = {
+    {"K", 30, "", 0, 0},
+    {"right", 45, "", 0, 0},
+    {"D", 25, "", 0, 0},
+    {"one", 25, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 5 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[5][5] D^-1
+ * in  right[5][9] rows by the motion
+ * in  K[5][6] S B, a row a direction
+ * in  G[5][6] change of the load that is carried
+ * out gain[5][9] D^-1 times the rows by the motion
+ * out V[5][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v3 = inverse[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v6 = inverse[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v9 = inverse[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(right + 36 + k, 1 * next);
+        const two_t v12 = inverse[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = inverse[5] * v0;
+        const two_t v15 = inverse[6] * v2;
+        const two_t v16 = v14 + v15;
+        const two_t v17 = inverse[7] * v5;
+        const two_t v18 = v16 + v17;
+        const two_t v19 = inverse[8] * v8;
+        const two_t v20 = v18 + v19;
+        const two_t v21 = inverse[9] * v11;
+        const two_t v22 = v20 + v21;
+        const two_t v23 = inverse[10] * v0;
+        const two_t v24 = inverse[11] * v2;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = inverse[12] * v5;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = inverse[13] * v8;
+        const two_t v29 = v27 + v28;
+        const two_t v30 = inverse[14] * v11;
+        const two_t v31 = v29 + v30;
+        const two_t v32 = inverse[15] * v0;
+        const two_t v33 = inverse[16] * v2;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = inverse[17] * v5;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = inverse[18] * v8;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = inverse[19] * v11;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = inverse[20] * v0;
+        const two_t v42 = inverse[21] * v2;
+        const two_t v43 = v41 + v42;
+        const two_t v44 = inverse[22] * v5;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = inverse[23] * v8;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = inverse[24] * v11;
+        const two_t v49 = v47 + v48;
+        gain[0 + k] = v13[0];
+        gain[9 + k] = v22[0];
+        gain[18 + k] = v31[0];
+        gain[27 + k] = v40[0];
+        gain[36 + k] = v49[0];
+        if (next) {
+            gain[1 + k] = v13[1];
+            gain[10 + k] = v22[1];
+            gain[19 + k] = v31[1];
+            gain[28 + k] = v40[1];
+            gain[37 + k] = v49[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        const two_t v3 = mstmm_beside(K + 6 + k);
+        const two_t v4 = mstmm_beside(G + 6 + k);
+        const two_t v5 = v3 + v4;
+        const two_t v6 = mstmm_beside(K + 12 + k);
+        const two_t v7 = mstmm_beside(G + 12 + k);
+        const two_t v8 = v6 + v7;
+        const two_t v9 = mstmm_beside(K + 18 + k);
+        const two_t v10 = mstmm_beside(G + 18 + k);
+        const two_t v11 = v9 + v10;
+        const two_t v12 = mstmm_beside(K + 24 + k);
+        const two_t v13 = mstmm_beside(G + 24 + k);
+        const two_t v14 = v12 + v13;
+        *(two_free_t *)(V + 0 + k) = v2;
+        *(two_free_t *)(V + 6 + k) = v5;
+        *(two_free_t *)(V + 12 + k) = v8;
+        *(two_free_t *)(V + 18 + k) = v11;
+        *(two_free_t *)(V + 24 + k) = v14;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v2 = mstmm_beside(V + 6 + k);
+        const two_t v3 = gain[9] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(V + 12 + k);
+        const two_t v6 = gain[18] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(V + 18 + k);
+        const two_t v9 = gain[27] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(V + 24 + k);
+        const two_t v12 = gain[36] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v15 = gain[1] * v0;
+        const two_t v16 = gain[10] * v2;
+        const two_t v17 = v15 + v16;
+        const two_t v18 = gain[19] * v5;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = gain[28] * v8;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = gain[37] * v11;
+        const two_t v23 = v21 + v22;
+        const two_t v25 = gain[2] * v0;
+        const two_t v26 = gain[11] * v2;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = gain[20] * v5;
+        const two_t v29 = v27 + v28;
+        const two_t v30 = gain[29] * v8;
+        const two_t v31 = v29 + v30;
+        const two_t v32 = gain[38] * v11;
+        const two_t v33 = v31 + v32;
+        const two_t v35 = gain[3] * v0;
+        const two_t v36 = gain[12] * v2;
+        const two_t v37 = v35 + v36;
+        const two_t v38 = gain[21] * v5;
+        const two_t v39 = v37 + v38;
+        const two_t v40 = gain[30] * v8;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = gain[39] * v11;
+        const two_t v43 = v41 + v42;
+        const two_t v45 = gain[4] * v0;
+        const two_t v46 = gain[13] * v2;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = gain[22] * v5;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = gain[31] * v8;
+        const two_t v51 = v49 + v50;
+        const two_t v52 = gain[40] * v11;
+        const two_t v53 = v51 + v52;
+        const two_t v55 = gain[5] * v0;
+        const two_t v56 = gain[14] * v2;
+        const two_t v57 = v55 + v56;
+        const two_t v58 = gain[23] * v5;
+        const two_t v59 = v57 + v58;
+        const two_t v60 = gain[32] * v8;
+        const two_t v61 = v59 + v60;
+        const two_t v62 = gain[41] * v11;
+        const two_t v63 = v61 + v62;
+        const two_t v65 = gain[6] * v0;
+        const two_t v66 = gain[15] * v2;
+        const two_t v67 = v65 + v66;
+        const two_t v68 = gain[24] * v5;
+        const two_t v69 = v67 + v68;
+        const two_t v70 = gain[33] * v8;
+        const two_t v71 = v69 + v70;
+        const two_t v72 = gain[42] * v11;
+        const two_t v73 = v71 + v72;
+        const two_t v75 = gain[7] * v0;
+        const two_t v76 = gain[16] * v2;
+        const two_t v77 = v75 + v76;
+        const two_t v78 = gain[25] * v5;
+        const two_t v79 = v77 + v78;
+        const two_t v80 = gain[34] * v8;
+        const two_t v81 = v79 + v80;
+        const two_t v82 = gain[43] * v11;
+        const two_t v83 = v81 + v82;
+        const two_t v85 = gain[8] * v0;
+        const two_t v86 = gain[17] * v2;
+        const two_t v87 = v85 + v86;
+        const two_t v88 = gain[26] * v5;
+        const two_t v89 = v87 + v88;
+        const two_t v90 = gain[35] * v8;
+        const two_t v91 = v89 + v90;
+        const two_t v92 = gain[44] * v11;
+        const two_t v93 = v91 + v92;
+        *(two_free_t *)(S + 0 + k) -= v13;
+        *(two_free_t *)(S + 6 + k) -= v23;
+        *(two_free_t *)(S + 12 + k) -= v33;
+        *(two_free_t *)(S + 18 + k) -= v43;
+        *(two_free_t *)(S + 24 + k) -= v53;
+        *(two_free_t *)(S + 30 + k) -= v63;
+        *(two_free_t *)(S + 36 + k) -= v73;
+        *(two_free_t *)(S + 42 + k) -= v83;
+        *(two_free_t *)(S + 48 + k) -= v93;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_reduce_inputs[] = {
+    {"inverse", 25, "", 0, 0},
+    {"right", 45, "", 0, 0},
+    {"K", 30, "", 0, 0},
+    {"G", 30, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_reduce_outputs[] = {
+    {"gain", 45, "", 0, 0},
+    {"V", 30, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 5 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][5] motion subspace of the unknowns
+ * in  V[5][6] K + G, a row a direction
+ * in  inverse[5][5] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[5] load of the rows
+ * out y[5] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[5] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[10] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[20] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[25] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[6] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[11] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[16] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[21] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[26] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[7] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[12] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[17] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[22] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[27] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = H[3] * e[0];
+    const real t42 = H[8] * e[1];
+    const real t43 = t41 + t42;
+    const real t44 = H[13] * e[2];
+    const real t45 = t43 + t44;
+    const real t46 = H[18] * e[3];
+    const real t47 = t45 + t46;
+    const real t48 = H[23] * e[4];
+    const real t49 = t47 + t48;
+    const real t50 = H[28] * e[5];
+    const real t51 = t49 + t50;
+    const real t52 = e_f[3] + t51;
+    const real t53 = inverse[3] * t52;
+    const real t54 = t40 + t53;
+    const real t55 = H[4] * e[0];
+    const real t56 = H[9] * e[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[14] * e[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[19] * e[3];
+    const real t61 = t59 + t60;
+    const real t62 = H[24] * e[4];
+    const real t63 = t61 + t62;
+    const real t64 = H[29] * e[5];
+    const real t65 = t63 + t64;
+    const real t66 = e_f[4] + t65;
+    const real t67 = inverse[4] * t66;
+    const real t68 = t54 + t67;
+    const real t69 = -t68;
+    y[0] = t69;
+    const real t70 = inverse[5] * t11;
+    const real t71 = inverse[6] * t24;
+    const real t72 = t70 + t71;
+    const real t73 = inverse[7] * t38;
+    const real t74 = t72 + t73;
+    const real t75 = inverse[8] * t52;
+    const real t76 = t74 + t75;
+    const real t77 = inverse[9] * t66;
+    const real t78 = t76 + t77;
+    const real t79 = -t78;
+    y[1] = t79;
+    const real t80 = inverse[10] * t11;
+    const real t81 = inverse[11] * t24;
+    const real t82 = t80 + t81;
+    const real t83 = inverse[12] * t38;
+    const real t84 = t82 + t83;
+    const real t85 = inverse[13] * t52;
+    const real t86 = t84 + t85;
+    const real t87 = inverse[14] * t66;
+    const real t88 = t86 + t87;
+    const real t89 = -t88;
+    y[2] = t89;
+    const real t90 = inverse[15] * t11;
+    const real t91 = inverse[16] * t24;
+    const real t92 = t90 + t91;
+    const real t93 = inverse[17] * t38;
+    const real t94 = t92 + t93;
+    const real t95 = inverse[18] * t52;
+    const real t96 = t94 + t95;
+    const real t97 = inverse[19] * t66;
+    const real t98 = t96 + t97;
+    const real t99 = -t98;
+    y[3] = t99;
+    const real t100 = inverse[20] * t11;
+    const real t101 = inverse[21] * t24;
+    const real t102 = t100 + t101;
+    const real t103 = inverse[22] * t38;
+    const real t104 = t102 + t103;
+    const real t105 = inverse[23] * t52;
+    const real t106 = t104 + t105;
+    const real t107 = inverse[24] * t66;
+    const real t108 = t106 + t107;
+    const real t109 = -t108;
+    y[4] = t109;
+    const real t110 = V[0] * t68;
+    const real t111 = V[6] * t78;
+    const real t112 = t110 + t111;
+    const real t113 = V[12] * t88;
+    const real t114 = t112 + t113;
+    const real t115 = V[18] * t98;
+    const real t116 = t114 + t115;
+    const real t117 = V[24] * t108;
+    const real t118 = t116 + t117;
+    const real t119 = e[0] - t118;
+    const real t120 = Rc[0] * t119;
+    const real t121 = V[1] * t68;
+    const real t122 = V[7] * t78;
+    const real t123 = t121 + t122;
+    const real t124 = V[13] * t88;
+    const real t125 = t123 + t124;
+    const real t126 = V[19] * t98;
+    const real t127 = t125 + t126;
+    const real t128 = V[25] * t108;
+    const real t129 = t127 + t128;
+    const real t130 = e[1] - t129;
+    const real t131 = Rc[1] * t130;
+    const real t132 = t120 + t131;
+    const real t133 = V[2] * t68;
+    const real t134 = V[8] * t78;
+    const real t135 = t133 + t134;
+    const real t136 = V[14] * t88;
+    const real t137 = t135 + t136;
+    const real t138 = V[20] * t98;
+    const real t139 = t137 + t138;
+    const real t140 = V[26] * t108;
+    const real t141 = t139 + t140;
+    const real t142 = e[2] - t141;
+    const real t143 = Rc[2] * t142;
+    const real t144 = t132 + t143;
+    e_I[0] += t144;
+    const real t145 = Rc[3] * t119;
+    const real t146 = Rc[4] * t130;
+    const real t147 = t145 + t146;
+    const real t148 = Rc[5] * t142;
+    const real t149 = t147 + t148;
+    e_I[1] += t149;
+    const real t150 = Rc[6] * t119;
+    const real t151 = Rc[7] * t130;
+    const real t152 = t150 + t151;
+    const real t153 = Rc[8] * t142;
+    const real t154 = t152 + t153;
+    e_I[2] += t154;
+    const real t155 = V[3] * t68;
+    const real t156 = V[9] * t78;
+    const real t157 = t155 + t156;
+    const real t158 = V[15] * t88;
+    const real t159 = t157 + t158;
+    const real t160 = V[21] * t98;
+    const real t161 = t159 + t160;
+    const real t162 = V[27] * t108;
+    const real t163 = t161 + t162;
+    const real t164 = e[3] - t163;
+    const real t165 = Rc[0] * t164;
+    const real t166 = V[4] * t68;
+    const real t167 = V[10] * t78;
+    const real t168 = t166 + t167;
+    const real t169 = V[16] * t88;
+    const real t170 = t168 + t169;
+    const real t171 = V[22] * t98;
+    const real t172 = t170 + t171;
+    const real t173 = V[28] * t108;
+    const real t174 = t172 + t173;
+    const real t175 = e[4] - t174;
+    const real t176 = Rc[1] * t175;
+    const real t177 = t165 + t176;
+    const real t178 = V[5] * t68;
+    const real t179 = V[11] * t78;
+    const real t180 = t178 + t179;
+    const real t181 = V[17] * t88;
+    const real t182 = t180 + t181;
+    const real t183 = V[23] * t98;
+    const real t184 = t182 + t183;
+    const real t185 = V[29] * t108;
+    const real t186 = t184 + t185;
+    const real t187 = e[5] - t186;
+    const real t188 = Rc[2] * t187;
+    const real t189 = t177 + t188;
+    const real t190 = Rc[6] * r[1];
+    const real t191 = Rc[3] * r[2];
+    const real t192 = t190 - t191;
+    const real t193 = t119 * t192;
+    const real t194 = Rc[7] * r[1];
+    const real t195 = Rc[4] * r[2];
+    const real t196 = t194 - t195;
+    const real t197 = t130 * t196;
+    const real t198 = t193 + t197;
+    const real t199 = Rc[8] * r[1];
+    const real t200 = Rc[5] * r[2];
+    const real t201 = t199 - t200;
+    const real t202 = t142 * t201;
+    const real t203 = t198 + t202;
+    const real t204 = t189 + t203;
+    e_I[3] += t204;
+    const real t205 = Rc[3] * t164;
+    const real t206 = Rc[4] * t175;
+    const real t207 = t205 + t206;
+    const real t208 = Rc[5] * t187;
+    const real t209 = t207 + t208;
+    const real t210 = Rc[0] * r[2];
+    const real t211 = Rc[6] * r[0];
+    const real t212 = t210 - t211;
+    const real t213 = t119 * t212;
+    const real t214 = Rc[1] * r[2];
+    const real t215 = Rc[7] * r[0];
+    const real t216 = t214 - t215;
+    const real t217 = t130 * t216;
+    const real t218 = t213 + t217;
+    const real t219 = Rc[2] * r[2];
+    const real t220 = Rc[8] * r[0];
+    const real t221 = t219 - t220;
+    const real t222 = t142 * t221;
+    const real t223 = t218 + t222;
+    const real t224 = t209 + t223;
+    e_I[4] += t224;
+    const real t225 = Rc[6] * t164;
+    const real t226 = Rc[7] * t175;
+    const real t227 = t225 + t226;
+    const real t228 = Rc[8] * t187;
+    const real t229 = t227 + t228;
+    const real t230 = Rc[3] * r[0];
+    const real t231 = Rc[0] * r[1];
+    const real t232 = t230 - t231;
+    const real t233 = t119 * t232;
+    const real t234 = Rc[4] * r[0];
+    const real t235 = Rc[1] * r[1];
+    const real t236 = t234 - t235;
+    const real t237 = t130 * t236;
+    const real t238 = t233 + t237;
+    const real t239 = Rc[5] * r[0];
+    const real t240 = Rc[2] * r[1];
+    const real t241 = t239 - t240;
+    const real t242 = t142 * t241;
+    const real t243 = t238 + t242;
+    const real t244 = t229 + t243;
+    e_I[5] += t244;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"V", 30, "", 0, 0},
+    {"inverse", 25, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_push_outputs[] = {
+    {"y", 5, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 5 free speeds that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[5][9] motion along the unknowns
+ * in  gain[5][9] D^-1 times the rows by the motion
+ * in  y[5] D^-1 times what is left of the rows
+ * out x[5] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = gain[9] * t4;
+    const real t145 = gain[10] * t10;
+    const real t146 = t144 + t145;
+    const real t147 = gain[11] * t17;
+    const real t148 = t146 + t147;
+    const real t149 = gain[12] * t28;
+    const real t150 = t148 + t149;
+    const real t151 = gain[13] * t39;
+    const real t152 = t150 + t151;
+    const real t153 = gain[14] * t50;
+    const real t154 = t152 + t153;
+    const real t155 = gain[15] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = gain[16] * t129;
+    const real t158 = t156 + t157;
+    const real t159 = gain[17] * t140;
+    const real t160 = t158 + t159;
+    const real t161 = y[1] - t160;
+    x[1] = t161;
+    const real t162 = gain[18] * t4;
+    const real t163 = gain[19] * t10;
+    const real t164 = t162 + t163;
+    const real t165 = gain[20] * t17;
+    const real t166 = t164 + t165;
+    const real t167 = gain[21] * t28;
+    const real t168 = t166 + t167;
+    const real t169 = gain[22] * t39;
+    const real t170 = t168 + t169;
+    const real t171 = gain[23] * t50;
+    const real t172 = t170 + t171;
+    const real t173 = gain[24] * t117;
+    const real t174 = t172 + t173;
+    const real t175 = gain[25] * t129;
+    const real t176 = t174 + t175;
+    const real t177 = gain[26] * t140;
+    const real t178 = t176 + t177;
+    const real t179 = y[2] - t178;
+    x[2] = t179;
+    const real t180 = gain[27] * t4;
+    const real t181 = gain[28] * t10;
+    const real t182 = t180 + t181;
+    const real t183 = gain[29] * t17;
+    const real t184 = t182 + t183;
+    const real t185 = gain[30] * t28;
+    const real t186 = t184 + t185;
+    const real t187 = gain[31] * t39;
+    const real t188 = t186 + t187;
+    const real t189 = gain[32] * t50;
+    const real t190 = t188 + t189;
+    const real t191 = gain[33] * t117;
+    const real t192 = t190 + t191;
+    const real t193 = gain[34] * t129;
+    const real t194 = t192 + t193;
+    const real t195 = gain[35] * t140;
+    const real t196 = t194 + t195;
+    const real t197 = y[3] - t196;
+    x[3] = t197;
+    const real t198 = gain[36] * t4;
+    const real t199 = gain[37] * t10;
+    const real t200 = t198 + t199;
+    const real t201 = gain[38] * t17;
+    const real t202 = t200 + t201;
+    const real t203 = gain[39] * t28;
+    const real t204 = t202 + t203;
+    const real t205 = gain[40] * t39;
+    const real t206 = t204 + t205;
+    const real t207 = gain[41] * t50;
+    const real t208 = t206 + t207;
+    const real t209 = gain[42] * t117;
+    const real t210 = t208 + t209;
+    const real t211 = gain[43] * t129;
+    const real t212 = t210 + t211;
+    const real t213 = gain[44] * t140;
+    const real t214 = t212 + t213;
+    const real t215 = y[4] - t214;
+    x[4] = t215;
+    const real t216 = B[0] * t143;
+    const real t217 = B[9] * t161;
+    const real t218 = t216 + t217;
+    const real t219 = B[18] * t179;
+    const real t220 = t218 + t219;
+    const real t221 = B[27] * t197;
+    const real t222 = t220 + t221;
+    const real t223 = B[36] * t215;
+    const real t224 = t222 + t223;
+    const real t225 = t4 + t224;
+    z[0] = t225;
+    const real t226 = B[1] * t143;
+    const real t227 = B[10] * t161;
+    const real t228 = t226 + t227;
+    const real t229 = B[19] * t179;
+    const real t230 = t228 + t229;
+    const real t231 = B[28] * t197;
+    const real t232 = t230 + t231;
+    const real t233 = B[37] * t215;
+    const real t234 = t232 + t233;
+    const real t235 = t10 + t234;
+    z[1] = t235;
+    const real t236 = B[2] * t143;
+    const real t237 = B[11] * t161;
+    const real t238 = t236 + t237;
+    const real t239 = B[20] * t179;
+    const real t240 = t238 + t239;
+    const real t241 = B[29] * t197;
+    const real t242 = t240 + t241;
+    const real t243 = B[38] * t215;
+    const real t244 = t242 + t243;
+    const real t245 = t17 + t244;
+    z[2] = t245;
+    const real t246 = B[3] * t143;
+    const real t247 = B[12] * t161;
+    const real t248 = t246 + t247;
+    const real t249 = B[21] * t179;
+    const real t250 = t248 + t249;
+    const real t251 = B[30] * t197;
+    const real t252 = t250 + t251;
+    const real t253 = B[39] * t215;
+    const real t254 = t252 + t253;
+    const real t255 = t28 + t254;
+    z[3] = t255;
+    const real t256 = B[4] * t143;
+    const real t257 = B[13] * t161;
+    const real t258 = t256 + t257;
+    const real t259 = B[22] * t179;
+    const real t260 = t258 + t259;
+    const real t261 = B[31] * t197;
+    const real t262 = t260 + t261;
+    const real t263 = B[40] * t215;
+    const real t264 = t262 + t263;
+    const real t265 = t39 + t264;
+    z[4] = t265;
+    const real t266 = B[5] * t143;
+    const real t267 = B[14] * t161;
+    const real t268 = t266 + t267;
+    const real t269 = B[23] * t179;
+    const real t270 = t268 + t269;
+    const real t271 = B[32] * t197;
+    const real t272 = t270 + t271;
+    const real t273 = B[41] * t215;
+    const real t274 = t272 + t273;
+    const real t275 = t50 + t274;
+    z[5] = t275;
+    const real t276 = B[6] * t143;
+    const real t277 = B[15] * t161;
+    const real t278 = t276 + t277;
+    const real t279 = B[24] * t179;
+    const real t280 = t278 + t279;
+    const real t281 = B[33] * t197;
+    const real t282 = t280 + t281;
+    const real t283 = B[42] * t215;
+    const real t284 = t282 + t283;
+    const real t285 = t117 + t284;
+    z[6] = t285;
+    const real t286 = B[7] * t143;
+    const real t287 = B[16] * t161;
+    const real t288 = t286 + t287;
+    const real t289 = B[25] * t179;
+    const real t290 = t288 + t289;
+    const real t291 = B[34] * t197;
+    const real t292 = t290 + t291;
+    const real t293 = B[43] * t215;
+    const real t294 = t292 + t293;
+    const real t295 = t129 + t294;
+    z[7] = t295;
+    const real t296 = B[8] * t143;
+    const real t297 = B[17] * t161;
+    const real t298 = t296 + t297;
+    const real t299 = B[26] * t179;
+    const real t300 = t298 + t299;
+    const real t301 = B[35] * t197;
+    const real t302 = t300 + t301;
+    const real t303 = B[44] * t215;
+    const real t304 = t302 + t303;
+    const real t305 = t140 + t304;
+    z[8] = t305;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 45, "", 0, 0},
+    {"gain", 45, "", 0, 0},
+    {"y", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_answer_outputs[] = {
+    {"x", 5, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -5522,6 +7002,54 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_rows,
+        .call = mstmm_sweep_generic5_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic5_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_rows_outputs,
+        .ir_hash = "5c5be2878b5213759e229fdc275b8e5be64eaacd2419e4226271acbc2d6f95ce",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_reduce,
+        .call = mstmm_sweep_generic5_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic5_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_reduce_outputs,
+        .ir_hash = "0faed90505aea4646d1481a4b72983eed9362c20d7f497e394d10b242a08b818",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_push,
+        .call = mstmm_sweep_generic5_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic5_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_push_outputs,
+        .ir_hash = "9c0e30a97b02ac29454dda19d7e48952255a9f43696c0b5dca85c90ff4288d48",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_answer,
+        .call = mstmm_sweep_generic5_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic5_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_answer_outputs,
+        .ir_hash = "22d59cb09090d5e07b4219a3add61b2f4954132ffce930892e523bdaf37bc733",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic5_forward_slope,
         .call = mstmm_sweep_generic5_forward_slope_call,
@@ -5551,7 +7079,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "57a366bc5a605a1979ed88788da73ed9de096b838aa1cbd9af99e8f845203cbc",
+    .hash = "8fe7280a6ef07e082b0e43baf006c39bb142e1ba3c7c46cfe1c7332d6a8b98e1",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5561,6 +7089,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic5_kernels,
 };

@@ -40,6 +40,19 @@ int mstmm_sweep_generic6_tangent_column(const real *restrict R, const real *rest
     const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
     const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
     real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one);
+int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S);
+int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -49,6 +62,23 @@ int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+
+#ifndef MSTMM_TWO
+#define MSTMM_TWO
+/* Two numbers at a time, in a register and in an array. */
+typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
+typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_beside(const real *at)
+{
+    return *(const two_free_t *)at;
+}
+
+static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const real *at, int other)
+{
+    return (two_t){at[0], at[other]};
+}
+#endif
 
 /* bias motion behind a hinge with 6 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -5560,6 +5590,1772 @@ static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
     {"d_tau", 6, "", 0, 0},
 };
 
+/* rows of a hinge with 6 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][6] motion subspace of the unknowns
+ * in  B[6][9] motion along the unknowns
+ * in  W[6][6] slopes of the rows, a row a direction
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * out K[6][6] S B, a row a direction
+ * out right[6][9] rows by the motion
+ * out D[6][6] rows by unknowns
+ * out one[6][6] unit matrix
+ */
+int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
+    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
+    real *restrict D, real *restrict one)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = B[0] * v0;
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = B[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = B[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = B[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = B[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = B[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = B[6] * v17;
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = B[7] * v20;
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = B[8] * v23;
+        const two_t v25 = v22 + v24;
+        const two_t v26 = B[9] * v0;
+        const two_t v27 = B[10] * v2;
+        const two_t v28 = v26 + v27;
+        const two_t v29 = B[11] * v5;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = B[12] * v8;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = B[13] * v11;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = B[14] * v14;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = B[15] * v17;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = B[16] * v20;
+        const two_t v40 = v38 + v39;
+        const two_t v41 = B[17] * v23;
+        const two_t v42 = v40 + v41;
+        const two_t v43 = B[18] * v0;
+        const two_t v44 = B[19] * v2;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = B[20] * v5;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = B[21] * v8;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = B[22] * v11;
+        const two_t v51 = v49 + v50;
+        const two_t v52 = B[23] * v14;
+        const two_t v53 = v51 + v52;
+        const two_t v54 = B[24] * v17;
+        const two_t v55 = v53 + v54;
+        const two_t v56 = B[25] * v20;
+        const two_t v57 = v55 + v56;
+        const two_t v58 = B[26] * v23;
+        const two_t v59 = v57 + v58;
+        const two_t v60 = B[27] * v0;
+        const two_t v61 = B[28] * v2;
+        const two_t v62 = v60 + v61;
+        const two_t v63 = B[29] * v5;
+        const two_t v64 = v62 + v63;
+        const two_t v65 = B[30] * v8;
+        const two_t v66 = v64 + v65;
+        const two_t v67 = B[31] * v11;
+        const two_t v68 = v66 + v67;
+        const two_t v69 = B[32] * v14;
+        const two_t v70 = v68 + v69;
+        const two_t v71 = B[33] * v17;
+        const two_t v72 = v70 + v71;
+        const two_t v73 = B[34] * v20;
+        const two_t v74 = v72 + v73;
+        const two_t v75 = B[35] * v23;
+        const two_t v76 = v74 + v75;
+        const two_t v77 = B[36] * v0;
+        const two_t v78 = B[37] * v2;
+        const two_t v79 = v77 + v78;
+        const two_t v80 = B[38] * v5;
+        const two_t v81 = v79 + v80;
+        const two_t v82 = B[39] * v8;
+        const two_t v83 = v81 + v82;
+        const two_t v84 = B[40] * v11;
+        const two_t v85 = v83 + v84;
+        const two_t v86 = B[41] * v14;
+        const two_t v87 = v85 + v86;
+        const two_t v88 = B[42] * v17;
+        const two_t v89 = v87 + v88;
+        const two_t v90 = B[43] * v20;
+        const two_t v91 = v89 + v90;
+        const two_t v92 = B[44] * v23;
+        const two_t v93 = v91 + v92;
+        const two_t v94 = B[45] * v0;
+        const two_t v95 = B[46] * v2;
+        const two_t v96 = v94 + v95;
+        const two_t v97 = B[47] * v5;
+        const two_t v98 = v96 + v97;
+        const two_t v99 = B[48] * v8;
+        const two_t v100 = v98 + v99;
+        const two_t v101 = B[49] * v11;
+        const two_t v102 = v100 + v101;
+        const two_t v103 = B[50] * v14;
+        const two_t v104 = v102 + v103;
+        const two_t v105 = B[51] * v17;
+        const two_t v106 = v104 + v105;
+        const two_t v107 = B[52] * v20;
+        const two_t v108 = v106 + v107;
+        const two_t v109 = B[53] * v23;
+        const two_t v110 = v108 + v109;
+        *(two_free_t *)(K + 0 + k) = v25;
+        *(two_free_t *)(K + 6 + k) = v42;
+        *(two_free_t *)(K + 12 + k) = v59;
+        *(two_free_t *)(K + 18 + k) = v76;
+        *(two_free_t *)(K + 24 + k) = v93;
+        *(two_free_t *)(K + 30 + k) = v110;
+    }
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+        const two_t v1 = H[0] * v0;
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v3 = H[6] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v6 = H[12] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v9 = H[18] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v12 = H[24] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v15 = H[30] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = H[1] * v0;
+        const two_t v18 = H[7] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = H[13] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = H[19] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = H[25] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = H[31] * v14;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = H[2] * v0;
+        const two_t v29 = H[8] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = H[14] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = H[20] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = H[26] * v11;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = H[32] * v14;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = H[3] * v0;
+        const two_t v40 = H[9] * v2;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = H[15] * v5;
+        const two_t v43 = v41 + v42;
+        const two_t v44 = H[21] * v8;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = H[27] * v11;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = H[33] * v14;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = H[4] * v0;
+        const two_t v51 = H[10] * v2;
+        const two_t v52 = v50 + v51;
+        const two_t v53 = H[16] * v5;
+        const two_t v54 = v52 + v53;
+        const two_t v55 = H[22] * v8;
+        const two_t v56 = v54 + v55;
+        const two_t v57 = H[28] * v11;
+        const two_t v58 = v56 + v57;
+        const two_t v59 = H[34] * v14;
+        const two_t v60 = v58 + v59;
+        const two_t v61 = H[5] * v0;
+        const two_t v62 = H[11] * v2;
+        const two_t v63 = v61 + v62;
+        const two_t v64 = H[17] * v5;
+        const two_t v65 = v63 + v64;
+        const two_t v66 = H[23] * v8;
+        const two_t v67 = v65 + v66;
+        const two_t v68 = H[29] * v11;
+        const two_t v69 = v67 + v68;
+        const two_t v70 = H[35] * v14;
+        const two_t v71 = v69 + v70;
+        right[0 + k] = v16[0];
+        right[9 + k] = v27[0];
+        right[18 + k] = v38[0];
+        right[27 + k] = v49[0];
+        right[36 + k] = v60[0];
+        right[45 + k] = v71[0];
+        if (next) {
+            right[1 + k] = v16[1];
+            right[10 + k] = v27[1];
+            right[19 + k] = v38[1];
+            right[28 + k] = v49[1];
+            right[37 + k] = v60[1];
+            right[46 + k] = v71[1];
+        }
+    }
+    const real t1206 = H[0] * K[0];
+    const real t1207 = H[6] * K[1];
+    const real t1208 = t1206 + t1207;
+    const real t1209 = H[12] * K[2];
+    const real t1210 = t1208 + t1209;
+    const real t1211 = H[18] * K[3];
+    const real t1212 = t1210 + t1211;
+    const real t1213 = H[24] * K[4];
+    const real t1214 = t1212 + t1213;
+    const real t1215 = H[30] * K[5];
+    const real t1216 = t1214 + t1215;
+    const real t1217 = W[0] + t1216;
+    D[0] = t1217;
+    const real t1218 = H[0] * K[6];
+    const real t1219 = H[6] * K[7];
+    const real t1220 = t1218 + t1219;
+    const real t1221 = H[12] * K[8];
+    const real t1222 = t1220 + t1221;
+    const real t1223 = H[18] * K[9];
+    const real t1224 = t1222 + t1223;
+    const real t1225 = H[24] * K[10];
+    const real t1226 = t1224 + t1225;
+    const real t1227 = H[30] * K[11];
+    const real t1228 = t1226 + t1227;
+    const real t1229 = W[6] + t1228;
+    D[1] = t1229;
+    const real t1230 = H[0] * K[12];
+    const real t1231 = H[6] * K[13];
+    const real t1232 = t1230 + t1231;
+    const real t1233 = H[12] * K[14];
+    const real t1234 = t1232 + t1233;
+    const real t1235 = H[18] * K[15];
+    const real t1236 = t1234 + t1235;
+    const real t1237 = H[24] * K[16];
+    const real t1238 = t1236 + t1237;
+    const real t1239 = H[30] * K[17];
+    const real t1240 = t1238 + t1239;
+    const real t1241 = W[12] + t1240;
+    D[2] = t1241;
+    const real t1242 = H[0] * K[18];
+    const real t1243 = H[6] * K[19];
+    const real t1244 = t1242 + t1243;
+    const real t1245 = H[12] * K[20];
+    const real t1246 = t1244 + t1245;
+    const real t1247 = H[18] * K[21];
+    const real t1248 = t1246 + t1247;
+    const real t1249 = H[24] * K[22];
+    const real t1250 = t1248 + t1249;
+    const real t1251 = H[30] * K[23];
+    const real t1252 = t1250 + t1251;
+    const real t1253 = W[18] + t1252;
+    D[3] = t1253;
+    const real t1254 = H[0] * K[24];
+    const real t1255 = H[6] * K[25];
+    const real t1256 = t1254 + t1255;
+    const real t1257 = H[12] * K[26];
+    const real t1258 = t1256 + t1257;
+    const real t1259 = H[18] * K[27];
+    const real t1260 = t1258 + t1259;
+    const real t1261 = H[24] * K[28];
+    const real t1262 = t1260 + t1261;
+    const real t1263 = H[30] * K[29];
+    const real t1264 = t1262 + t1263;
+    const real t1265 = W[24] + t1264;
+    D[4] = t1265;
+    const real t1266 = H[0] * K[30];
+    const real t1267 = H[6] * K[31];
+    const real t1268 = t1266 + t1267;
+    const real t1269 = H[12] * K[32];
+    const real t1270 = t1268 + t1269;
+    const real t1271 = H[18] * K[33];
+    const real t1272 = t1270 + t1271;
+    const real t1273 = H[24] * K[34];
+    const real t1274 = t1272 + t1273;
+    const real t1275 = H[30] * K[35];
+    const real t1276 = t1274 + t1275;
+    const real t1277 = W[30] + t1276;
+    D[5] = t1277;
+    const real t1278 = H[1] * K[0];
+    const real t1279 = H[7] * K[1];
+    const real t1280 = t1278 + t1279;
+    const real t1281 = H[13] * K[2];
+    const real t1282 = t1280 + t1281;
+    const real t1283 = H[19] * K[3];
+    const real t1284 = t1282 + t1283;
+    const real t1285 = H[25] * K[4];
+    const real t1286 = t1284 + t1285;
+    const real t1287 = H[31] * K[5];
+    const real t1288 = t1286 + t1287;
+    const real t1289 = W[1] + t1288;
+    D[6] = t1289;
+    const real t1290 = H[1] * K[6];
+    const real t1291 = H[7] * K[7];
+    const real t1292 = t1290 + t1291;
+    const real t1293 = H[13] * K[8];
+    const real t1294 = t1292 + t1293;
+    const real t1295 = H[19] * K[9];
+    const real t1296 = t1294 + t1295;
+    const real t1297 = H[25] * K[10];
+    const real t1298 = t1296 + t1297;
+    const real t1299 = H[31] * K[11];
+    const real t1300 = t1298 + t1299;
+    const real t1301 = W[7] + t1300;
+    D[7] = t1301;
+    const real t1302 = H[1] * K[12];
+    const real t1303 = H[7] * K[13];
+    const real t1304 = t1302 + t1303;
+    const real t1305 = H[13] * K[14];
+    const real t1306 = t1304 + t1305;
+    const real t1307 = H[19] * K[15];
+    const real t1308 = t1306 + t1307;
+    const real t1309 = H[25] * K[16];
+    const real t1310 = t1308 + t1309;
+    const real t1311 = H[31] * K[17];
+    const real t1312 = t1310 + t1311;
+    const real t1313 = W[13] + t1312;
+    D[8] = t1313;
+    const real t1314 = H[1] * K[18];
+    const real t1315 = H[7] * K[19];
+    const real t1316 = t1314 + t1315;
+    const real t1317 = H[13] * K[20];
+    const real t1318 = t1316 + t1317;
+    const real t1319 = H[19] * K[21];
+    const real t1320 = t1318 + t1319;
+    const real t1321 = H[25] * K[22];
+    const real t1322 = t1320 + t1321;
+    const real t1323 = H[31] * K[23];
+    const real t1324 = t1322 + t1323;
+    const real t1325 = W[19] + t1324;
+    D[9] = t1325;
+    const real t1326 = H[1] * K[24];
+    const real t1327 = H[7] * K[25];
+    const real t1328 = t1326 + t1327;
+    const real t1329 = H[13] * K[26];
+    const real t1330 = t1328 + t1329;
+    const real t1331 = H[19] * K[27];
+    const real t1332 = t1330 + t1331;
+    const real t1333 = H[25] * K[28];
+    const real t1334 = t1332 + t1333;
+    const real t1335 = H[31] * K[29];
+    const real t1336 = t1334 + t1335;
+    const real t1337 = W[25] + t1336;
+    D[10] = t1337;
+    const real t1338 = H[1] * K[30];
+    const real t1339 = H[7] * K[31];
+    const real t1340 = t1338 + t1339;
+    const real t1341 = H[13] * K[32];
+    const real t1342 = t1340 + t1341;
+    const real t1343 = H[19] * K[33];
+    const real t1344 = t1342 + t1343;
+    const real t1345 = H[25] * K[34];
+    const real t1346 = t1344 + t1345;
+    const real t1347 = H[31] * K[35];
+    const real t1348 = t1346 + t1347;
+    const real t1349 = W[31] + t1348;
+    D[11] = t1349;
+    const real t1350 = H[2] * K[0];
+    const real t1351 = H[8] * K[1];
+    const real t1352 = t1350 + t1351;
+    const real t1353 = H[14] * K[2];
+    const real t1354 = t1352 + t1353;
+    const real t1355 = H[20] * K[3];
+    const real t1356 = t1354 + t1355;
+    const real t1357 = H[26] * K[4];
+    const real t1358 = t1356 + t1357;
+    const real t1359 = H[32] * K[5];
+    const real t1360 = t1358 + t1359;
+    const real t1361 = W[2] + t1360;
+    D[12] = t1361;
+    const real t1362 = H[2] * K[6];
+    const real t1363 = H[8] * K[7];
+    const real t1364 = t1362 + t1363;
+    const real t1365 = H[14] * K[8];
+    const real t1366 = t1364 + t1365;
+    const real t1367 = H[20] * K[9];
+    const real t1368 = t1366 + t1367;
+    const real t1369 = H[26] * K[10];
+    const real t1370 = t1368 + t1369;
+    const real t1371 = H[32] * K[11];
+    const real t1372 = t1370 + t1371;
+    const real t1373 = W[8] + t1372;
+    D[13] = t1373;
+    const real t1374 = H[2] * K[12];
+    const real t1375 = H[8] * K[13];
+    const real t1376 = t1374 + t1375;
+    const real t1377 = H[14] * K[14];
+    const real t1378 = t1376 + t1377;
+    const real t1379 = H[20] * K[15];
+    const real t1380 = t1378 + t1379;
+    const real t1381 = H[26] * K[16];
+    const real t1382 = t1380 + t1381;
+    const real t1383 = H[32] * K[17];
+    const real t1384 = t1382 + t1383;
+    const real t1385 = W[14] + t1384;
+    D[14] = t1385;
+    const real t1386 = H[2] * K[18];
+    const real t1387 = H[8] * K[19];
+    const real t1388 = t1386 + t1387;
+    const real t1389 = H[14] * K[20];
+    const real t1390 = t1388 + t1389;
+    const real t1391 = H[20] * K[21];
+    const real t1392 = t1390 + t1391;
+    const real t1393 = H[26] * K[22];
+    const real t1394 = t1392 + t1393;
+    const real t1395 = H[32] * K[23];
+    const real t1396 = t1394 + t1395;
+    const real t1397 = W[20] + t1396;
+    D[15] = t1397;
+    const real t1398 = H[2] * K[24];
+    const real t1399 = H[8] * K[25];
+    const real t1400 = t1398 + t1399;
+    const real t1401 = H[14] * K[26];
+    const real t1402 = t1400 + t1401;
+    const real t1403 = H[20] * K[27];
+    const real t1404 = t1402 + t1403;
+    const real t1405 = H[26] * K[28];
+    const real t1406 = t1404 + t1405;
+    const real t1407 = H[32] * K[29];
+    const real t1408 = t1406 + t1407;
+    const real t1409 = W[26] + t1408;
+    D[16] = t1409;
+    const real t1410 = H[2] * K[30];
+    const real t1411 = H[8] * K[31];
+    const real t1412 = t1410 + t1411;
+    const real t1413 = H[14] * K[32];
+    const real t1414 = t1412 + t1413;
+    const real t1415 = H[20] * K[33];
+    const real t1416 = t1414 + t1415;
+    const real t1417 = H[26] * K[34];
+    const real t1418 = t1416 + t1417;
+    const real t1419 = H[32] * K[35];
+    const real t1420 = t1418 + t1419;
+    const real t1421 = W[32] + t1420;
+    D[17] = t1421;
+    const real t1422 = H[3] * K[0];
+    const real t1423 = H[9] * K[1];
+    const real t1424 = t1422 + t1423;
+    const real t1425 = H[15] * K[2];
+    const real t1426 = t1424 + t1425;
+    const real t1427 = H[21] * K[3];
+    const real t1428 = t1426 + t1427;
+    const real t1429 = H[27] * K[4];
+    const real t1430 = t1428 + t1429;
+    const real t1431 = H[33] * K[5];
+    const real t1432 = t1430 + t1431;
+    const real t1433 = W[3] + t1432;
+    D[18] = t1433;
+    const real t1434 = H[3] * K[6];
+    const real t1435 = H[9] * K[7];
+    const real t1436 = t1434 + t1435;
+    const real t1437 = H[15] * K[8];
+    const real t1438 = t1436 + t1437;
+    const real t1439 = H[21] * K[9];
+    const real t1440 = t1438 + t1439;
+    const real t1441 = H[27] * K[10];
+    const real t1442 = t1440 + t1441;
+    const real t1443 = H[33] * K[11];
+    const real t1444 = t1442 + t1443;
+    const real t1445 = W[9] + t1444;
+    D[19] = t1445;
+    const real t1446 = H[3] * K[12];
+    const real t1447 = H[9] * K[13];
+    const real t1448 = t1446 + t1447;
+    const real t1449 = H[15] * K[14];
+    const real t1450 = t1448 + t1449;
+    const real t1451 = H[21] * K[15];
+    const real t1452 = t1450 + t1451;
+    const real t1453 = H[27] * K[16];
+    const real t1454 = t1452 + t1453;
+    const real t1455 = H[33] * K[17];
+    const real t1456 = t1454 + t1455;
+    const real t1457 = W[15] + t1456;
+    D[20] = t1457;
+    const real t1458 = H[3] * K[18];
+    const real t1459 = H[9] * K[19];
+    const real t1460 = t1458 + t1459;
+    const real t1461 = H[15] * K[20];
+    const real t1462 = t1460 + t1461;
+    const real t1463 = H[21] * K[21];
+    const real t1464 = t1462 + t1463;
+    const real t1465 = H[27] * K[22];
+    const real t1466 = t1464 + t1465;
+    const real t1467 = H[33] * K[23];
+    const real t1468 = t1466 + t1467;
+    const real t1469 = W[21] + t1468;
+    D[21] = t1469;
+    const real t1470 = H[3] * K[24];
+    const real t1471 = H[9] * K[25];
+    const real t1472 = t1470 + t1471;
+    const real t1473 = H[15] * K[26];
+    const real t1474 = t1472 + t1473;
+    const real t1475 = H[21] * K[27];
+    const real t1476 = t1474 + t1475;
+    const real t1477 = H[27] * K[28];
+    const real t1478 = t1476 + t1477;
+    const real t1479 = H[33] * K[29];
+    const real t1480 = t1478 + t1479;
+    const real t1481 = W[27] + t1480;
+    D[22] = t1481;
+    const real t1482 = H[3] * K[30];
+    const real t1483 = H[9] * K[31];
+    const real t1484 = t1482 + t1483;
+    const real t1485 = H[15] * K[32];
+    const real t1486 = t1484 + t1485;
+    const real t1487 = H[21] * K[33];
+    const real t1488 = t1486 + t1487;
+    const real t1489 = H[27] * K[34];
+    const real t1490 = t1488 + t1489;
+    const real t1491 = H[33] * K[35];
+    const real t1492 = t1490 + t1491;
+    const real t1493 = W[33] + t1492;
+    D[23] = t1493;
+    const real t1494 = H[4] * K[0];
+    const real t1495 = H[10] * K[1];
+    const real t1496 = t1494 + t1495;
+    const real t1497 = H[16] * K[2];
+    const real t1498 = t1496 + t1497;
+    const real t1499 = H[22] * K[3];
+    const real t1500 = t1498 + t1499;
+    const real t1501 = H[28] * K[4];
+    const real t1502 = t1500 + t1501;
+    const real t1503 = H[34] * K[5];
+    const real t1504 = t1502 + t1503;
+    const real t1505 = W[4] + t1504;
+    D[24] = t1505;
+    const real t1506 = H[4] * K[6];
+    const real t1507 = H[10] * K[7];
+    const real t1508 = t1506 + t1507;
+    const real t1509 = H[16] * K[8];
+    const real t1510 = t1508 + t1509;
+    const real t1511 = H[22] * K[9];
+    const real t1512 = t1510 + t1511;
+    const real t1513 = H[28] * K[10];
+    const real t1514 = t1512 + t1513;
+    const real t1515 = H[34] * K[11];
+    const real t1516 = t1514 + t1515;
+    const real t1517 = W[10] + t1516;
+    D[25] = t1517;
+    const real t1518 = H[4] * K[12];
+    const real t1519 = H[10] * K[13];
+    const real t1520 = t1518 + t1519;
+    const real t1521 = H[16] * K[14];
+    const real t1522 = t1520 + t1521;
+    const real t1523 = H[22] * K[15];
+    const real t1524 = t1522 + t1523;
+    const real t1525 = H[28] * K[16];
+    const real t1526 = t1524 + t1525;
+    const real t1527 = H[34] * K[17];
+    const real t1528 = t1526 + t1527;
+    const real t1529 = W[16] + t1528;
+    D[26] = t1529;
+    const real t1530 = H[4] * K[18];
+    const real t1531 = H[10] * K[19];
+    const real t1532 = t1530 + t1531;
+    const real t1533 = H[16] * K[20];
+    const real t1534 = t1532 + t1533;
+    const real t1535 = H[22] * K[21];
+    const real t1536 = t1534 + t1535;
+    const real t1537 = H[28] * K[22];
+    const real t1538 = t1536 + t1537;
+    const real t1539 = H[34] * K[23];
+    const real t1540 = t1538 + t1539;
+    const real t1541 = W[22] + t1540;
+    D[27] = t1541;
+    const real t1542 = H[4] * K[24];
+    const real t1543 = H[10] * K[25];
+    const real t1544 = t1542 + t1543;
+    const real t1545 = H[16] * K[26];
+    const real t1546 = t1544 + t1545;
+    const real t1547 = H[22] * K[27];
+    const real t1548 = t1546 + t1547;
+    const real t1549 = H[28] * K[28];
+    const real t1550 = t1548 + t1549;
+    const real t1551 = H[34] * K[29];
+    const real t1552 = t1550 + t1551;
+    const real t1553 = W[28] + t1552;
+    D[28] = t1553;
+    const real t1554 = H[4] * K[30];
+    const real t1555 = H[10] * K[31];
+    const real t1556 = t1554 + t1555;
+    const real t1557 = H[16] * K[32];
+    const real t1558 = t1556 + t1557;
+    const real t1559 = H[22] * K[33];
+    const real t1560 = t1558 + t1559;
+    const real t1561 = H[28] * K[34];
+    const real t1562 = t1560 + t1561;
+    const real t1563 = H[34] * K[35];
+    const real t1564 = t1562 + t1563;
+    const real t1565 = W[34] + t1564;
+    D[29] = t1565;
+    const real t1566 = H[5] * K[0];
+    const real t1567 = H[11] * K[1];
+    const real t1568 = t1566 + t1567;
+    const real t1569 = H[17] * K[2];
+    const real t1570 = t1568 + t1569;
+    const real t1571 = H[23] * K[3];
+    const real t1572 = t1570 + t1571;
+    const real t1573 = H[29] * K[4];
+    const real t1574 = t1572 + t1573;
+    const real t1575 = H[35] * K[5];
+    const real t1576 = t1574 + t1575;
+    const real t1577 = W[5] + t1576;
+    D[30] = t1577;
+    const real t1578 = H[5] * K[6];
+    const real t1579 = H[11] * K[7];
+    const real t1580 = t1578 + t1579;
+    const real t1581 = H[17] * K[8];
+    const real t1582 = t1580 + t1581;
+    const real t1583 = H[23] * K[9];
+    const real t1584 = t1582 + t1583;
+    const real t1585 = H[29] * K[10];
+    const real t1586 = t1584 + t1585;
+    const real t1587 = H[35] * K[11];
+    const real t1588 = t1586 + t1587;
+    const real t1589 = W[11] + t1588;
+    D[31] = t1589;
+    const real t1590 = H[5] * K[12];
+    const real t1591 = H[11] * K[13];
+    const real t1592 = t1590 + t1591;
+    const real t1593 = H[17] * K[14];
+    const real t1594 = t1592 + t1593;
+    const real t1595 = H[23] * K[15];
+    const real t1596 = t1594 + t1595;
+    const real t1597 = H[29] * K[16];
+    const real t1598 = t1596 + t1597;
+    const real t1599 = H[35] * K[17];
+    const real t1600 = t1598 + t1599;
+    const real t1601 = W[17] + t1600;
+    D[32] = t1601;
+    const real t1602 = H[5] * K[18];
+    const real t1603 = H[11] * K[19];
+    const real t1604 = t1602 + t1603;
+    const real t1605 = H[17] * K[20];
+    const real t1606 = t1604 + t1605;
+    const real t1607 = H[23] * K[21];
+    const real t1608 = t1606 + t1607;
+    const real t1609 = H[29] * K[22];
+    const real t1610 = t1608 + t1609;
+    const real t1611 = H[35] * K[23];
+    const real t1612 = t1610 + t1611;
+    const real t1613 = W[23] + t1612;
+    D[33] = t1613;
+    const real t1614 = H[5] * K[24];
+    const real t1615 = H[11] * K[25];
+    const real t1616 = t1614 + t1615;
+    const real t1617 = H[17] * K[26];
+    const real t1618 = t1616 + t1617;
+    const real t1619 = H[23] * K[27];
+    const real t1620 = t1618 + t1619;
+    const real t1621 = H[29] * K[28];
+    const real t1622 = t1620 + t1621;
+    const real t1623 = H[35] * K[29];
+    const real t1624 = t1622 + t1623;
+    const real t1625 = W[29] + t1624;
+    D[34] = t1625;
+    const real t1626 = H[5] * K[30];
+    const real t1627 = H[11] * K[31];
+    const real t1628 = t1626 + t1627;
+    const real t1629 = H[17] * K[32];
+    const real t1630 = t1628 + t1629;
+    const real t1631 = H[23] * K[33];
+    const real t1632 = t1630 + t1631;
+    const real t1633 = H[29] * K[34];
+    const real t1634 = t1632 + t1633;
+    const real t1635 = H[35] * K[35];
+    const real t1636 = t1634 + t1635;
+    const real t1637 = W[35] + t1636;
+    D[35] = t1637;
+    one[0] = 1.0;
+    one[1] = 0.0;
+    one[2] = 0.0;
+    one[3] = 0.0;
+    one[4] = 0.0;
+    one[5] = 0.0;
+    one[6] = 0.0;
+    one[7] = 1.0;
+    one[8] = 0.0;
+    one[9] = 0.0;
+    one[10] = 0.0;
+    one[11] = 0.0;
+    one[12] = 0.0;
+    one[13] = 0.0;
+    one[14] = 1.0;
+    one[15] = 0.0;
+    one[16] = 0.0;
+    one[17] = 0.0;
+    one[18] = 0.0;
+    one[19] = 0.0;
+    one[20] = 0.0;
+    one[21] = 1.0;
+    one[22] = 0.0;
+    one[23] = 0.0;
+    one[24] = 0.0;
+    one[25] = 0.0;
+    one[26] = 0.0;
+    one[27] = 0.0;
+    one[28] = 1.0;
+    one[29] = 0.0;
+    one[30] = 0.0;
+    one[31] = 0.0;
+    one[32] = 0.0;
+    one[33] = 0.0;
+    one[34] = 0.0;
+    one[35] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_rows_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_rows_inputs[] = {
+    {"H", 36, "", 0, 0},
+    {"B", 54, "", 0, 0},
+    {"W", 36, "", 0, 0},
+    {"S", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_rows_outputs[] = {
+    {"K", 36, "", 0, 0},
+    {"right", 54, "", 0, 0},
+    {"D", 36, "", 0, 0},
+    {"one", 36, "", 0, 0},
+};
+
+/* S without the unknowns of a hinge with 6 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[6][6] D^-1
+ * in  right[6][9] rows by the motion
+ * in  K[6][6] S B, a row a direction
+ * in  G[6][6] change of the load that is carried
+ * out gain[6][9] D^-1 times the rows by the motion
+ * out V[6][6] K + G, a row a direction
+ * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ */
+int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
+    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
+    real *restrict S)
+{
+    for (int k = 0; k < 9; k += 2) {
+        const int next = k + 1 < 9;
+        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+        const two_t v1 = inverse[0] * v0;
+        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v3 = inverse[1] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v6 = inverse[2] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v9 = inverse[3] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_apart(right + 36 + k, 1 * next);
+        const two_t v12 = inverse[4] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_apart(right + 45 + k, 1 * next);
+        const two_t v15 = inverse[5] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v17 = inverse[6] * v0;
+        const two_t v18 = inverse[7] * v2;
+        const two_t v19 = v17 + v18;
+        const two_t v20 = inverse[8] * v5;
+        const two_t v21 = v19 + v20;
+        const two_t v22 = inverse[9] * v8;
+        const two_t v23 = v21 + v22;
+        const two_t v24 = inverse[10] * v11;
+        const two_t v25 = v23 + v24;
+        const two_t v26 = inverse[11] * v14;
+        const two_t v27 = v25 + v26;
+        const two_t v28 = inverse[12] * v0;
+        const two_t v29 = inverse[13] * v2;
+        const two_t v30 = v28 + v29;
+        const two_t v31 = inverse[14] * v5;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = inverse[15] * v8;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = inverse[16] * v11;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = inverse[17] * v14;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = inverse[18] * v0;
+        const two_t v40 = inverse[19] * v2;
+        const two_t v41 = v39 + v40;
+        const two_t v42 = inverse[20] * v5;
+        const two_t v43 = v41 + v42;
+        const two_t v44 = inverse[21] * v8;
+        const two_t v45 = v43 + v44;
+        const two_t v46 = inverse[22] * v11;
+        const two_t v47 = v45 + v46;
+        const two_t v48 = inverse[23] * v14;
+        const two_t v49 = v47 + v48;
+        const two_t v50 = inverse[24] * v0;
+        const two_t v51 = inverse[25] * v2;
+        const two_t v52 = v50 + v51;
+        const two_t v53 = inverse[26] * v5;
+        const two_t v54 = v52 + v53;
+        const two_t v55 = inverse[27] * v8;
+        const two_t v56 = v54 + v55;
+        const two_t v57 = inverse[28] * v11;
+        const two_t v58 = v56 + v57;
+        const two_t v59 = inverse[29] * v14;
+        const two_t v60 = v58 + v59;
+        const two_t v61 = inverse[30] * v0;
+        const two_t v62 = inverse[31] * v2;
+        const two_t v63 = v61 + v62;
+        const two_t v64 = inverse[32] * v5;
+        const two_t v65 = v63 + v64;
+        const two_t v66 = inverse[33] * v8;
+        const two_t v67 = v65 + v66;
+        const two_t v68 = inverse[34] * v11;
+        const two_t v69 = v67 + v68;
+        const two_t v70 = inverse[35] * v14;
+        const two_t v71 = v69 + v70;
+        gain[0 + k] = v16[0];
+        gain[9 + k] = v27[0];
+        gain[18 + k] = v38[0];
+        gain[27 + k] = v49[0];
+        gain[36 + k] = v60[0];
+        gain[45 + k] = v71[0];
+        if (next) {
+            gain[1 + k] = v16[1];
+            gain[10 + k] = v27[1];
+            gain[19 + k] = v38[1];
+            gain[28 + k] = v49[1];
+            gain[37 + k] = v60[1];
+            gain[46 + k] = v71[1];
+        }
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(K + 0 + k);
+        const two_t v1 = mstmm_beside(G + 0 + k);
+        const two_t v2 = v0 + v1;
+        const two_t v3 = mstmm_beside(K + 6 + k);
+        const two_t v4 = mstmm_beside(G + 6 + k);
+        const two_t v5 = v3 + v4;
+        const two_t v6 = mstmm_beside(K + 12 + k);
+        const two_t v7 = mstmm_beside(G + 12 + k);
+        const two_t v8 = v6 + v7;
+        const two_t v9 = mstmm_beside(K + 18 + k);
+        const two_t v10 = mstmm_beside(G + 18 + k);
+        const two_t v11 = v9 + v10;
+        const two_t v12 = mstmm_beside(K + 24 + k);
+        const two_t v13 = mstmm_beside(G + 24 + k);
+        const two_t v14 = v12 + v13;
+        const two_t v15 = mstmm_beside(K + 30 + k);
+        const two_t v16 = mstmm_beside(G + 30 + k);
+        const two_t v17 = v15 + v16;
+        *(two_free_t *)(V + 0 + k) = v2;
+        *(two_free_t *)(V + 6 + k) = v5;
+        *(two_free_t *)(V + 12 + k) = v8;
+        *(two_free_t *)(V + 18 + k) = v11;
+        *(two_free_t *)(V + 24 + k) = v14;
+        *(two_free_t *)(V + 30 + k) = v17;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(V + 0 + k);
+        const two_t v1 = gain[0] * v0;
+        const two_t v2 = mstmm_beside(V + 6 + k);
+        const two_t v3 = gain[9] * v2;
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(V + 12 + k);
+        const two_t v6 = gain[18] * v5;
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(V + 18 + k);
+        const two_t v9 = gain[27] * v8;
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(V + 24 + k);
+        const two_t v12 = gain[36] * v11;
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(V + 30 + k);
+        const two_t v15 = gain[45] * v14;
+        const two_t v16 = v13 + v15;
+        const two_t v18 = gain[1] * v0;
+        const two_t v19 = gain[10] * v2;
+        const two_t v20 = v18 + v19;
+        const two_t v21 = gain[19] * v5;
+        const two_t v22 = v20 + v21;
+        const two_t v23 = gain[28] * v8;
+        const two_t v24 = v22 + v23;
+        const two_t v25 = gain[37] * v11;
+        const two_t v26 = v24 + v25;
+        const two_t v27 = gain[46] * v14;
+        const two_t v28 = v26 + v27;
+        const two_t v30 = gain[2] * v0;
+        const two_t v31 = gain[11] * v2;
+        const two_t v32 = v30 + v31;
+        const two_t v33 = gain[20] * v5;
+        const two_t v34 = v32 + v33;
+        const two_t v35 = gain[29] * v8;
+        const two_t v36 = v34 + v35;
+        const two_t v37 = gain[38] * v11;
+        const two_t v38 = v36 + v37;
+        const two_t v39 = gain[47] * v14;
+        const two_t v40 = v38 + v39;
+        const two_t v42 = gain[3] * v0;
+        const two_t v43 = gain[12] * v2;
+        const two_t v44 = v42 + v43;
+        const two_t v45 = gain[21] * v5;
+        const two_t v46 = v44 + v45;
+        const two_t v47 = gain[30] * v8;
+        const two_t v48 = v46 + v47;
+        const two_t v49 = gain[39] * v11;
+        const two_t v50 = v48 + v49;
+        const two_t v51 = gain[48] * v14;
+        const two_t v52 = v50 + v51;
+        const two_t v54 = gain[4] * v0;
+        const two_t v55 = gain[13] * v2;
+        const two_t v56 = v54 + v55;
+        const two_t v57 = gain[22] * v5;
+        const two_t v58 = v56 + v57;
+        const two_t v59 = gain[31] * v8;
+        const two_t v60 = v58 + v59;
+        const two_t v61 = gain[40] * v11;
+        const two_t v62 = v60 + v61;
+        const two_t v63 = gain[49] * v14;
+        const two_t v64 = v62 + v63;
+        const two_t v66 = gain[5] * v0;
+        const two_t v67 = gain[14] * v2;
+        const two_t v68 = v66 + v67;
+        const two_t v69 = gain[23] * v5;
+        const two_t v70 = v68 + v69;
+        const two_t v71 = gain[32] * v8;
+        const two_t v72 = v70 + v71;
+        const two_t v73 = gain[41] * v11;
+        const two_t v74 = v72 + v73;
+        const two_t v75 = gain[50] * v14;
+        const two_t v76 = v74 + v75;
+        const two_t v78 = gain[6] * v0;
+        const two_t v79 = gain[15] * v2;
+        const two_t v80 = v78 + v79;
+        const two_t v81 = gain[24] * v5;
+        const two_t v82 = v80 + v81;
+        const two_t v83 = gain[33] * v8;
+        const two_t v84 = v82 + v83;
+        const two_t v85 = gain[42] * v11;
+        const two_t v86 = v84 + v85;
+        const two_t v87 = gain[51] * v14;
+        const two_t v88 = v86 + v87;
+        const two_t v90 = gain[7] * v0;
+        const two_t v91 = gain[16] * v2;
+        const two_t v92 = v90 + v91;
+        const two_t v93 = gain[25] * v5;
+        const two_t v94 = v92 + v93;
+        const two_t v95 = gain[34] * v8;
+        const two_t v96 = v94 + v95;
+        const two_t v97 = gain[43] * v11;
+        const two_t v98 = v96 + v97;
+        const two_t v99 = gain[52] * v14;
+        const two_t v100 = v98 + v99;
+        const two_t v102 = gain[8] * v0;
+        const two_t v103 = gain[17] * v2;
+        const two_t v104 = v102 + v103;
+        const two_t v105 = gain[26] * v5;
+        const two_t v106 = v104 + v105;
+        const two_t v107 = gain[35] * v8;
+        const two_t v108 = v106 + v107;
+        const two_t v109 = gain[44] * v11;
+        const two_t v110 = v108 + v109;
+        const two_t v111 = gain[53] * v14;
+        const two_t v112 = v110 + v111;
+        *(two_free_t *)(S + 0 + k) -= v16;
+        *(two_free_t *)(S + 6 + k) -= v28;
+        *(two_free_t *)(S + 12 + k) -= v40;
+        *(two_free_t *)(S + 18 + k) -= v52;
+        *(two_free_t *)(S + 24 + k) -= v64;
+        *(two_free_t *)(S + 30 + k) -= v76;
+        *(two_free_t *)(S + 36 + k) -= v88;
+        *(two_free_t *)(S + 42 + k) -= v100;
+        *(two_free_t *)(S + 48 + k) -= v112;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_reduce_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_reduce_inputs[] = {
+    {"inverse", 36, "", 0, 0},
+    {"right", 54, "", 0, 0},
+    {"K", 36, "", 0, 0},
+    {"G", 36, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_reduce_outputs[] = {
+    {"gain", 54, "", 0, 0},
+    {"V", 36, "", 0, 0},
+    {"S", 54, "", 1, 0},
+};
+
+/* a right-hand side carried across a hinge with 6 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][6] motion subspace of the unknowns
+ * in  V[6][6] K + G, a row a direction
+ * in  inverse[6][6] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[6] load of the rows
+ * out y[6] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[6] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[12] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[18] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[24] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[30] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[7] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[13] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[19] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[25] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[31] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[8] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[14] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[20] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[26] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[32] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = H[3] * e[0];
+    const real t42 = H[9] * e[1];
+    const real t43 = t41 + t42;
+    const real t44 = H[15] * e[2];
+    const real t45 = t43 + t44;
+    const real t46 = H[21] * e[3];
+    const real t47 = t45 + t46;
+    const real t48 = H[27] * e[4];
+    const real t49 = t47 + t48;
+    const real t50 = H[33] * e[5];
+    const real t51 = t49 + t50;
+    const real t52 = e_f[3] + t51;
+    const real t53 = inverse[3] * t52;
+    const real t54 = t40 + t53;
+    const real t55 = H[4] * e[0];
+    const real t56 = H[10] * e[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[16] * e[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[22] * e[3];
+    const real t61 = t59 + t60;
+    const real t62 = H[28] * e[4];
+    const real t63 = t61 + t62;
+    const real t64 = H[34] * e[5];
+    const real t65 = t63 + t64;
+    const real t66 = e_f[4] + t65;
+    const real t67 = inverse[4] * t66;
+    const real t68 = t54 + t67;
+    const real t69 = H[5] * e[0];
+    const real t70 = H[11] * e[1];
+    const real t71 = t69 + t70;
+    const real t72 = H[17] * e[2];
+    const real t73 = t71 + t72;
+    const real t74 = H[23] * e[3];
+    const real t75 = t73 + t74;
+    const real t76 = H[29] * e[4];
+    const real t77 = t75 + t76;
+    const real t78 = H[35] * e[5];
+    const real t79 = t77 + t78;
+    const real t80 = e_f[5] + t79;
+    const real t81 = inverse[5] * t80;
+    const real t82 = t68 + t81;
+    const real t83 = -t82;
+    y[0] = t83;
+    const real t84 = inverse[6] * t11;
+    const real t85 = inverse[7] * t24;
+    const real t86 = t84 + t85;
+    const real t87 = inverse[8] * t38;
+    const real t88 = t86 + t87;
+    const real t89 = inverse[9] * t52;
+    const real t90 = t88 + t89;
+    const real t91 = inverse[10] * t66;
+    const real t92 = t90 + t91;
+    const real t93 = inverse[11] * t80;
+    const real t94 = t92 + t93;
+    const real t95 = -t94;
+    y[1] = t95;
+    const real t96 = inverse[12] * t11;
+    const real t97 = inverse[13] * t24;
+    const real t98 = t96 + t97;
+    const real t99 = inverse[14] * t38;
+    const real t100 = t98 + t99;
+    const real t101 = inverse[15] * t52;
+    const real t102 = t100 + t101;
+    const real t103 = inverse[16] * t66;
+    const real t104 = t102 + t103;
+    const real t105 = inverse[17] * t80;
+    const real t106 = t104 + t105;
+    const real t107 = -t106;
+    y[2] = t107;
+    const real t108 = inverse[18] * t11;
+    const real t109 = inverse[19] * t24;
+    const real t110 = t108 + t109;
+    const real t111 = inverse[20] * t38;
+    const real t112 = t110 + t111;
+    const real t113 = inverse[21] * t52;
+    const real t114 = t112 + t113;
+    const real t115 = inverse[22] * t66;
+    const real t116 = t114 + t115;
+    const real t117 = inverse[23] * t80;
+    const real t118 = t116 + t117;
+    const real t119 = -t118;
+    y[3] = t119;
+    const real t120 = inverse[24] * t11;
+    const real t121 = inverse[25] * t24;
+    const real t122 = t120 + t121;
+    const real t123 = inverse[26] * t38;
+    const real t124 = t122 + t123;
+    const real t125 = inverse[27] * t52;
+    const real t126 = t124 + t125;
+    const real t127 = inverse[28] * t66;
+    const real t128 = t126 + t127;
+    const real t129 = inverse[29] * t80;
+    const real t130 = t128 + t129;
+    const real t131 = -t130;
+    y[4] = t131;
+    const real t132 = inverse[30] * t11;
+    const real t133 = inverse[31] * t24;
+    const real t134 = t132 + t133;
+    const real t135 = inverse[32] * t38;
+    const real t136 = t134 + t135;
+    const real t137 = inverse[33] * t52;
+    const real t138 = t136 + t137;
+    const real t139 = inverse[34] * t66;
+    const real t140 = t138 + t139;
+    const real t141 = inverse[35] * t80;
+    const real t142 = t140 + t141;
+    const real t143 = -t142;
+    y[5] = t143;
+    const real t144 = V[0] * t82;
+    const real t145 = V[6] * t94;
+    const real t146 = t144 + t145;
+    const real t147 = V[12] * t106;
+    const real t148 = t146 + t147;
+    const real t149 = V[18] * t118;
+    const real t150 = t148 + t149;
+    const real t151 = V[24] * t130;
+    const real t152 = t150 + t151;
+    const real t153 = V[30] * t142;
+    const real t154 = t152 + t153;
+    const real t155 = e[0] - t154;
+    const real t156 = Rc[0] * t155;
+    const real t157 = V[1] * t82;
+    const real t158 = V[7] * t94;
+    const real t159 = t157 + t158;
+    const real t160 = V[13] * t106;
+    const real t161 = t159 + t160;
+    const real t162 = V[19] * t118;
+    const real t163 = t161 + t162;
+    const real t164 = V[25] * t130;
+    const real t165 = t163 + t164;
+    const real t166 = V[31] * t142;
+    const real t167 = t165 + t166;
+    const real t168 = e[1] - t167;
+    const real t169 = Rc[1] * t168;
+    const real t170 = t156 + t169;
+    const real t171 = V[2] * t82;
+    const real t172 = V[8] * t94;
+    const real t173 = t171 + t172;
+    const real t174 = V[14] * t106;
+    const real t175 = t173 + t174;
+    const real t176 = V[20] * t118;
+    const real t177 = t175 + t176;
+    const real t178 = V[26] * t130;
+    const real t179 = t177 + t178;
+    const real t180 = V[32] * t142;
+    const real t181 = t179 + t180;
+    const real t182 = e[2] - t181;
+    const real t183 = Rc[2] * t182;
+    const real t184 = t170 + t183;
+    e_I[0] += t184;
+    const real t185 = Rc[3] * t155;
+    const real t186 = Rc[4] * t168;
+    const real t187 = t185 + t186;
+    const real t188 = Rc[5] * t182;
+    const real t189 = t187 + t188;
+    e_I[1] += t189;
+    const real t190 = Rc[6] * t155;
+    const real t191 = Rc[7] * t168;
+    const real t192 = t190 + t191;
+    const real t193 = Rc[8] * t182;
+    const real t194 = t192 + t193;
+    e_I[2] += t194;
+    const real t195 = V[3] * t82;
+    const real t196 = V[9] * t94;
+    const real t197 = t195 + t196;
+    const real t198 = V[15] * t106;
+    const real t199 = t197 + t198;
+    const real t200 = V[21] * t118;
+    const real t201 = t199 + t200;
+    const real t202 = V[27] * t130;
+    const real t203 = t201 + t202;
+    const real t204 = V[33] * t142;
+    const real t205 = t203 + t204;
+    const real t206 = e[3] - t205;
+    const real t207 = Rc[0] * t206;
+    const real t208 = V[4] * t82;
+    const real t209 = V[10] * t94;
+    const real t210 = t208 + t209;
+    const real t211 = V[16] * t106;
+    const real t212 = t210 + t211;
+    const real t213 = V[22] * t118;
+    const real t214 = t212 + t213;
+    const real t215 = V[28] * t130;
+    const real t216 = t214 + t215;
+    const real t217 = V[34] * t142;
+    const real t218 = t216 + t217;
+    const real t219 = e[4] - t218;
+    const real t220 = Rc[1] * t219;
+    const real t221 = t207 + t220;
+    const real t222 = V[5] * t82;
+    const real t223 = V[11] * t94;
+    const real t224 = t222 + t223;
+    const real t225 = V[17] * t106;
+    const real t226 = t224 + t225;
+    const real t227 = V[23] * t118;
+    const real t228 = t226 + t227;
+    const real t229 = V[29] * t130;
+    const real t230 = t228 + t229;
+    const real t231 = V[35] * t142;
+    const real t232 = t230 + t231;
+    const real t233 = e[5] - t232;
+    const real t234 = Rc[2] * t233;
+    const real t235 = t221 + t234;
+    const real t236 = Rc[6] * r[1];
+    const real t237 = Rc[3] * r[2];
+    const real t238 = t236 - t237;
+    const real t239 = t155 * t238;
+    const real t240 = Rc[7] * r[1];
+    const real t241 = Rc[4] * r[2];
+    const real t242 = t240 - t241;
+    const real t243 = t168 * t242;
+    const real t244 = t239 + t243;
+    const real t245 = Rc[8] * r[1];
+    const real t246 = Rc[5] * r[2];
+    const real t247 = t245 - t246;
+    const real t248 = t182 * t247;
+    const real t249 = t244 + t248;
+    const real t250 = t235 + t249;
+    e_I[3] += t250;
+    const real t251 = Rc[3] * t206;
+    const real t252 = Rc[4] * t219;
+    const real t253 = t251 + t252;
+    const real t254 = Rc[5] * t233;
+    const real t255 = t253 + t254;
+    const real t256 = Rc[0] * r[2];
+    const real t257 = Rc[6] * r[0];
+    const real t258 = t256 - t257;
+    const real t259 = t155 * t258;
+    const real t260 = Rc[1] * r[2];
+    const real t261 = Rc[7] * r[0];
+    const real t262 = t260 - t261;
+    const real t263 = t168 * t262;
+    const real t264 = t259 + t263;
+    const real t265 = Rc[2] * r[2];
+    const real t266 = Rc[8] * r[0];
+    const real t267 = t265 - t266;
+    const real t268 = t182 * t267;
+    const real t269 = t264 + t268;
+    const real t270 = t255 + t269;
+    e_I[4] += t270;
+    const real t271 = Rc[6] * t206;
+    const real t272 = Rc[7] * t219;
+    const real t273 = t271 + t272;
+    const real t274 = Rc[8] * t233;
+    const real t275 = t273 + t274;
+    const real t276 = Rc[3] * r[0];
+    const real t277 = Rc[0] * r[1];
+    const real t278 = t276 - t277;
+    const real t279 = t155 * t278;
+    const real t280 = Rc[4] * r[0];
+    const real t281 = Rc[1] * r[1];
+    const real t282 = t280 - t281;
+    const real t283 = t168 * t282;
+    const real t284 = t279 + t283;
+    const real t285 = Rc[5] * r[0];
+    const real t286 = Rc[2] * r[1];
+    const real t287 = t285 - t286;
+    const real t288 = t182 * t287;
+    const real t289 = t284 + t288;
+    const real t290 = t275 + t289;
+    e_I[5] += t290;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_push_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_push_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 36, "", 0, 0},
+    {"V", 36, "", 0, 0},
+    {"inverse", 36, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_push_outputs[] = {
+    {"y", 6, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 6 free speeds that answer a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[6][9] motion along the unknowns
+ * in  gain[6][9] D^-1 times the rows by the motion
+ * in  y[6] D^-1 times what is left of the rows
+ * out x[6] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = gain[0] * t4;
+    const real t6 = Rc[1] * z_I[0];
+    const real t7 = Rc[4] * z_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[7] * z_I[2];
+    const real t10 = t8 + t9;
+    const real t11 = gain[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[2] * z_I[0];
+    const real t14 = Rc[5] * z_I[1];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[8] * z_I[2];
+    const real t17 = t15 + t16;
+    const real t18 = gain[2] * t17;
+    const real t19 = t12 + t18;
+    const real t20 = w[2] * t10;
+    const real t21 = w[1] * t17;
+    const real t22 = t20 - t21;
+    const real t23 = Rc[0] * z_I[3];
+    const real t24 = Rc[3] * z_I[4];
+    const real t25 = t23 + t24;
+    const real t26 = Rc[6] * z_I[5];
+    const real t27 = t25 + t26;
+    const real t28 = t22 + t27;
+    const real t29 = gain[3] * t28;
+    const real t30 = t19 + t29;
+    const real t31 = w[0] * t17;
+    const real t32 = w[2] * t4;
+    const real t33 = t31 - t32;
+    const real t34 = Rc[1] * z_I[3];
+    const real t35 = Rc[4] * z_I[4];
+    const real t36 = t34 + t35;
+    const real t37 = Rc[7] * z_I[5];
+    const real t38 = t36 + t37;
+    const real t39 = t33 + t38;
+    const real t40 = gain[4] * t39;
+    const real t41 = t30 + t40;
+    const real t42 = w[1] * t4;
+    const real t43 = w[0] * t10;
+    const real t44 = t42 - t43;
+    const real t45 = Rc[2] * z_I[3];
+    const real t46 = Rc[5] * z_I[4];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[8] * z_I[5];
+    const real t49 = t47 + t48;
+    const real t50 = t44 + t49;
+    const real t51 = gain[5] * t50;
+    const real t52 = t41 + t51;
+    const real t53 = v[2] * 2.0;
+    const real t54 = t10 * t53;
+    const real t55 = v[1] * 2.0;
+    const real t56 = t17 * t55;
+    const real t57 = t54 - t56;
+    const real t58 = r[2] * z_I[4];
+    const real t59 = r[1] * w_I[1];
+    const real t60 = r[2] * w_I[2];
+    const real t61 = t59 + t60;
+    const real t62 = z_I[0] * t61;
+    const real t63 = r[0] * w_I[1];
+    const real t64 = 2.0 * t63;
+    const real t65 = r[1] * w_I[0];
+    const real t66 = t64 - t65;
+    const real t67 = z_I[1] * t66;
+    const real t68 = r[0] * w_I[2];
+    const real t69 = 2.0 * t68;
+    const real t70 = r[2] * w_I[0];
+    const real t71 = t69 - t70;
+    const real t72 = z_I[2] * t71;
+    const real t73 = t67 + t72;
+    const real t74 = t62 - t73;
+    const real t75 = r[1] * z_I[5];
+    const real t76 = t74 - t75;
+    const real t77 = t58 + t76;
+    const real t78 = z_I[6] + t77;
+    const real t79 = Rc[0] * t78;
+    const real t80 = r[0] * z_I[5];
+    const real t81 = r[0] * w_I[0];
+    const real t82 = t60 + t81;
+    const real t83 = z_I[1] * t82;
+    const real t84 = 2.0 * t65;
+    const real t85 = t84 - t63;
+    const real t86 = z_I[0] * t85;
+    const real t87 = t83 - t86;
+    const real t88 = r[1] * w_I[2];
+    const real t89 = 2.0 * t88;
+    const real t90 = r[2] * w_I[1];
+    const real t91 = t89 - t90;
+    const real t92 = z_I[2] * t91;
+    const real t93 = t87 - t92;
+    const real t94 = t80 + t93;
+    const real t95 = r[2] * z_I[3];
+    const real t96 = t94 - t95;
+    const real t97 = z_I[7] + t96;
+    const real t98 = Rc[3] * t97;
+    const real t99 = t79 + t98;
+    const real t100 = r[1] * z_I[3];
+    const real t101 = t59 + t81;
+    const real t102 = z_I[2] * t101;
+    const real t103 = 2.0 * t70;
+    const real t104 = t103 - t68;
+    const real t105 = z_I[0] * t104;
+    const real t106 = t102 - t105;
+    const real t107 = 2.0 * t90;
+    const real t108 = t107 - t88;
+    const real t109 = z_I[1] * t108;
+    const real t110 = t106 - t109;
+    const real t111 = r[0] * z_I[4];
+    const real t112 = t110 - t111;
+    const real t113 = t100 + t112;
+    const real t114 = z_I[8] + t113;
+    const real t115 = Rc[6] * t114;
+    const real t116 = t99 + t115;
+    const real t117 = t57 + t116;
+    const real t118 = gain[6] * t117;
+    const real t119 = t52 + t118;
+    const real t120 = v[0] * 2.0;
+    const real t121 = t17 * t120;
+    const real t122 = t4 * t53;
+    const real t123 = t121 - t122;
+    const real t124 = Rc[1] * t78;
+    const real t125 = Rc[4] * t97;
+    const real t126 = t124 + t125;
+    const real t127 = Rc[7] * t114;
+    const real t128 = t126 + t127;
+    const real t129 = t123 + t128;
+    const real t130 = gain[7] * t129;
+    const real t131 = t119 + t130;
+    const real t132 = t4 * t55;
+    const real t133 = t10 * t120;
+    const real t134 = t132 - t133;
+    const real t135 = Rc[2] * t78;
+    const real t136 = Rc[5] * t97;
+    const real t137 = t135 + t136;
+    const real t138 = Rc[8] * t114;
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = gain[8] * t140;
+    const real t142 = t131 + t141;
+    const real t143 = y[0] - t142;
+    x[0] = t143;
+    const real t144 = gain[9] * t4;
+    const real t145 = gain[10] * t10;
+    const real t146 = t144 + t145;
+    const real t147 = gain[11] * t17;
+    const real t148 = t146 + t147;
+    const real t149 = gain[12] * t28;
+    const real t150 = t148 + t149;
+    const real t151 = gain[13] * t39;
+    const real t152 = t150 + t151;
+    const real t153 = gain[14] * t50;
+    const real t154 = t152 + t153;
+    const real t155 = gain[15] * t117;
+    const real t156 = t154 + t155;
+    const real t157 = gain[16] * t129;
+    const real t158 = t156 + t157;
+    const real t159 = gain[17] * t140;
+    const real t160 = t158 + t159;
+    const real t161 = y[1] - t160;
+    x[1] = t161;
+    const real t162 = gain[18] * t4;
+    const real t163 = gain[19] * t10;
+    const real t164 = t162 + t163;
+    const real t165 = gain[20] * t17;
+    const real t166 = t164 + t165;
+    const real t167 = gain[21] * t28;
+    const real t168 = t166 + t167;
+    const real t169 = gain[22] * t39;
+    const real t170 = t168 + t169;
+    const real t171 = gain[23] * t50;
+    const real t172 = t170 + t171;
+    const real t173 = gain[24] * t117;
+    const real t174 = t172 + t173;
+    const real t175 = gain[25] * t129;
+    const real t176 = t174 + t175;
+    const real t177 = gain[26] * t140;
+    const real t178 = t176 + t177;
+    const real t179 = y[2] - t178;
+    x[2] = t179;
+    const real t180 = gain[27] * t4;
+    const real t181 = gain[28] * t10;
+    const real t182 = t180 + t181;
+    const real t183 = gain[29] * t17;
+    const real t184 = t182 + t183;
+    const real t185 = gain[30] * t28;
+    const real t186 = t184 + t185;
+    const real t187 = gain[31] * t39;
+    const real t188 = t186 + t187;
+    const real t189 = gain[32] * t50;
+    const real t190 = t188 + t189;
+    const real t191 = gain[33] * t117;
+    const real t192 = t190 + t191;
+    const real t193 = gain[34] * t129;
+    const real t194 = t192 + t193;
+    const real t195 = gain[35] * t140;
+    const real t196 = t194 + t195;
+    const real t197 = y[3] - t196;
+    x[3] = t197;
+    const real t198 = gain[36] * t4;
+    const real t199 = gain[37] * t10;
+    const real t200 = t198 + t199;
+    const real t201 = gain[38] * t17;
+    const real t202 = t200 + t201;
+    const real t203 = gain[39] * t28;
+    const real t204 = t202 + t203;
+    const real t205 = gain[40] * t39;
+    const real t206 = t204 + t205;
+    const real t207 = gain[41] * t50;
+    const real t208 = t206 + t207;
+    const real t209 = gain[42] * t117;
+    const real t210 = t208 + t209;
+    const real t211 = gain[43] * t129;
+    const real t212 = t210 + t211;
+    const real t213 = gain[44] * t140;
+    const real t214 = t212 + t213;
+    const real t215 = y[4] - t214;
+    x[4] = t215;
+    const real t216 = gain[45] * t4;
+    const real t217 = gain[46] * t10;
+    const real t218 = t216 + t217;
+    const real t219 = gain[47] * t17;
+    const real t220 = t218 + t219;
+    const real t221 = gain[48] * t28;
+    const real t222 = t220 + t221;
+    const real t223 = gain[49] * t39;
+    const real t224 = t222 + t223;
+    const real t225 = gain[50] * t50;
+    const real t226 = t224 + t225;
+    const real t227 = gain[51] * t117;
+    const real t228 = t226 + t227;
+    const real t229 = gain[52] * t129;
+    const real t230 = t228 + t229;
+    const real t231 = gain[53] * t140;
+    const real t232 = t230 + t231;
+    const real t233 = y[5] - t232;
+    x[5] = t233;
+    const real t234 = B[0] * t143;
+    const real t235 = B[9] * t161;
+    const real t236 = t234 + t235;
+    const real t237 = B[18] * t179;
+    const real t238 = t236 + t237;
+    const real t239 = B[27] * t197;
+    const real t240 = t238 + t239;
+    const real t241 = B[36] * t215;
+    const real t242 = t240 + t241;
+    const real t243 = B[45] * t233;
+    const real t244 = t242 + t243;
+    const real t245 = t4 + t244;
+    z[0] = t245;
+    const real t246 = B[1] * t143;
+    const real t247 = B[10] * t161;
+    const real t248 = t246 + t247;
+    const real t249 = B[19] * t179;
+    const real t250 = t248 + t249;
+    const real t251 = B[28] * t197;
+    const real t252 = t250 + t251;
+    const real t253 = B[37] * t215;
+    const real t254 = t252 + t253;
+    const real t255 = B[46] * t233;
+    const real t256 = t254 + t255;
+    const real t257 = t10 + t256;
+    z[1] = t257;
+    const real t258 = B[2] * t143;
+    const real t259 = B[11] * t161;
+    const real t260 = t258 + t259;
+    const real t261 = B[20] * t179;
+    const real t262 = t260 + t261;
+    const real t263 = B[29] * t197;
+    const real t264 = t262 + t263;
+    const real t265 = B[38] * t215;
+    const real t266 = t264 + t265;
+    const real t267 = B[47] * t233;
+    const real t268 = t266 + t267;
+    const real t269 = t17 + t268;
+    z[2] = t269;
+    const real t270 = B[3] * t143;
+    const real t271 = B[12] * t161;
+    const real t272 = t270 + t271;
+    const real t273 = B[21] * t179;
+    const real t274 = t272 + t273;
+    const real t275 = B[30] * t197;
+    const real t276 = t274 + t275;
+    const real t277 = B[39] * t215;
+    const real t278 = t276 + t277;
+    const real t279 = B[48] * t233;
+    const real t280 = t278 + t279;
+    const real t281 = t28 + t280;
+    z[3] = t281;
+    const real t282 = B[4] * t143;
+    const real t283 = B[13] * t161;
+    const real t284 = t282 + t283;
+    const real t285 = B[22] * t179;
+    const real t286 = t284 + t285;
+    const real t287 = B[31] * t197;
+    const real t288 = t286 + t287;
+    const real t289 = B[40] * t215;
+    const real t290 = t288 + t289;
+    const real t291 = B[49] * t233;
+    const real t292 = t290 + t291;
+    const real t293 = t39 + t292;
+    z[4] = t293;
+    const real t294 = B[5] * t143;
+    const real t295 = B[14] * t161;
+    const real t296 = t294 + t295;
+    const real t297 = B[23] * t179;
+    const real t298 = t296 + t297;
+    const real t299 = B[32] * t197;
+    const real t300 = t298 + t299;
+    const real t301 = B[41] * t215;
+    const real t302 = t300 + t301;
+    const real t303 = B[50] * t233;
+    const real t304 = t302 + t303;
+    const real t305 = t50 + t304;
+    z[5] = t305;
+    const real t306 = B[6] * t143;
+    const real t307 = B[15] * t161;
+    const real t308 = t306 + t307;
+    const real t309 = B[24] * t179;
+    const real t310 = t308 + t309;
+    const real t311 = B[33] * t197;
+    const real t312 = t310 + t311;
+    const real t313 = B[42] * t215;
+    const real t314 = t312 + t313;
+    const real t315 = B[51] * t233;
+    const real t316 = t314 + t315;
+    const real t317 = t117 + t316;
+    z[6] = t317;
+    const real t318 = B[7] * t143;
+    const real t319 = B[16] * t161;
+    const real t320 = t318 + t319;
+    const real t321 = B[25] * t179;
+    const real t322 = t320 + t321;
+    const real t323 = B[34] * t197;
+    const real t324 = t322 + t323;
+    const real t325 = B[43] * t215;
+    const real t326 = t324 + t325;
+    const real t327 = B[52] * t233;
+    const real t328 = t326 + t327;
+    const real t329 = t129 + t328;
+    z[7] = t329;
+    const real t330 = B[8] * t143;
+    const real t331 = B[17] * t161;
+    const real t332 = t330 + t331;
+    const real t333 = B[26] * t179;
+    const real t334 = t332 + t333;
+    const real t335 = B[35] * t197;
+    const real t336 = t334 + t335;
+    const real t337 = B[44] * t215;
+    const real t338 = t336 + t337;
+    const real t339 = B[53] * t233;
+    const real t340 = t338 + t339;
+    const real t341 = t140 + t340;
+    z[8] = t341;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_answer_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_answer_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 54, "", 0, 0},
+    {"gain", 54, "", 0, 0},
+    {"y", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_answer_outputs[] = {
+    {"x", 6, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -6472,6 +8268,54 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_rows",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_rows,
+        .call = mstmm_sweep_generic6_tangent_rows_call,
+        .n_inputs = 4,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_generic6_tangent_rows_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_rows_outputs,
+        .ir_hash = "c999d1882ee8541e41109667953e9a630034dae0de30714d70a5303d8f363131",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_reduce",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_reduce,
+        .call = mstmm_sweep_generic6_tangent_reduce_call,
+        .n_inputs = 4,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic6_tangent_reduce_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_reduce_outputs,
+        .ir_hash = "11f1ec7f5894bb8deeb50e2bb2ff21e465ac56575a39809d23780e11f5a3c758",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_push",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_push,
+        .call = mstmm_sweep_generic6_tangent_push_call,
+        .n_inputs = 7,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic6_tangent_push_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_push_outputs,
+        .ir_hash = "d4571a3c3405cfe5e82ca222fb38953da7bd78b9640e142b57606d7b02a097ec",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_answer,
+        .call = mstmm_sweep_generic6_tangent_answer_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic6_tangent_answer_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_answer_outputs,
+        .ir_hash = "80ebb420d417e68dc8cdede0c328ab46484e16787ff901cb7bf195dc20e210df",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic6_forward_slope,
         .call = mstmm_sweep_generic6_forward_slope_call,
@@ -6501,7 +8345,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "6516924c5df45c993cc6b32beaf4243885d6af63317fa74dc628f2ba4913a238",
+    .hash = "7f2e1332bb25faa3716f949d66742391990e65feeaf7fce8609f26f8b8ac9c03",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -6511,6 +8355,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -118,6 +118,46 @@ mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[] 
     mstmm_sweep_generic6_tangent_column,
 };
 
+mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_rows,
+    mstmm_sweep_generic2_tangent_rows,
+    mstmm_sweep_generic3_tangent_rows,
+    mstmm_sweep_generic4_tangent_rows,
+    mstmm_sweep_generic5_tangent_rows,
+    mstmm_sweep_generic6_tangent_rows,
+};
+
+mstmm_generic_tangent_reduce_kernel *const mstmm_generic_tangent_reduce_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_reduce,
+    mstmm_sweep_generic2_tangent_reduce,
+    mstmm_sweep_generic3_tangent_reduce,
+    mstmm_sweep_generic4_tangent_reduce,
+    mstmm_sweep_generic5_tangent_reduce,
+    mstmm_sweep_generic6_tangent_reduce,
+};
+
+mstmm_generic_tangent_push_kernel *const mstmm_generic_tangent_push_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_push,
+    mstmm_sweep_generic2_tangent_push,
+    mstmm_sweep_generic3_tangent_push,
+    mstmm_sweep_generic4_tangent_push,
+    mstmm_sweep_generic5_tangent_push,
+    mstmm_sweep_generic6_tangent_push,
+};
+
+mstmm_generic_tangent_answer_kernel *const mstmm_generic_tangent_answer_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_answer,
+    mstmm_sweep_generic2_tangent_answer,
+    mstmm_sweep_generic3_tangent_answer,
+    mstmm_sweep_generic4_tangent_answer,
+    mstmm_sweep_generic5_tangent_answer,
+    mstmm_sweep_generic6_tangent_answer,
+};
+
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)62 * n + 4 * (int64_t)n * n; }
@@ -1653,6 +1693,11 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     real tau[6];
     real d_required[6];
     real free[6];
+    real K[36];
+    real right[54];
+    real D[36];
+    real one[36];
+    real work[36];
     real T[54];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
@@ -1699,7 +1744,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_no_mode(state, modal);
-        code = mstmm_judged(state, mstmm_tangent_node_own(
+        code = mstmm_judged(state, mstmm_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
@@ -1713,7 +1758,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_judged(state, mstmm_tangent_node_own(
+        code = mstmm_judged(state, mstmm_tangent_node(
             .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
@@ -1764,19 +1809,22 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         for (int k = 0; k < speeds; k++)
             for (int row = 0; row < 6; row++)
                 (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
-        code = mstmm_judged(state, mstmm_tangent_node(
-            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+        mstmm_generic_tangent_rows(speeds,
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
-            .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
             .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
-            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq),
-            .right = tangent + MSTMM_TANGENT_RIGHT(body->nu, body->nq),
-            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), .S_c = S_c,
-            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq)));
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = K, .right = right, .D = D,
+            .one = one);
+        code = mstmm_judged(state, mstmm_tangent_invert(
+            .n = speeds, .D = D, .one = one,
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
+        mstmm_generic_tangent_reduce(speeds,
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .right = right,
+            .K = K, .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
     }
     if (body->section && !body->section->inward) {
         const int nu = body->nu;
@@ -1868,11 +1916,8 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
     real e_c[6];
     real rows[6];
     const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
     int columns[6];
     const int speeds = mstmm_free_speeds(state, body, columns);
-    real *d_block = state->slope->workspace + body->block;
-    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
     if (mstmm_idle(state, body)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -1880,6 +1925,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         mstmm_tangent_push(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
@@ -1892,6 +1938,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         mstmm_tangent_push(
             .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
@@ -1900,25 +1947,12 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
         memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
     }
-    if (!body->section && speeds) {
-        const int nu = body->nu;
-        real *tangent = state->tangents->numbers + body->tangent;
-        for (int k = 0; k < speeds; k++)
-            rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
-        mstmm_tangent_push(
-            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
-            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .D = tangent + MSTMM_TANGENT_D(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
-            .e_f = rows, .rest = tangent + MSTMM_TANGENT_REST(body->nu, body->nq),
-            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .e_c = e_c,
-            .work = tangent + MSTMM_TANGENT_WORK(body->nu, body->nq));
-        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
-    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
+        real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         mstmm_modal_modal_effort(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
@@ -1926,59 +1960,88 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         for (int j = 0; j < n; j++)
             (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
     }
-    mstmm_frames_transport(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .e = d_block + MSTMM_BLOCK_E, .e_I = d_parent + MSTMM_BLOCK_E);
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        for (int k = 0; k < speeds; k++)
+            rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
+        mstmm_generic_tangent_push(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
+            .e = d_block + MSTMM_BLOCK_E, .e_f = rows,
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .e_I = d_parent + MSTMM_BLOCK_E);
+    } else {
+        real *block = state->workspace + body->block;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_transport(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .e = d_block + MSTMM_BLOCK_E, .e_I = d_parent + MSTMM_BLOCK_E);
+    }
     return 0;
 }
 
 /* Unknowns that answer a right-hand side. */
 static int mstmm_at_tangent_answered(mstmm_state *state, int index)
 {
-    real z[9];
     real x[6];
+    real z[9];
     const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state, body, columns);
-    real *d_block = state->slope->workspace + body->block;
-    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
     if (mstmm_idle(state, body)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
-    mstmm_frames_tangent_moved(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
-        .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
-        .z = d_block + MSTMM_BLOCK_MOTION);
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_generic_tangent_answer(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .x = x,
+            .z = d_block + MSTMM_BLOCK_MOTION);
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
+                         : 0;
+    } else {
+        real *block = state->workspace + body->block;
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_tangent_moved(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .z = d_block + MSTMM_BLOCK_MOTION);
+    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
         mstmm_tangent_displaced(
             .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
     }
-    if (!body->section && speeds) {
-        real *tangent = state->tangents->numbers + body->tangent;
-        mstmm_tangent_answer(
-            .n = speeds, .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
-            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
-            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq),
-            .z_c = d_block + MSTMM_BLOCK_MOTION, .x = x, .z = z);
-        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
-        for (int j = 0, k = 0; j < nu; j++)
-            (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
-                         : 0;
-    }
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
         mstmm_tangent_answer(
             .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,

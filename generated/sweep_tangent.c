@@ -8,11 +8,9 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_tangent;
+int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
+    real *restrict inverse, real *restrict work);
 int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, real *restrict V,
-    real *restrict D, real *restrict right, real *restrict gain, real *restrict S_c,
-    real *restrict work);
-int mstmm_sweep_tangent_node_own(int n, const real *restrict H, const real *restrict B,
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
@@ -85,820 +83,51 @@ int mstmm_solve_lu(
 }
 #endif
 
-/* unknowns of a hinge eliminated
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  H[6][n] motion subspace of the unknowns
- * in  B[n][9] motion along the unknowns
- * in  G[n][6] change of the load that is carried
- * in  W[n][n] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out V[6][n] K + G
- * out D[n][n] rows by unknowns
- * out right[n][9] rows by the motion
- * out gain[n][9] D^-1 times the rows by the motion
- * out S_c[9][6] S without the unknowns, a row an entry
+/* inverse of the rows by the unknowns of a hinge
+ * in  D[n][n] rows by unknowns
+ * in  one[n][n] unit matrix
+ * out inverse[n][n] D^-1
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_node_sized(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, real *restrict V,
-    real *restrict D, real *restrict right, real *restrict gain, real *restrict S_c,
-    real *restrict work)
+int mstmm_sweep_tangent_invert_sized(int n, const real *restrict D, const real *restrict one,
+    real *restrict inverse, real *restrict work)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S[0] * B[9 * k];
-        const real t1 = S[6] * B[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = S[12] * B[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = S[18] * B[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = S[24] * B[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = S[30] * B[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = S[36] * B[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = S[42] * B[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = S[48] * B[9 * k + 8];
-        const real t16 = t14 + t15;
-        const real t17 = t16 + G[6 * k];
-        V[k] = t17;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t18 = S[1] * B[9 * k];
-        const real t19 = S[7] * B[9 * k + 1];
-        const real t20 = t18 + t19;
-        const real t21 = S[13] * B[9 * k + 2];
-        const real t22 = t20 + t21;
-        const real t23 = S[19] * B[9 * k + 3];
-        const real t24 = t22 + t23;
-        const real t25 = S[25] * B[9 * k + 4];
-        const real t26 = t24 + t25;
-        const real t27 = S[31] * B[9 * k + 5];
-        const real t28 = t26 + t27;
-        const real t29 = S[37] * B[9 * k + 6];
-        const real t30 = t28 + t29;
-        const real t31 = S[43] * B[9 * k + 7];
-        const real t32 = t30 + t31;
-        const real t33 = S[49] * B[9 * k + 8];
-        const real t34 = t32 + t33;
-        const real t35 = t34 + G[6 * k + 1];
-        V[n + k] = t35;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t36 = S[2] * B[9 * k];
-        const real t37 = S[8] * B[9 * k + 1];
-        const real t38 = t36 + t37;
-        const real t39 = S[14] * B[9 * k + 2];
-        const real t40 = t38 + t39;
-        const real t41 = S[20] * B[9 * k + 3];
-        const real t42 = t40 + t41;
-        const real t43 = S[26] * B[9 * k + 4];
-        const real t44 = t42 + t43;
-        const real t45 = S[32] * B[9 * k + 5];
-        const real t46 = t44 + t45;
-        const real t47 = S[38] * B[9 * k + 6];
-        const real t48 = t46 + t47;
-        const real t49 = S[44] * B[9 * k + 7];
-        const real t50 = t48 + t49;
-        const real t51 = S[50] * B[9 * k + 8];
-        const real t52 = t50 + t51;
-        const real t53 = t52 + G[6 * k + 2];
-        V[2 * n + k] = t53;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t54 = S[3] * B[9 * k];
-        const real t55 = S[9] * B[9 * k + 1];
-        const real t56 = t54 + t55;
-        const real t57 = S[15] * B[9 * k + 2];
-        const real t58 = t56 + t57;
-        const real t59 = S[21] * B[9 * k + 3];
-        const real t60 = t58 + t59;
-        const real t61 = S[27] * B[9 * k + 4];
-        const real t62 = t60 + t61;
-        const real t63 = S[33] * B[9 * k + 5];
-        const real t64 = t62 + t63;
-        const real t65 = S[39] * B[9 * k + 6];
-        const real t66 = t64 + t65;
-        const real t67 = S[45] * B[9 * k + 7];
-        const real t68 = t66 + t67;
-        const real t69 = S[51] * B[9 * k + 8];
-        const real t70 = t68 + t69;
-        const real t71 = t70 + G[6 * k + 3];
-        V[3 * n + k] = t71;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t72 = S[4] * B[9 * k];
-        const real t73 = S[10] * B[9 * k + 1];
-        const real t74 = t72 + t73;
-        const real t75 = S[16] * B[9 * k + 2];
-        const real t76 = t74 + t75;
-        const real t77 = S[22] * B[9 * k + 3];
-        const real t78 = t76 + t77;
-        const real t79 = S[28] * B[9 * k + 4];
-        const real t80 = t78 + t79;
-        const real t81 = S[34] * B[9 * k + 5];
-        const real t82 = t80 + t81;
-        const real t83 = S[40] * B[9 * k + 6];
-        const real t84 = t82 + t83;
-        const real t85 = S[46] * B[9 * k + 7];
-        const real t86 = t84 + t85;
-        const real t87 = S[52] * B[9 * k + 8];
-        const real t88 = t86 + t87;
-        const real t89 = t88 + G[6 * k + 4];
-        V[4 * n + k] = t89;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t90 = S[5] * B[9 * k];
-        const real t91 = S[11] * B[9 * k + 1];
-        const real t92 = t90 + t91;
-        const real t93 = S[17] * B[9 * k + 2];
-        const real t94 = t92 + t93;
-        const real t95 = S[23] * B[9 * k + 3];
-        const real t96 = t94 + t95;
-        const real t97 = S[29] * B[9 * k + 4];
-        const real t98 = t96 + t97;
-        const real t99 = S[35] * B[9 * k + 5];
-        const real t100 = t98 + t99;
-        const real t101 = S[41] * B[9 * k + 6];
-        const real t102 = t100 + t101;
-        const real t103 = S[47] * B[9 * k + 7];
-        const real t104 = t102 + t103;
-        const real t105 = S[53] * B[9 * k + 8];
-        const real t106 = t104 + t105;
-        const real t107 = t106 + G[6 * k + 5];
-        V[5 * n + k] = t107;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t108 = S[0] * B[9 * l];
-            const real t109 = S[6] * B[9 * l + 1];
-            const real t110 = t108 + t109;
-            const real t111 = S[12] * B[9 * l + 2];
-            const real t112 = t110 + t111;
-            const real t113 = S[18] * B[9 * l + 3];
-            const real t114 = t112 + t113;
-            const real t115 = S[24] * B[9 * l + 4];
-            const real t116 = t114 + t115;
-            const real t117 = S[30] * B[9 * l + 5];
-            const real t118 = t116 + t117;
-            const real t119 = S[36] * B[9 * l + 6];
-            const real t120 = t118 + t119;
-            const real t121 = S[42] * B[9 * l + 7];
-            const real t122 = t120 + t121;
-            const real t123 = S[48] * B[9 * l + 8];
-            const real t124 = t122 + t123;
-            const real t125 = H[k] * t124;
-            const real t126 = S[1] * B[9 * l];
-            const real t127 = S[7] * B[9 * l + 1];
-            const real t128 = t126 + t127;
-            const real t129 = S[13] * B[9 * l + 2];
-            const real t130 = t128 + t129;
-            const real t131 = S[19] * B[9 * l + 3];
-            const real t132 = t130 + t131;
-            const real t133 = S[25] * B[9 * l + 4];
-            const real t134 = t132 + t133;
-            const real t135 = S[31] * B[9 * l + 5];
-            const real t136 = t134 + t135;
-            const real t137 = S[37] * B[9 * l + 6];
-            const real t138 = t136 + t137;
-            const real t139 = S[43] * B[9 * l + 7];
-            const real t140 = t138 + t139;
-            const real t141 = S[49] * B[9 * l + 8];
-            const real t142 = t140 + t141;
-            const real t143 = H[n + k] * t142;
-            const real t144 = t125 + t143;
-            const real t145 = S[2] * B[9 * l];
-            const real t146 = S[8] * B[9 * l + 1];
-            const real t147 = t145 + t146;
-            const real t148 = S[14] * B[9 * l + 2];
-            const real t149 = t147 + t148;
-            const real t150 = S[20] * B[9 * l + 3];
-            const real t151 = t149 + t150;
-            const real t152 = S[26] * B[9 * l + 4];
-            const real t153 = t151 + t152;
-            const real t154 = S[32] * B[9 * l + 5];
-            const real t155 = t153 + t154;
-            const real t156 = S[38] * B[9 * l + 6];
-            const real t157 = t155 + t156;
-            const real t158 = S[44] * B[9 * l + 7];
-            const real t159 = t157 + t158;
-            const real t160 = S[50] * B[9 * l + 8];
-            const real t161 = t159 + t160;
-            const real t162 = H[2 * n + k] * t161;
-            const real t163 = t144 + t162;
-            const real t164 = S[3] * B[9 * l];
-            const real t165 = S[9] * B[9 * l + 1];
-            const real t166 = t164 + t165;
-            const real t167 = S[15] * B[9 * l + 2];
-            const real t168 = t166 + t167;
-            const real t169 = S[21] * B[9 * l + 3];
-            const real t170 = t168 + t169;
-            const real t171 = S[27] * B[9 * l + 4];
-            const real t172 = t170 + t171;
-            const real t173 = S[33] * B[9 * l + 5];
-            const real t174 = t172 + t173;
-            const real t175 = S[39] * B[9 * l + 6];
-            const real t176 = t174 + t175;
-            const real t177 = S[45] * B[9 * l + 7];
-            const real t178 = t176 + t177;
-            const real t179 = S[51] * B[9 * l + 8];
-            const real t180 = t178 + t179;
-            const real t181 = H[3 * n + k] * t180;
-            const real t182 = t163 + t181;
-            const real t183 = S[4] * B[9 * l];
-            const real t184 = S[10] * B[9 * l + 1];
-            const real t185 = t183 + t184;
-            const real t186 = S[16] * B[9 * l + 2];
-            const real t187 = t185 + t186;
-            const real t188 = S[22] * B[9 * l + 3];
-            const real t189 = t187 + t188;
-            const real t190 = S[28] * B[9 * l + 4];
-            const real t191 = t189 + t190;
-            const real t192 = S[34] * B[9 * l + 5];
-            const real t193 = t191 + t192;
-            const real t194 = S[40] * B[9 * l + 6];
-            const real t195 = t193 + t194;
-            const real t196 = S[46] * B[9 * l + 7];
-            const real t197 = t195 + t196;
-            const real t198 = S[52] * B[9 * l + 8];
-            const real t199 = t197 + t198;
-            const real t200 = H[4 * n + k] * t199;
-            const real t201 = t182 + t200;
-            const real t202 = S[5] * B[9 * l];
-            const real t203 = S[11] * B[9 * l + 1];
-            const real t204 = t202 + t203;
-            const real t205 = S[17] * B[9 * l + 2];
-            const real t206 = t204 + t205;
-            const real t207 = S[23] * B[9 * l + 3];
-            const real t208 = t206 + t207;
-            const real t209 = S[29] * B[9 * l + 4];
-            const real t210 = t208 + t209;
-            const real t211 = S[35] * B[9 * l + 5];
-            const real t212 = t210 + t211;
-            const real t213 = S[41] * B[9 * l + 6];
-            const real t214 = t212 + t213;
-            const real t215 = S[47] * B[9 * l + 7];
-            const real t216 = t214 + t215;
-            const real t217 = S[53] * B[9 * l + 8];
-            const real t218 = t216 + t217;
-            const real t219 = H[5 * n + k] * t218;
-            const real t220 = t201 + t219;
-            const real t221 = t220 + W[n * l + k];
-            D[n * k + l] = t221;
-        }
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t222 = S[0] * H[k];
-        const real t223 = S[1] * H[n + k];
-        const real t224 = t222 + t223;
-        const real t225 = S[2] * H[2 * n + k];
-        const real t226 = t224 + t225;
-        const real t227 = S[3] * H[3 * n + k];
-        const real t228 = t226 + t227;
-        const real t229 = S[4] * H[4 * n + k];
-        const real t230 = t228 + t229;
-        const real t231 = S[5] * H[5 * n + k];
-        const real t232 = t230 + t231;
-        right[9 * k] = t232;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t233 = S[6] * H[k];
-        const real t234 = S[7] * H[n + k];
-        const real t235 = t233 + t234;
-        const real t236 = S[8] * H[2 * n + k];
-        const real t237 = t235 + t236;
-        const real t238 = S[9] * H[3 * n + k];
-        const real t239 = t237 + t238;
-        const real t240 = S[10] * H[4 * n + k];
-        const real t241 = t239 + t240;
-        const real t242 = S[11] * H[5 * n + k];
-        const real t243 = t241 + t242;
-        right[9 * k + 1] = t243;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t244 = S[12] * H[k];
-        const real t245 = S[13] * H[n + k];
-        const real t246 = t244 + t245;
-        const real t247 = S[14] * H[2 * n + k];
-        const real t248 = t246 + t247;
-        const real t249 = S[15] * H[3 * n + k];
-        const real t250 = t248 + t249;
-        const real t251 = S[16] * H[4 * n + k];
-        const real t252 = t250 + t251;
-        const real t253 = S[17] * H[5 * n + k];
-        const real t254 = t252 + t253;
-        right[9 * k + 2] = t254;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t255 = S[18] * H[k];
-        const real t256 = S[19] * H[n + k];
-        const real t257 = t255 + t256;
-        const real t258 = S[20] * H[2 * n + k];
-        const real t259 = t257 + t258;
-        const real t260 = S[21] * H[3 * n + k];
-        const real t261 = t259 + t260;
-        const real t262 = S[22] * H[4 * n + k];
-        const real t263 = t261 + t262;
-        const real t264 = S[23] * H[5 * n + k];
-        const real t265 = t263 + t264;
-        right[9 * k + 3] = t265;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t266 = S[24] * H[k];
-        const real t267 = S[25] * H[n + k];
-        const real t268 = t266 + t267;
-        const real t269 = S[26] * H[2 * n + k];
-        const real t270 = t268 + t269;
-        const real t271 = S[27] * H[3 * n + k];
-        const real t272 = t270 + t271;
-        const real t273 = S[28] * H[4 * n + k];
-        const real t274 = t272 + t273;
-        const real t275 = S[29] * H[5 * n + k];
-        const real t276 = t274 + t275;
-        right[9 * k + 4] = t276;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t277 = S[30] * H[k];
-        const real t278 = S[31] * H[n + k];
-        const real t279 = t277 + t278;
-        const real t280 = S[32] * H[2 * n + k];
-        const real t281 = t279 + t280;
-        const real t282 = S[33] * H[3 * n + k];
-        const real t283 = t281 + t282;
-        const real t284 = S[34] * H[4 * n + k];
-        const real t285 = t283 + t284;
-        const real t286 = S[35] * H[5 * n + k];
-        const real t287 = t285 + t286;
-        right[9 * k + 5] = t287;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t288 = S[36] * H[k];
-        const real t289 = S[37] * H[n + k];
-        const real t290 = t288 + t289;
-        const real t291 = S[38] * H[2 * n + k];
-        const real t292 = t290 + t291;
-        const real t293 = S[39] * H[3 * n + k];
-        const real t294 = t292 + t293;
-        const real t295 = S[40] * H[4 * n + k];
-        const real t296 = t294 + t295;
-        const real t297 = S[41] * H[5 * n + k];
-        const real t298 = t296 + t297;
-        right[9 * k + 6] = t298;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t299 = S[42] * H[k];
-        const real t300 = S[43] * H[n + k];
-        const real t301 = t299 + t300;
-        const real t302 = S[44] * H[2 * n + k];
-        const real t303 = t301 + t302;
-        const real t304 = S[45] * H[3 * n + k];
-        const real t305 = t303 + t304;
-        const real t306 = S[46] * H[4 * n + k];
-        const real t307 = t305 + t306;
-        const real t308 = S[47] * H[5 * n + k];
-        const real t309 = t307 + t308;
-        right[9 * k + 7] = t309;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t310 = S[48] * H[k];
-        const real t311 = S[49] * H[n + k];
-        const real t312 = t310 + t311;
-        const real t313 = S[50] * H[2 * n + k];
-        const real t314 = t312 + t313;
-        const real t315 = S[51] * H[3 * n + k];
-        const real t316 = t314 + t315;
-        const real t317 = S[52] * H[4 * n + k];
-        const real t318 = t316 + t317;
-        const real t319 = S[53] * H[5 * n + k];
-        const real t320 = t318 + t319;
-        right[9 * k + 8] = t320;
-    }
     /* a pivot of D vanishes: a motion is undetermined */
-    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
-    if (found_gain == 1) return 1;
-    real t322 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t321 = gain[9 * k] * V[k];
-        t322 += t321;
-    }
-    const real t323 = S[0] - t322;
-    S_c[0] = t323;
-    real t325 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t324 = gain[9 * k] * V[n + k];
-        t325 += t324;
-    }
-    const real t326 = S[1] - t325;
-    S_c[1] = t326;
-    real t328 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t327 = gain[9 * k] * V[2 * n + k];
-        t328 += t327;
-    }
-    const real t329 = S[2] - t328;
-    S_c[2] = t329;
-    real t331 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t330 = gain[9 * k] * V[3 * n + k];
-        t331 += t330;
-    }
-    const real t332 = S[3] - t331;
-    S_c[3] = t332;
-    real t334 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t333 = gain[9 * k] * V[4 * n + k];
-        t334 += t333;
-    }
-    const real t335 = S[4] - t334;
-    S_c[4] = t335;
-    real t337 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t336 = gain[9 * k] * V[5 * n + k];
-        t337 += t336;
-    }
-    const real t338 = S[5] - t337;
-    S_c[5] = t338;
-    real t340 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t339 = V[k] * gain[9 * k + 1];
-        t340 += t339;
-    }
-    const real t341 = S[6] - t340;
-    S_c[6] = t341;
-    real t343 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t342 = V[n + k] * gain[9 * k + 1];
-        t343 += t342;
-    }
-    const real t344 = S[7] - t343;
-    S_c[7] = t344;
-    real t346 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t345 = V[2 * n + k] * gain[9 * k + 1];
-        t346 += t345;
-    }
-    const real t347 = S[8] - t346;
-    S_c[8] = t347;
-    real t349 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t348 = V[3 * n + k] * gain[9 * k + 1];
-        t349 += t348;
-    }
-    const real t350 = S[9] - t349;
-    S_c[9] = t350;
-    real t352 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t351 = V[4 * n + k] * gain[9 * k + 1];
-        t352 += t351;
-    }
-    const real t353 = S[10] - t352;
-    S_c[10] = t353;
-    real t355 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t354 = V[5 * n + k] * gain[9 * k + 1];
-        t355 += t354;
-    }
-    const real t356 = S[11] - t355;
-    S_c[11] = t356;
-    real t358 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t357 = V[k] * gain[9 * k + 2];
-        t358 += t357;
-    }
-    const real t359 = S[12] - t358;
-    S_c[12] = t359;
-    real t361 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t360 = V[n + k] * gain[9 * k + 2];
-        t361 += t360;
-    }
-    const real t362 = S[13] - t361;
-    S_c[13] = t362;
-    real t364 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t363 = V[2 * n + k] * gain[9 * k + 2];
-        t364 += t363;
-    }
-    const real t365 = S[14] - t364;
-    S_c[14] = t365;
-    real t367 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t366 = V[3 * n + k] * gain[9 * k + 2];
-        t367 += t366;
-    }
-    const real t368 = S[15] - t367;
-    S_c[15] = t368;
-    real t370 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t369 = V[4 * n + k] * gain[9 * k + 2];
-        t370 += t369;
-    }
-    const real t371 = S[16] - t370;
-    S_c[16] = t371;
-    real t373 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t372 = V[5 * n + k] * gain[9 * k + 2];
-        t373 += t372;
-    }
-    const real t374 = S[17] - t373;
-    S_c[17] = t374;
-    real t376 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t375 = V[k] * gain[9 * k + 3];
-        t376 += t375;
-    }
-    const real t377 = S[18] - t376;
-    S_c[18] = t377;
-    real t379 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t378 = V[n + k] * gain[9 * k + 3];
-        t379 += t378;
-    }
-    const real t380 = S[19] - t379;
-    S_c[19] = t380;
-    real t382 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t381 = V[2 * n + k] * gain[9 * k + 3];
-        t382 += t381;
-    }
-    const real t383 = S[20] - t382;
-    S_c[20] = t383;
-    real t385 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t384 = V[3 * n + k] * gain[9 * k + 3];
-        t385 += t384;
-    }
-    const real t386 = S[21] - t385;
-    S_c[21] = t386;
-    real t388 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t387 = V[4 * n + k] * gain[9 * k + 3];
-        t388 += t387;
-    }
-    const real t389 = S[22] - t388;
-    S_c[22] = t389;
-    real t391 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t390 = V[5 * n + k] * gain[9 * k + 3];
-        t391 += t390;
-    }
-    const real t392 = S[23] - t391;
-    S_c[23] = t392;
-    real t394 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t393 = V[k] * gain[9 * k + 4];
-        t394 += t393;
-    }
-    const real t395 = S[24] - t394;
-    S_c[24] = t395;
-    real t397 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t396 = V[n + k] * gain[9 * k + 4];
-        t397 += t396;
-    }
-    const real t398 = S[25] - t397;
-    S_c[25] = t398;
-    real t400 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t399 = V[2 * n + k] * gain[9 * k + 4];
-        t400 += t399;
-    }
-    const real t401 = S[26] - t400;
-    S_c[26] = t401;
-    real t403 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t402 = V[3 * n + k] * gain[9 * k + 4];
-        t403 += t402;
-    }
-    const real t404 = S[27] - t403;
-    S_c[27] = t404;
-    real t406 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t405 = V[4 * n + k] * gain[9 * k + 4];
-        t406 += t405;
-    }
-    const real t407 = S[28] - t406;
-    S_c[28] = t407;
-    real t409 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t408 = V[5 * n + k] * gain[9 * k + 4];
-        t409 += t408;
-    }
-    const real t410 = S[29] - t409;
-    S_c[29] = t410;
-    real t412 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t411 = V[k] * gain[9 * k + 5];
-        t412 += t411;
-    }
-    const real t413 = S[30] - t412;
-    S_c[30] = t413;
-    real t415 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t414 = V[n + k] * gain[9 * k + 5];
-        t415 += t414;
-    }
-    const real t416 = S[31] - t415;
-    S_c[31] = t416;
-    real t418 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t417 = V[2 * n + k] * gain[9 * k + 5];
-        t418 += t417;
-    }
-    const real t419 = S[32] - t418;
-    S_c[32] = t419;
-    real t421 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t420 = V[3 * n + k] * gain[9 * k + 5];
-        t421 += t420;
-    }
-    const real t422 = S[33] - t421;
-    S_c[33] = t422;
-    real t424 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t423 = V[4 * n + k] * gain[9 * k + 5];
-        t424 += t423;
-    }
-    const real t425 = S[34] - t424;
-    S_c[34] = t425;
-    real t427 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t426 = V[5 * n + k] * gain[9 * k + 5];
-        t427 += t426;
-    }
-    const real t428 = S[35] - t427;
-    S_c[35] = t428;
-    real t430 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t429 = V[k] * gain[9 * k + 6];
-        t430 += t429;
-    }
-    const real t431 = S[36] - t430;
-    S_c[36] = t431;
-    real t433 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t432 = V[n + k] * gain[9 * k + 6];
-        t433 += t432;
-    }
-    const real t434 = S[37] - t433;
-    S_c[37] = t434;
-    real t436 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t435 = V[2 * n + k] * gain[9 * k + 6];
-        t436 += t435;
-    }
-    const real t437 = S[38] - t436;
-    S_c[38] = t437;
-    real t439 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t438 = V[3 * n + k] * gain[9 * k + 6];
-        t439 += t438;
-    }
-    const real t440 = S[39] - t439;
-    S_c[39] = t440;
-    real t442 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t441 = V[4 * n + k] * gain[9 * k + 6];
-        t442 += t441;
-    }
-    const real t443 = S[40] - t442;
-    S_c[40] = t443;
-    real t445 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t444 = V[5 * n + k] * gain[9 * k + 6];
-        t445 += t444;
-    }
-    const real t446 = S[41] - t445;
-    S_c[41] = t446;
-    real t448 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t447 = V[k] * gain[9 * k + 7];
-        t448 += t447;
-    }
-    const real t449 = S[42] - t448;
-    S_c[42] = t449;
-    real t451 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t450 = V[n + k] * gain[9 * k + 7];
-        t451 += t450;
-    }
-    const real t452 = S[43] - t451;
-    S_c[43] = t452;
-    real t454 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t453 = V[2 * n + k] * gain[9 * k + 7];
-        t454 += t453;
-    }
-    const real t455 = S[44] - t454;
-    S_c[44] = t455;
-    real t457 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t456 = V[3 * n + k] * gain[9 * k + 7];
-        t457 += t456;
-    }
-    const real t458 = S[45] - t457;
-    S_c[45] = t458;
-    real t460 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t459 = V[4 * n + k] * gain[9 * k + 7];
-        t460 += t459;
-    }
-    const real t461 = S[46] - t460;
-    S_c[46] = t461;
-    real t463 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t462 = V[5 * n + k] * gain[9 * k + 7];
-        t463 += t462;
-    }
-    const real t464 = S[47] - t463;
-    S_c[47] = t464;
-    real t466 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t465 = V[k] * gain[9 * k + 8];
-        t466 += t465;
-    }
-    const real t467 = S[48] - t466;
-    S_c[48] = t467;
-    real t469 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t468 = V[n + k] * gain[9 * k + 8];
-        t469 += t468;
-    }
-    const real t470 = S[49] - t469;
-    S_c[49] = t470;
-    real t472 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t471 = V[2 * n + k] * gain[9 * k + 8];
-        t472 += t471;
-    }
-    const real t473 = S[50] - t472;
-    S_c[50] = t473;
-    real t475 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t474 = V[3 * n + k] * gain[9 * k + 8];
-        t475 += t474;
-    }
-    const real t476 = S[51] - t475;
-    S_c[51] = t476;
-    real t478 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t477 = V[4 * n + k] * gain[9 * k + 8];
-        t478 += t477;
-    }
-    const real t479 = S[52] - t478;
-    S_c[52] = t479;
-    real t481 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t480 = V[5 * n + k] * gain[9 * k + 8];
-        t481 += t480;
-    }
-    const real t482 = S[53] - t481;
-    S_c[53] = t482;
-    if (found_gain) return 2; /* a negative determinant */
+    const int found_inverse = mstmm_solve_lu(n, n, D, one, inverse, work, 1e-13);
+    if (found_inverse == 1) return 1;
+    if (found_inverse) return 2; /* a negative determinant */
     return 0;
 }
 
-int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, real *restrict V,
-    real *restrict D, real *restrict right, real *restrict gain, real *restrict S_c,
-    real *restrict work)
+int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
+    real *restrict inverse, real *restrict work)
 {
     switch (n) { /* loops over a number that is known are unrolled */
-    case 1: return mstmm_sweep_tangent_node_sized(1, H, B, G, W, S, V, D, right, gain, S_c, work);
-    case 2: return mstmm_sweep_tangent_node_sized(2, H, B, G, W, S, V, D, right, gain, S_c, work);
-    case 3: return mstmm_sweep_tangent_node_sized(3, H, B, G, W, S, V, D, right, gain, S_c, work);
-    case 4: return mstmm_sweep_tangent_node_sized(4, H, B, G, W, S, V, D, right, gain, S_c, work);
-    default: return mstmm_sweep_tangent_node_sized(n, H, B, G, W, S, V, D, right, gain, S_c, work);
+    case 1: return mstmm_sweep_tangent_invert_sized(1, D, one, inverse, work);
+    case 2: return mstmm_sweep_tangent_invert_sized(2, D, one, inverse, work);
+    case 3: return mstmm_sweep_tangent_invert_sized(3, D, one, inverse, work);
+    case 4: return mstmm_sweep_tangent_invert_sized(4, D, one, inverse, work);
+    default: return mstmm_sweep_tangent_invert_sized(n, D, one, inverse, work);
     }
 }
 
-static int mstmm_sweep_tangent_node_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_invert_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_node(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_tangent_invert(n, in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_node_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"B", 9, "", 0, 1},
-    {"G", 6, "", 0, 1},
-    {"W", 1, "", 0, 2},
-    {"S", 54, "", 0, 0},
+static const mstmm_port mstmm_sweep_tangent_invert_inputs[] = {
+    {"D", 1, "", 0, 2},
+    {"one", 1, "", 0, 2},
 };
 
-static const mstmm_port mstmm_sweep_tangent_node_outputs[] = {
-    {"V", 6, "", 0, 1},
-    {"D", 1, "", 0, 2},
-    {"right", 9, "", 0, 1},
-    {"gain", 9, "", 0, 1},
-    {"S_c", 54, "", 0, 0},
+static const mstmm_port mstmm_sweep_tangent_invert_outputs[] = {
+    {"inverse", 1, "", 0, 2},
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
+static const mstmm_guard mstmm_sweep_tangent_invert_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
     {2, "the determinant is negative; all results are there"},
 };
@@ -922,7 +151,7 @@ static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_node_own_sized(int n, const real *restrict H, const real *restrict B,
+int mstmm_sweep_tangent_node_sized(int n, const real *restrict H, const real *restrict B,
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
@@ -1723,26 +952,26 @@ int mstmm_sweep_tangent_node_own_sized(int n, const real *restrict H, const real
     return 0;
 }
 
-int mstmm_sweep_tangent_node_own(int n, const real *restrict H, const real *restrict B,
+int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
 {
     switch (n) { /* loops over a number that is known are unrolled */
-    case 1: return mstmm_sweep_tangent_node_own_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 2: return mstmm_sweep_tangent_node_own_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 3: return mstmm_sweep_tangent_node_own_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 4: return mstmm_sweep_tangent_node_own_sized(4, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    default: return mstmm_sweep_tangent_node_own_sized(n, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+    case 1: return mstmm_sweep_tangent_node_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+    case 2: return mstmm_sweep_tangent_node_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+    case 3: return mstmm_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+    case 4: return mstmm_sweep_tangent_node_sized(4, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+    default: return mstmm_sweep_tangent_node_sized(n, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
     }
 }
 
-static int mstmm_sweep_tangent_node_own_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_node_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_node_own(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_tangent_node(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_node_own_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_node_inputs[] = {
     {"H", 6, "", 0, 1},
     {"B", 9, "", 0, 1},
     {"G", 6, "", 0, 1},
@@ -1753,7 +982,7 @@ static const mstmm_port mstmm_sweep_tangent_node_own_inputs[] = {
     {"Z_x", 1, "", 0, 2},
 };
 
-static const mstmm_port mstmm_sweep_tangent_node_own_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_node_outputs[] = {
     {"V", 6, "", 0, 1},
     {"D", 1, "", 0, 2},
     {"right", 9, "", 0, 1},
@@ -1762,7 +991,7 @@ static const mstmm_port mstmm_sweep_tangent_node_own_outputs[] = {
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_tangent_node_own_guards[] = {
+static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
     {2, "the determinant is negative; all results are there"},
 };
@@ -2681,28 +1910,28 @@ static const mstmm_port mstmm_sweep_tangent_lagged_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
     {
+        .name = "invert",
+        .function = (void (*)(void))mstmm_sweep_tangent_invert,
+        .call = mstmm_sweep_tangent_invert_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_tangent_invert_inputs,
+        .outputs = mstmm_sweep_tangent_invert_outputs,
+        .ir_hash = "d51a0da114a148ce565cf89daf636eb2e848afd9546de3cfb59a5e7f6bb3d444",
+        .n_guards = 2,
+        .guards = mstmm_sweep_tangent_invert_guards,
+    },
+    {
         .name = "node",
         .function = (void (*)(void))mstmm_sweep_tangent_node,
         .call = mstmm_sweep_tangent_node_call,
-        .n_inputs = 5,
+        .n_inputs = 8,
         .n_outputs = 6,
         .inputs = mstmm_sweep_tangent_node_inputs,
         .outputs = mstmm_sweep_tangent_node_outputs,
-        .ir_hash = "e97de26a445ed6531523caad2a9c95715d1efef6453f0ab54e29363803d18efe",
+        .ir_hash = "08ff4b38e479f3c046f9085bd9384e3d09836c959c50b18d464949b675ae7b9b",
         .n_guards = 2,
         .guards = mstmm_sweep_tangent_node_guards,
-    },
-    {
-        .name = "node_own",
-        .function = (void (*)(void))mstmm_sweep_tangent_node_own,
-        .call = mstmm_sweep_tangent_node_own_call,
-        .n_inputs = 8,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_tangent_node_own_inputs,
-        .outputs = mstmm_sweep_tangent_node_own_outputs,
-        .ir_hash = "75314a369a51310126bb00c31ca07f95c9e72eb6712bb068e4ed183c6769c9d1",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_node_own_guards,
     },
     {
         .name = "absorb",
@@ -2782,7 +2011,7 @@ const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "f4f57d752082ed04ba191456f457c073d9e394230ac96c9bf8dae96fe51a619e",
+    .hash = "646fdbe3d823cb3e70051be2d6e7950a34d6f569af38549fa87c10a0142397d9",
     .nq = 0,
     .nu = 0,
     .np = 0,

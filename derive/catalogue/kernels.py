@@ -115,6 +115,16 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("push", columns.push(nu)),
         Kernel("answer", columns.answer(nu)),
         Kernel("tangent_column", tangent.tangent_column(nu)),
+        *(
+            Kernel(make.__name__, make(nu))
+            for make in (
+                tangent.tangent_rows,
+                tangent.tangent_reduce,
+                tangent.tangent_push,
+                tangent.tangent_answer,
+            )
+            if nu
+        ),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )
@@ -185,14 +195,10 @@ def modal_kernels() -> tuple[Kernel, ...]:
 
 def tangent_kernels() -> tuple[Kernel, ...]:
     """Elimination of the unknowns of an implicit step: n of a hinge or of a flexible body."""
-    return (
-        Kernel("node", tangent.node(own=False)),
-        Kernel("node_own", tangent.node(own=True)),
-        *(
-            Kernel(make.__name__, make())
-            for make in (tangent.absorb, tangent.push, tangent.answer, tangent.displaced,
-                         tangent.lag, tangent.lagged)
-        ),
+    return tuple(
+        Kernel(make.__name__, make())
+        for make in (tangent.invert, tangent.node, tangent.absorb, tangent.push, tangent.answer,
+                     tangent.displaced, tangent.lag, tangent.lagged)
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ import sympy as sp
 
 from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from .algebra import column, part, stack, symbol
-from .sweep import SHIFT, E, R
+from .sweep import PARENT_E, SHIFT, E, R, free_speeds, transport
 
 #: Number of unknowns of a hinge, or of a flexible body.
 N = sp.Symbol("n", integer=True, positive=True)
@@ -88,30 +88,29 @@ def tangent_carry() -> Derivation:
     )
 
 
-def tangent_moved() -> Derivation:
-    """Th z_I: change of the body's motion by that of its parent's alone."""
+def _behind() -> tuple[Equation, sp.BlockMatrix]:
+    """Th z_I, and the equation that it needs before."""
     turn, rate, linear = (part(Z_PARENT.symbol, 3 * k) for k in range(3))
     lever = tilde(column(SHIFT.symbol))
     seen = symbol("dw", 3)
     relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
     moved = linear - lever * rate - _spun() * turn
+    return Equation("change of the angular velocity", seen, R.symbol.T * turn), stack(
+        seen,
+        R.symbol.T * rate - relative * seen,
+        R.symbol.T * moved - 2 * (velocity * seen),
+    )
+
+
+def tangent_moved() -> Derivation:
+    """Th z_I: change of the body's motion by that of its parent's alone."""
+    first, moved = _behind()
     return Derivation(
         "frames",
         "change of a body's motion by that of its parent's",
         (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
         (Z,),
-        (
-            Equation("change of the angular velocity", seen, R.symbol.T * turn),
-            Equation(
-                "Th z_I",
-                Z.symbol,
-                stack(
-                    seen,
-                    R.symbol.T * rate - relative * seen,
-                    R.symbol.T * moved - 2 * (velocity * seen),
-                ),
-            ),
-        ),
+        (first, Equation("Th z_I", Z.symbol, moved)),
         sources=SOURCES,
     )
 
@@ -187,6 +186,118 @@ def tangent_column(nu: int) -> Derivation:
     )
 
 
+# --- the unknowns of a hinge --------------------------------------------------------------------
+
+
+def _hinge(nu: int) -> dict[str, Quantity]:
+    """What is kept of a hinge with `nu` free speeds; arrays with a row for each."""
+    sizes = {
+        "H": (6, nu, "motion subspace of the unknowns"),
+        "B": (nu, 9, "motion along the unknowns"),
+        "G": (nu, 6, "change of the load that is carried"),
+        "W": (nu, nu, "slopes of the rows, a row a direction"),
+        "K": (nu, 6, "S B, a row a direction"),
+        "V": (nu, 6, "K + G, a row a direction"),
+        "D": (nu, nu, "rows by unknowns"),
+        "right": (nu, 9, "rows by the motion"),
+        "gain": (nu, 9, "D^-1 times the rows by the motion"),
+        "inverse": (nu, nu, "D^-1"),
+        "y": (nu, 1, "D^-1 times what is left of the rows"),
+    }
+    return {
+        name: Quantity(symbol(name, rows, columns), "", meaning)
+        for name, (rows, columns, meaning) in sizes.items()
+    }
+
+
+def tangent_rows(nu: int) -> Derivation:
+    """D = H^T S B + W of a hinge, and its rows by the motion."""
+    at = _hinge(nu)
+    h, b, w, k, d, right = (at[name] for name in ("H", "B", "W", "K", "D", "right"))
+    unit = Quantity(symbol("one", nu, nu), "", "unit matrix")
+    s = ROWS_S.symbol
+    return Derivation(
+        f"generic{nu}",
+        f"rows of a hinge with {free_speeds(nu)}",
+        (h, b, w, ROWS_S),
+        (k, right, d, unit),
+        (
+            Equation("K = S B", k.symbol, b.symbol * s),
+            Equation("H^T S", right.symbol, h.symbol.T * s.T),
+            Equation("D = H^T K + W", d.symbol, h.symbol.T * k.symbol.T + w.symbol.T),
+            Equation("1", unit.symbol, sp.ImmutableDenseMatrix(sp.eye(nu))),
+        ),
+        sources=SOURCES,
+    )
+
+
+def tangent_reduce(nu: int) -> Derivation:
+    """S without the unknowns of a hinge."""
+    at = _hinge(nu)
+    inverse, right, k, g, v, gain = (
+        at[name] for name in ("inverse", "right", "K", "G", "V", "gain")
+    )
+    change = Quantity(ROWS_S.symbol, "", ROWS_S.meaning, accumulate=True)
+    return Derivation(
+        f"generic{nu}",
+        f"S without the unknowns of a hinge with {free_speeds(nu)}",
+        (inverse, right, k, g),
+        (gain, v, change),
+        (
+            Equation("D^-1 H^T S", gain.symbol, inverse.symbol * right.symbol),
+            Equation("V = K + G", v.symbol, k.symbol + g.symbol),
+            Equation("- V D^-1 H^T S", change.symbol, -gain.symbol.T * v.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def tangent_push(nu: int) -> Derivation:
+    """y = D^-1 (-e_f - H^T e), and the load e + V y carried to the parent."""
+    at = _hinge(nu)
+    h, v, inverse, y = (at[name] for name in ("H", "V", "inverse", "y"))
+    own = Quantity(symbol("e_f", nu), "", "load of the rows")
+    onward = symbol("e_c", 6)
+    return Derivation(
+        f"generic{nu}",
+        f"a right-hand side carried across a hinge with {free_speeds(nu)}",
+        (R, SHIFT, h, v, inverse, E, own),
+        (y, PARENT_E),
+        (
+            Equation(
+                "D^-1 (-e_f - H^T e)",
+                y.symbol,
+                inverse.symbol * (-own.symbol - h.symbol.T * E.symbol),
+            ),
+            Equation("e + V y", onward, E.symbol + v.symbol.T * y.symbol),
+            Equation("X^T (e + V y)", PARENT_E.symbol, transport(onward)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def tangent_answer(nu: int) -> Derivation:
+    """x = y - D^-1 H^T S z of a hinge and z = Th z_I + B x behind it."""
+    at = _hinge(nu)
+    b, gain, y = (at[name] for name in ("B", "gain", "y"))
+    unknowns = Quantity(symbol("x", nu), "", "unknowns")
+    moved = symbol("z_c", 9)
+    first, behind = _behind()
+    return Derivation(
+        f"generic{nu}",
+        f"unknowns of a hinge with {free_speeds(nu)} that answer a right-hand side",
+        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT, b, gain, y),
+        (unknowns, Z),
+        (
+            first,
+            Equation("Th z_I", moved, behind),
+            Equation("x", unknowns.symbol, y.symbol - gain.symbol * moved),
+            Equation("z", Z.symbol, moved + b.symbol.T * unknowns.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
 # --- any number of unknowns ---------------------------------------------------------------------
 
 
@@ -213,28 +324,37 @@ OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, a
 OWN_D = _square("Z_x", "own rows by the unknowns, a row a direction")
 
 
-def node(own: bool) -> Derivation:
-    """The unknowns of a hinge eliminated, or (`own`) those of a flexible body."""
+def invert() -> Derivation:
+    """D^-1 of the rows of a hinge."""
+    unit, inverse = _square("one", "unit matrix"), _square("inverse", "D^-1")
+    return Derivation(
+        "tangent",
+        "inverse of the rows by the unknowns of a hinge",
+        (D, unit),
+        (inverse,),
+        (Equation("D^-1", inverse.symbol, Solve(D.symbol, unit.symbol)),),
+    )
+
+
+def node() -> Derivation:
+    """The unknowns of a flexible body eliminated."""
     without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, a row an entry")
     s = ROWS_S.symbol.T
     k = symbol("K_x", 6, N)
-    moved = s * B.symbol.T
-    force = moved + OWN_K.symbol.T if own else moved
-    rows = H.symbol.T * k + W.symbol.T
-    by_motion = H.symbol.T * s
-    if own:
-        rows = rows + OWN_ROWS.symbol.T * B.symbol.T + OWN_D.symbol.T
-        by_motion = by_motion + OWN_ROWS.symbol.T
     return Derivation(
         "tangent",
-        "unknowns of a " + ("flexible body" if own else "hinge") + " eliminated",
-        (H, B, G, W, ROWS_S, *((OWN_K, OWN_ROWS, OWN_D) if own else ())),
+        "unknowns of a flexible body eliminated",
+        (H, B, G, W, ROWS_S, OWN_K, OWN_ROWS, OWN_D),
         (V, D, RIGHT, GAIN, without),
         (
-            Equation("K = S B" + (" + K" if own else ""), k, force),
+            Equation("K = S B + K", k, s * B.symbol.T + OWN_K.symbol.T),
             Equation("V = K + G", V.symbol, k + G.symbol.T),
-            Equation("D = H^T K + W", D.symbol, rows),
-            Equation("H^T S", RIGHT.symbol, by_motion),
+            Equation(
+                "D = H^T K + W",
+                D.symbol,
+                H.symbol.T * k + W.symbol.T + OWN_ROWS.symbol.T * B.symbol.T + OWN_D.symbol.T,
+            ),
+            Equation("H^T S", RIGHT.symbol, H.symbol.T * s + OWN_ROWS.symbol.T),
             Equation("D^-1 H^T S", GAIN.symbol, Solve(D.symbol, RIGHT.symbol)),
             Equation(
                 "S - V D^-1 H^T S",

@@ -27,6 +27,8 @@ from mstmm.ir import (
 #: are computed; what an output holds is read from there by those behind it.
 ALIKE: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     ("frames", "tangent_carry"): (("T", 1), ("S_I", 0)),
+    **{(f"generic{n}", "tangent_rows"): (("K", 1), ("right", 1)) for n in range(1, 7)},
+    **{(f"generic{n}", "tangent_reduce"): (("gain", 1), ("V", 1), ("S", 1)) for n in range(1, 7)},
 }
 
 #: What a lane's value is: the same operand in every lane, or that of each lane in turn.
@@ -64,7 +66,7 @@ class Loop:
 
 
 class Alike:
-    """The loops of one kernel, and the statements that stand before them."""
+    """The loops of one kernel, and the statements behind them."""
 
     def __init__(self, kernel: KernelIR, asked: Sequence[tuple[str, int]]) -> None:
         if kernel.size_symbol is not None:
@@ -75,22 +77,27 @@ class Alike:
         self.kept: dict[Operand, Element] = {}
         self.loops = [self._loop(self.ports[name], axis) for name, axis in asked]
         looped = {name for name, _ in asked}
-        self.others = tuple(
-            s for s in kernel.statements
-            if not isinstance(s, Assign) and not (isinstance(s, Store) and s.port in looped)
-        )  # fmt: skip
+        others = [s for s in kernel.statements if not isinstance(s, Assign)]
+        if not all(isinstance(s, Store) for s in others):
+            raise ValueError(f"{kernel.name}: a guard among loops")
+        self.others = [s for s in others if isinstance(s, Store) and s.port not in looped]
 
     def needed(self, operands: Sequence[Operand]) -> list[Assign]:
-        """What operands of the straight line are made of, in its order."""
+        """What operands of the straight line are made of, in its order, kept outputs aside."""
         found: set[int] = set()
-        stack = [o.number for o in operands if isinstance(o, Temporary)]
+        stack = list(operands)
         while stack:
-            number = stack.pop()
-            if number not in found:
-                found.add(number)
-                args = self.assigned[number].args
-                stack.extend(o.number for o in args if isinstance(o, Temporary))
+            operand = stack.pop()
+            if not isinstance(operand, Temporary) or operand in self.kept:
+                continue
+            if operand.number not in found:
+                found.add(operand.number)
+                stack.extend(self.assigned[operand.number].args)
         return [s for number, s in self.assigned.items() if number in found]
+
+    def read(self, operand: Operand) -> Operand:
+        """The entry of an output where an operand is kept."""
+        return self.kept.get(operand, operand)
 
     def _loop(self, port: Port, axis: int) -> Loop:
         stored = {s.index: s.value for s in self.kernel.statements
@@ -135,14 +142,14 @@ class _Builder:
         return found
 
     def shared(self, operand: Operand) -> Operand:
-        operand = self.whole.kept.get(operand, operand)
+        operand = self.whole.read(operand)
         if isinstance(operand, Temporary) and operand.number not in self.loop.shared:
             self.loop.shared.append(operand.number)
         return operand
 
     def _made(self, lanes: _Lanes) -> Value:
         number = len(self.loop.values)
-        places = [self.whole.kept.get(lane, lane) for lane in lanes]
+        places = [self.whole.read(lane) for lane in lanes]
         axis = _moves(places)
         if axis is not None:
             assert isinstance(places[0], Element)
@@ -171,7 +178,7 @@ class _Builder:
         return self.like[key]
 
     def _alike(self, first: Operand, other: Operand, k: int) -> bool:
-        places = [self.whole.kept.get(operand, operand) for operand in (first, other)]
+        places = [self.whole.read(operand) for operand in (first, other)]
         if _moves([places[0], *[None] * (k - 1), places[1]]) is not None:
             return True
         if not isinstance(first, Temporary) or not isinstance(other, Temporary):

@@ -65,11 +65,13 @@ POINTED = {
         ("sweep", "link_pin"), {k: k for k in ("angle", "forward", "condense", "recover")},
     ),
 }  # fmt: skip
-#: Largest number of speeds of a hinge, and the kernels that there are for every number.
+#: Largest number of speeds of a hinge, and the kernels that there are for every number, or for
+#: every number but none.
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
-    "forward_slope", "effort_slope", "tangent_column",
+    "forward_slope", "effort_slope", "tangent_column", "tangent_rows", "tangent_reduce",
+    "tangent_push", "tangent_answer",
 )  # fmt: skip
 
 
@@ -104,7 +106,12 @@ def _callees(specs: Specs) -> Iterator[tuple[str, Callee]]:
             symbol = abi.kernel_symbol(*key, kernel.name)
             yield f"{short}.{kernel.name}", Callee(f"{short}_{kernel.name}", kernel, "name", symbol)
     for name in GENERIC:
-        kernels = [_kernel(specs["sweep", f"generic{n}"], name) for n in range(MOST_SPEEDS + 1)]
+        kernels = [
+            kernel
+            for n in range(MOST_SPEEDS + 1)
+            for kernel in specs["sweep", f"generic{n}"].kernels
+            if kernel.name == name
+        ]
         _same_ports(kernels)
         yield f"generic.{name}", Callee(f"generic_{name}", kernels[-1], "speeds")
     for short, (key, names) in POINTED.items():
@@ -149,7 +156,12 @@ def tables(specs: Specs) -> str:
         if callee.by != "speeds":
             continue
         kernel = callee.kernel.name
-        names = [abi.kernel_symbol("sweep", f"generic{n}", kernel) for n in range(MOST_SPEEDS + 1)]
+        names = [
+            abi.kernel_symbol("sweep", f"generic{n}", kernel)
+            if any(kernel == known.name for known in specs["sweep", f"generic{n}"].kernels)
+            else "NULL"
+            for n in range(MOST_SPEEDS + 1)
+        ]
         rows = ",\n".join(f"    {name}" for name in names)
         name = f"mstmm_{callee.name}"
         lines.append(f"{name}_kernel *const {name}_table[] = {{\n{rows},\n}};\n")

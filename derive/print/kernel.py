@@ -86,7 +86,7 @@ class KernelText:
         return [self._statement(statement) for statement in self.kernel.statements]
 
     def _loops(self, alike: Alike) -> list[dict[str, Any]]:
-        """Loops over what is alike, each behind what its entries share; first what is not."""
+        """Loops over what is alike, each behind what its entries share; last what is not."""
         found: list[dict[str, Any]] = []
         known: set[int] = set()
 
@@ -96,12 +96,12 @@ class KernelText:
                     known.add(assign.number)
                     found.append(self._statement(assign))
 
-        for statement in alike.others:
-            shared(_operands(statement))
-            found.append(self._statement(statement))
         for loop in alike.loops:
             shared([Temporary(number) for number in loop.shared])
             found.append({"kind": "alike", "lines": self._loop(loop)})
+        for store in alike.others:
+            shared([store.value])
+            found.append(self._statement(store))
         return found
 
     def _loop(self, loop: Loop) -> list[str]:
@@ -110,12 +110,17 @@ class KernelText:
         lines = [f"for (int k = 0; k < {loop.count}; k += 2) {{"]
         if odd:
             lines.append(f"    const int next = k + 1 < {loop.count};")
-        for value in loop.values:
-            lines.append(f"    const two_t v{value.number} = {self._pair(value, odd)};")
         port = self.ports[loop.port.name]
-        sign = "+=" if port.accumulate else "="
+        taken = {v: _taken_off(port, v) for _, v in loop.stores}
+        for value in loop.values:
+            if taken.get(value) is None:
+                lines.append(f"    const two_t v{value.number} = {self._pair(value, odd)};")
         second = []
-        for index, value in loop.stores:
+        for index, stored in loop.stores:
+            value, sign = stored, "+=" if port.accumulate else "="
+            off = taken[stored]
+            if off is not None:
+                value, sign = off, "-="
             place, stride = self._moving(port, index, loop.axis)
             if stride == 1 and not odd:
                 lines.append(f"    *(two_free_t *)({place}) {sign} v{value.number};")
@@ -222,6 +227,8 @@ class KernelText:
 
     def operand(self, operand: Operand) -> str:
         """C text of an operand: a literal, an entry of an array or a temporary."""
+        if self.alike is not None:
+            operand = self.alike.read(operand)
         if isinstance(operand, Constant):
             return literal(operand.text)
         if isinstance(operand, Temporary):
@@ -236,6 +243,12 @@ class KernelText:
 
     def _entry(self, port: Port, index: tuple[int | str, ...]) -> str:
         return f"{self.names[port.name]}[{_place(port, index)}]"
+
+
+def _taken_off(port: Port, value: Value) -> Value | None:
+    """The value whose opposite is added to a port, if it is one."""
+    first = value.args[0] if port.accumulate and value.op == "neg" else None
+    return first if isinstance(first, Value) else None
 
 
 def _place(port: Port, index: tuple[int | str, ...]) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from mstmm.border.elements import c_outputs
+
 from ..schedule.slope import SLOPE, D, Sloped, ports_of
 from ..schedule.steps import (
     Add,
@@ -99,7 +101,7 @@ class StepText:
         if isinstance(step, Call):
             callee, ports = self._callee(step), ports_of(step)
             most = MOST_SPEEDS if ports.get("n") == "free" else 1
-            for port in (*callee.kernel.inputs, *callee.kernel.outputs):
+            for port in (*callee.kernel.inputs, *c_outputs(callee.kernel)):
                 slot = ports.get(port.name, f"local.unused_{port.name}")
                 yield slot, port.length(most)
         elif isinstance(step, Pick):

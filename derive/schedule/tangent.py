@@ -242,31 +242,33 @@ TANGENT_OWN = Pass(
 )  # fmt: skip
 
 
-def _node(matrices: str, **ports: str) -> dict[str, str]:
-    names = ("B", "G", "W", "V", "D", "right", "gain", "work")
-    return {name: f"{matrices}.{name}" for name in names} | ports
-
-
 _OWN = {name: f"bend.{name}" for name in ("K", "Z_z", "Z_x")}
-_REDUCED = Copy(to="tangent.S", source="local.S_c")
+_NODE = {
+    **{name: f"bend.{name}" for name in ("B", "G", "W", "V", "D", "right", "gain", "work")},
+    **_OWN, "S": "tangent.S", "S_c": "local.S_c",
+}  # fmt: skip
+_ROWS = {"K": "local.K", "right": "local.right"}
 _TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
 
 TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
     (
         *only("modal section", *_section("bend")),
-        call("tangent.node_own", n="modes", when="modal section", fails="tangent", H="section.H",
-             S="tangent.S", S_c="local.S_c", **_node("bend", **_OWN)),
-        call("tangent.node_own", n="modes", when="modal !section", fails="tangent", H="bend.still",
-             S="tangent.S", S_c="local.S_c", **_node("bend", **_OWN)),
-        *only("modal", _REDUCED),
+        call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
+             **_NODE),
+        call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
+             **_NODE),
+        *only("modal", Copy(to="tangent.S", source="local.S_c")),
         *only(
             "moving",
             *_HINGE,
             Pick(to="tangent.H", source="hinge.H", rows=6),
-            call("tangent.node", n="free", fails="tangent", H="tangent.H", S="tangent.S",
-                 S_c="local.S_c", **_node("tangent")),
-            _REDUCED,
+            call("generic{free}.tangent_rows", H="tangent.H", B="tangent.B", W="tangent.W",
+                 S="tangent.S", **_ROWS, D="local.D", one="local.one"),
+            call("tangent.invert", n="free", fails="tangent", D="local.D", one="local.one",
+                 inverse="tangent.inverse", work="local.work"),
+            call("generic{free}.tangent_reduce", inverse="tangent.inverse", **_ROWS,
+                 G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
         ),
         *only("outward", *_section("port")),
         call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
@@ -303,11 +305,11 @@ TANGENT_COLUMN = Pass(
 )  # fmt: skip
 
 
-def _pushed(matrices: str, size: str, subspace: str, rows: str) -> tuple[Step, ...]:
+def _pushed(subspace: str) -> tuple[Step, ...]:
     return (
-        call("tangent.push", n=size, H=subspace, V=f"{matrices}.V",
-             D=f"{matrices}.D", e=D + "body.e", e_f=rows, rest=f"{matrices}.rest",
-             y=f"{matrices}.y", e_c="local.e_c", work=f"{matrices}.work"),
+        call("tangent.push", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
+             e_f=D + "modes.e_f", rest="bend.rest", y="bend.y", e_c="local.e_c",
+             work="bend.work"),
         Copy(to=D + "body.e", source="local.e_c"),
     )  # fmt: skip
 
@@ -315,44 +317,45 @@ def _pushed(matrices: str, size: str, subspace: str, rows: str) -> tuple[Step, .
 TANGENT_CARRIED = Pass(
     "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
     (
-        *only("modal section", *_pushed("bend", "modes", "section.H", D + "modes.e_f")),
-        *only("modal !section", *_pushed("bend", "modes", "bend.still", D + "modes.e_f")),
+        *only("modal section", *_pushed("section.H")),
+        *only("modal !section", *_pushed("bend.still")),
+        *only("outward", *_FELT_CHANGE),
         *only(
             "moving",
             Pick(to="local.rows", source=D + "body.tau"),
-            *_pushed("tangent", "free", "tangent.H", "local.rows"),
+            call("generic{free}.tangent_push", Rc="body.R", r="body.r", H="tangent.H",
+                 V="tangent.V", inverse="tangent.inverse", e=D + "body.e", e_f="local.rows",
+                 y="tangent.y", e_I=D + "parent.e"),
         ),
-        *only("outward", *_FELT_CHANGE),
-        call("frames.transport", Rc="body.R", r="body.r", e=D + "body.e", e_I=D + "parent.e"),
+        call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
+             e_I=D + "parent.e"),
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
 _MOVED = Copy(to=D + "body.motion", source="local.z")
-
-
-def _answered(matrices: str, size: str, unknowns: str) -> tuple[Step, ...]:
-    return (
-        call("tangent.answer", n=size, B=f"{matrices}.B", gain=f"{matrices}.gain",
-             y=f"{matrices}.y", z_c=D + "body.motion", x=unknowns, z="local.z"),
-        _MOVED,
-    )  # fmt: skip
-
+_BEHIND = _TH | {"z_I": D + "parent.motion", "z": D + "body.motion"}
 
 TANGENT_ANSWERED = Pass(
     "tangent_answered", "body", "Unknowns that answer a right-hand side.",
     (
         Copy(to="body.answer"),
-        call("frames.tangent_moved", **_TH, z_I=D + "parent.motion", z=D + "body.motion"),
+        *only(
+            "moving",
+            call("generic{free}.tangent_answer", **_BEHIND, B="tangent.B", gain="tangent.gain",
+                 y="tangent.y", x="local.x"),
+            Spread(to="body.answer", free="local.x"),
+        ),
+        call("frames.tangent_moved", when="!moving", **_BEHIND),
         call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
         *only("outward", _MOVED),
         *only(
-            "moving",
-            *_answered("tangent", "free", "local.x"),
-            Spread(to="body.answer", free="local.x"),
+            "modal",
+            call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
+                 z_c=D + "body.motion", x="modes.answer", z="local.z"),
+            _MOVED,
         ),
-        *only("modal", *_answered("bend", "modes", "modes.answer")),
     ),
     skip="idle",
 )  # fmt: skip

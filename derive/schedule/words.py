@@ -175,13 +175,10 @@ tangent.G | 6 nu | change of the load that is carried, a row a speed
 tangent.W | nu nu | change of the rows by load and laws, a row a speed
 tangent.laws | nu nu | change of the laws' efforts, a row a speed
 tangent.H | 6 nu | columns of H of the free speeds
-tangent.V | 6 nu | load by the unknowns
-tangent.D | nu nu | rows by the unknowns
-tangent.right | 9 nu | rows by the motion
-tangent.gain | 9 nu | D^-1 times them
-tangent.work | nu nu | factors of D
-tangent.rest | nu | what is left of the rows
-tangent.y | nu | D^-1 times it
+tangent.V | 6 nu | load by the unknowns, a row a speed
+tangent.gain | 9 nu | rows by the motion, divided by those by the unknowns
+tangent.inverse | nu nu | inverse of the rows by the unknowns
+tangent.y | nu | what is left of the rows, divided by those by the unknowns
 tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
 tangent.turns | nq nq | slopes of the rates by the coordinates, a row a coordinate
 tangent.unit | nq nq | unit matrix
