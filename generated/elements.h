@@ -503,6 +503,8 @@ int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restri
 int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z);
+int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+    const real *restrict d_d, real *restrict theta, real *restrict x);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -564,12 +566,15 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic0_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
 int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -604,12 +609,22 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -657,12 +672,22 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -710,12 +735,22 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -763,12 +798,22 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -816,12 +861,22 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic5_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -869,12 +924,22 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic6_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);

@@ -356,6 +356,20 @@ static inline int mstmm_frames_tangent_moved_by(struct mstmm_frames_tangent_move
 }
 #define mstmm_frames_tangent_moved(...) mstmm_frames_tangent_moved_by((struct mstmm_frames_tangent_moved){__VA_ARGS__})
 
+struct mstmm_frames_tangent_turned {
+    const real *R;
+    const real *d_R;
+    const real *d_d;
+    real *theta;
+    real *x;
+};
+static inline int mstmm_frames_tangent_turned_by(struct mstmm_frames_tangent_turned to)
+{
+    return mstmm_sweep_frames_tangent_turned(
+        to.R, to.d_R, to.d_d, to.theta, to.x);
+}
+#define mstmm_frames_tangent_turned(...) mstmm_frames_tangent_turned_by((struct mstmm_frames_tangent_turned){__VA_ARGS__})
+
 struct mstmm_frames_pose_slope {
     const real *A_I;
     const real *x_I;
@@ -2153,25 +2167,45 @@ static inline int mstmm_generic_effort_slope_by(int speeds, struct mstmm_generic
 }
 #define mstmm_generic_effort_slope(speeds, ...) mstmm_generic_effort_slope_by(speeds, (struct mstmm_generic_effort_slope){__VA_ARGS__})
 
-struct mstmm_generic_tangent_column {
-    const real *R;
+struct mstmm_generic_tangent_carrier {
     const real *H;
     const real *s;
     const real *v;
     const real *w;
     const real *c;
     const real *motion;
+    real *Q;
+};
+typedef int mstmm_generic_tangent_carrier_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[];
+static inline int mstmm_generic_tangent_carrier_by(int speeds, struct mstmm_generic_tangent_carrier to)
+{
+    return mstmm_generic_tangent_carrier_table[speeds](
+        to.H, to.s, to.v, to.w, to.c, to.motion, to.Q);
+}
+#define mstmm_generic_tangent_carrier(speeds, ...) mstmm_generic_tangent_carrier_by(speeds, (struct mstmm_generic_tangent_carrier){__VA_ARGS__})
+
+struct mstmm_generic_tangent_column {
+    const real *theta;
+    const real *x;
+    const real *H;
+    const real *s;
+    const real *v;
+    const real *w;
+    const real *Q;
     const real *f;
-    const real *d_R;
-    const real *d_d;
     const real *d_H;
     const real *d_v;
     const real *d_w;
     const real *d_c;
     const real *d_s;
+    const real *J;
+    const real *laws;
     real *B;
     real *G;
-    real *d_tau;
+    real *row;
 };
 typedef int mstmm_generic_tangent_column_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
@@ -2183,10 +2217,56 @@ extern mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_t
 static inline int mstmm_generic_tangent_column_by(int speeds, struct mstmm_generic_tangent_column to)
 {
     return mstmm_generic_tangent_column_table[speeds](
-        to.R, to.H, to.s, to.v, to.w, to.c, to.motion, to.f, to.d_R, to.d_d, to.d_H, to.d_v,
-        to.d_w, to.d_c, to.d_s, to.B, to.G, to.d_tau);
+        to.theta, to.x, to.H, to.s, to.v, to.w, to.Q, to.f, to.d_H, to.d_v, to.d_w, to.d_c,
+        to.d_s, to.J, to.laws, to.B, to.G, to.row);
 }
 #define mstmm_generic_tangent_column(speeds, ...) mstmm_generic_tangent_column_by(speeds, (struct mstmm_generic_tangent_column){__VA_ARGS__})
+
+struct mstmm_generic_tangent_along {
+    const real *H;
+    const real *d_q;
+    real *theta;
+    real *x;
+};
+typedef int mstmm_generic_tangent_along_kernel(
+    const real *restrict, const real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_along_kernel *const mstmm_generic_tangent_along_table[];
+static inline int mstmm_generic_tangent_along_by(int speeds, struct mstmm_generic_tangent_along to)
+{
+    return mstmm_generic_tangent_along_table[speeds](
+        to.H, to.d_q, to.theta, to.x);
+}
+#define mstmm_generic_tangent_along(speeds, ...) mstmm_generic_tangent_along_by(speeds, (struct mstmm_generic_tangent_along){__VA_ARGS__})
+
+struct mstmm_generic_tangent_steady {
+    const real *theta;
+    const real *x;
+    const real *H;
+    const real *v;
+    const real *w;
+    const real *Q;
+    const real *f;
+    const real *d_u;
+    const real *d_s;
+    const real *J;
+    const real *laws;
+    real *B;
+    real *G;
+    real *row;
+};
+typedef int mstmm_generic_tangent_steady_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict, real *restrict);
+extern mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[];
+static inline int mstmm_generic_tangent_steady_by(int speeds, struct mstmm_generic_tangent_steady to)
+{
+    return mstmm_generic_tangent_steady_table[speeds](
+        to.theta, to.x, to.H, to.v, to.w, to.Q, to.f, to.d_u, to.d_s, to.J, to.laws, to.B, to.G,
+        to.row);
+}
+#define mstmm_generic_tangent_steady(speeds, ...) mstmm_generic_tangent_steady_by(speeds, (struct mstmm_generic_tangent_steady){__VA_ARGS__})
 
 struct mstmm_generic_tangent_rows {
     const real *H;

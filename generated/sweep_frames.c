@@ -62,6 +62,8 @@ int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restri
 int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z);
+int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+    const real *restrict d_d, real *restrict theta, real *restrict x);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -2405,6 +2407,74 @@ static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* turn and change of place along a direction
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  R[3][3]
+ * in  d_R[3][3]
+ * in  d_d[3]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+    const real *restrict d_d, real *restrict theta, real *restrict x)
+{
+    const real t0 = R[8] * d_R[7];
+    const real t1 = R[2] * d_R[1];
+    const real t2 = R[5] * d_R[4];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    theta[0] = t4;
+    const real t5 = R[6] * d_R[8];
+    const real t6 = R[0] * d_R[2];
+    const real t7 = R[3] * d_R[5];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    theta[1] = t9;
+    const real t10 = R[7] * d_R[6];
+    const real t11 = R[1] * d_R[0];
+    const real t12 = R[4] * d_R[3];
+    const real t13 = t11 + t12;
+    const real t14 = t10 + t13;
+    theta[2] = t14;
+    const real t15 = R[0] * d_d[0];
+    const real t16 = R[3] * d_d[1];
+    const real t17 = t15 + t16;
+    const real t18 = R[6] * d_d[2];
+    const real t19 = t17 + t18;
+    x[0] = t19;
+    const real t20 = R[1] * d_d[0];
+    const real t21 = R[4] * d_d[1];
+    const real t22 = t20 + t21;
+    const real t23 = R[7] * d_d[2];
+    const real t24 = t22 + t23;
+    x[1] = t24;
+    const real t25 = R[2] * d_d[0];
+    const real t26 = R[5] * d_d[1];
+    const real t27 = t25 + t26;
+    const real t28 = R[8] * d_d[2];
+    const real t29 = t27 + t28;
+    x[2] = t29;
+    return 0;
+}
+
+static int mstmm_sweep_frames_tangent_turned_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_tangent_turned(in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_tangent_turned_inputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d_R", 9, "", 0, 0},
+    {"d_d", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
 /* pose and its derivative along a direction
  * in  A_I[3][3] rotation, parent axes to inertial axes
  * in  x_I[3] (m) P of the parent, inertial axes
@@ -3929,6 +3999,18 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turned",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_turned,
+        .call = mstmm_sweep_frames_tangent_turned_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_tangent_turned_inputs,
+        .outputs = mstmm_sweep_frames_tangent_turned_outputs,
+        .ir_hash = "56d92003cfb79c71f4c8fc829fe2c7323749f7e020e918457ea5ec958d9a3af5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "pose_slope",
         .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
         .call = mstmm_sweep_frames_pose_slope_call,
@@ -4054,7 +4136,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "2b576f506280dc0c8924d6b908cf4e14b26d757e5f8863ac2f5020837d06eea0",
+    .hash = "8a4d1de6e8caf2916987aca2bdfd595e8eeb597b9516a8c22a826bd207c7de8c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4064,6 +4146,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 34,
+    .n_kernels = 35,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -33,12 +33,15 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic0_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
 int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1189,346 +1192,300 @@ static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 0 speeds
+/* motion of Q across a hinge with 0 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][0]
  * in  s[0]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    (void)H;
+    (void)s;
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = t5 - c[3];
+    const real t7 = motion[3] + t6;
+    Q[3] = t7;
+    const real t8 = w[2] * t0;
+    const real t9 = w[0] * t2;
+    const real t10 = t8 - t9;
+    const real t11 = t10 - c[4];
+    const real t12 = motion[4] + t11;
+    Q[4] = t12;
+    const real t13 = w[0] * t1;
+    const real t14 = w[1] * t0;
+    const real t15 = t13 - t14;
+    const real t16 = t15 - c[5];
+    const real t17 = motion[5] + t16;
+    Q[5] = t17;
+    const real t18 = v[1] * t2;
+    const real t19 = t18 * 2.0;
+    const real t20 = v[2] * t1;
+    const real t21 = 2.0 * t20;
+    const real t22 = t19 - t21;
+    const real t23 = t22 - c[0];
+    const real t24 = motion[6] + t23;
+    Q[6] = t24;
+    const real t25 = v[2] * t0;
+    const real t26 = 2.0 * t25;
+    const real t27 = v[0] * t2;
+    const real t28 = 2.0 * t27;
+    const real t29 = t26 - t28;
+    const real t30 = t29 - c[1];
+    const real t31 = motion[7] + t30;
+    Q[7] = t31;
+    const real t32 = v[0] * t1;
+    const real t33 = 2.0 * t32;
+    const real t34 = v[1] * t0;
+    const real t35 = 2.0 * t34;
+    const real t36 = t33 - t35;
+    const real t37 = t36 - c[2];
+    const real t38 = motion[8] + t37;
+    Q[8] = t38;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_tangent_carrier_inputs[] = {
+    {"H", 0, "", 0, 0},
+    {"s", 0, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 0 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][0]
+ * in  s[0]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][0]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[0]
- * out B[9]
- * out G[6]
- * out d_tau[0]
+ * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[0] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[0] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic0_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
     (void)H;
     (void)s;
     (void)d_H;
     (void)d_s;
-    (void)d_tau;
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
-    const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
-    const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
-    const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
-    const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
-    const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
-    const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
-    const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
-    const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
-    const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = d_w[2] * t12;
-    const real t67 = d_w[1] * t20;
-    const real t68 = t66 - t67;
-    const real t69 = d_c[3] + t68;
-    const real t70 = w[1] * t64;
-    const real t71 = w[2] * t43;
+    (void)J;
+    (void)laws;
+    (void)row;
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = theta[2] * Q[4];
+    const real t16 = Q[1] * d_w[2];
+    const real t17 = Q[2] * d_w[1];
+    const real t18 = t16 - t17;
+    const real t19 = t15 + t18;
+    const real t20 = theta[1] * Q[5];
+    const real t21 = t19 - t20;
+    const real t22 = d_c[3] + t21;
+    const real t23 = t14 + t22;
+    B[3] = t23;
+    const real t24 = w[0] * t10;
+    const real t25 = w[2] * t2;
+    const real t26 = t24 - t25;
+    const real t27 = theta[0] * Q[5];
+    const real t28 = Q[2] * d_w[0];
+    const real t29 = Q[0] * d_w[2];
+    const real t30 = t28 - t29;
+    const real t31 = theta[2] * Q[3];
+    const real t32 = t30 - t31;
+    const real t33 = t27 + t32;
+    const real t34 = d_c[4] + t33;
+    const real t35 = t26 + t34;
+    B[4] = t35;
+    const real t36 = w[1] * t2;
+    const real t37 = w[0] * t6;
+    const real t38 = t36 - t37;
+    const real t39 = theta[1] * Q[3];
+    const real t40 = Q[0] * d_w[1];
+    const real t41 = Q[1] * d_w[0];
+    const real t42 = t40 - t41;
+    const real t43 = t39 + t42;
+    const real t44 = theta[0] * Q[4];
+    const real t45 = t43 - t44;
+    const real t46 = d_c[5] + t45;
+    const real t47 = t38 + t46;
+    B[5] = t47;
+    const real t48 = v[2] * 2.0;
+    const real t49 = t6 * t48;
+    const real t50 = v[1] * 2.0;
+    const real t51 = t10 * t50;
+    const real t52 = t49 - t51;
+    const real t53 = theta[2] * Q[7];
+    const real t54 = x[2] * Q[4];
+    const real t55 = Q[1] * d_v[2];
+    const real t56 = 2.0 * t55;
+    const real t57 = x[1] * Q[0];
+    const real t58 = x[0] * Q[1];
+    const real t59 = t57 - t58;
+    const real t60 = Q[1] * t59;
+    const real t61 = x[0] * Q[2];
+    const real t62 = x[2] * Q[0];
+    const real t63 = t61 - t62;
+    const real t64 = Q[2] * t63;
+    const real t65 = t60 - t64;
+    const real t66 = t56 + t65;
+    const real t67 = Q[2] * d_v[1];
+    const real t68 = 2.0 * t67;
+    const real t69 = t66 - t68;
+    const real t70 = t54 + t69;
+    const real t71 = x[1] * Q[5];
     const real t72 = t70 - t71;
-    const real t73 = w[1] * t20;
-    const real t74 = w[2] * t12;
+    const real t73 = t53 + t72;
+    const real t74 = theta[1] * Q[8];
     const real t75 = t73 - t74;
-    const real t76 = t75 - c[3];
-    const real t77 = motion[3] + t76;
-    const real t78 = t4 * t77;
-    const real t79 = w[2] * t5;
-    const real t80 = w[0] * t20;
+    const real t76 = d_c[0] + t75;
+    const real t77 = t52 + t76;
+    B[6] = t77;
+    const real t78 = v[0] * 2.0;
+    const real t79 = t10 * t78;
+    const real t80 = t2 * t48;
     const real t81 = t79 - t80;
-    const real t82 = t81 - c[4];
-    const real t83 = motion[4] + t82;
-    const real t84 = t11 * t83;
-    const real t85 = t78 + t84;
-    const real t86 = w[0] * t12;
-    const real t87 = w[1] * t5;
+    const real t82 = theta[0] * Q[8];
+    const real t83 = x[0] * Q[5];
+    const real t84 = Q[2] * d_v[0];
+    const real t85 = 2.0 * t84;
+    const real t86 = x[2] * Q[1];
+    const real t87 = x[1] * Q[2];
     const real t88 = t86 - t87;
-    const real t89 = t88 - c[5];
-    const real t90 = motion[5] + t89;
-    const real t91 = t19 * t90;
-    const real t92 = t85 + t91;
-    const real t93 = t72 - t92;
-    const real t94 = t69 + t93;
-    B[3] = t94;
-    const real t95 = d_w[0] * t20;
-    const real t96 = d_w[2] * t5;
+    const real t89 = Q[2] * t88;
+    const real t90 = Q[0] * t59;
+    const real t91 = t89 - t90;
+    const real t92 = Q[0] * d_v[2];
+    const real t93 = 2.0 * t92;
+    const real t94 = t91 - t93;
+    const real t95 = t85 + t94;
+    const real t96 = x[2] * Q[3];
     const real t97 = t95 - t96;
-    const real t98 = d_c[4] + t97;
-    const real t99 = w[2] * t22;
-    const real t100 = w[0] * t64;
-    const real t101 = t99 - t100;
-    const real t102 = t28 * t77;
-    const real t103 = t34 * t83;
-    const real t104 = t102 + t103;
-    const real t105 = t41 * t90;
-    const real t106 = t104 + t105;
-    const real t107 = t101 - t106;
-    const real t108 = t98 + t107;
-    B[4] = t108;
-    const real t109 = d_w[1] * t5;
-    const real t110 = d_w[0] * t12;
-    const real t111 = t109 - t110;
-    const real t112 = d_c[5] + t111;
-    const real t113 = w[0] * t43;
-    const real t114 = w[1] * t22;
-    const real t115 = t113 - t114;
-    const real t116 = t49 * t77;
-    const real t117 = t55 * t83;
-    const real t118 = t116 + t117;
-    const real t119 = t62 * t90;
-    const real t120 = t118 + t119;
-    const real t121 = t115 - t120;
-    const real t122 = t112 + t121;
-    B[5] = t122;
-    const real t123 = d_v[2] * t12;
-    const real t124 = 2.0 * t123;
-    const real t125 = d_v[1] * t20;
-    const real t126 = 2.0 * t125;
-    const real t127 = t124 - t126;
-    const real t128 = d_c[0] + t127;
-    const real t129 = R[1] * d_d[0];
-    const real t130 = R[4] * d_d[1];
-    const real t131 = t129 + t130;
-    const real t132 = R[7] * d_d[2];
-    const real t133 = t131 + t132;
-    const real t134 = t5 * t12;
-    const real t135 = t133 * t134;
-    const real t136 = R[0] * d_d[0];
-    const real t137 = R[3] * d_d[1];
-    const real t138 = t136 + t137;
-    const real t139 = R[6] * d_d[2];
-    const real t140 = t138 + t139;
-    const real t141 = t12 * t12;
-    const real t142 = t20 * t20;
-    const real t143 = t141 + t142;
-    const real t144 = t140 * t143;
-    const real t145 = t135 - t144;
-    const real t146 = R[2] * d_d[0];
-    const real t147 = R[5] * d_d[1];
-    const real t148 = t146 + t147;
-    const real t149 = R[8] * d_d[2];
-    const real t150 = t148 + t149;
-    const real t151 = t5 * t20;
-    const real t152 = t150 * t151;
-    const real t153 = t145 + t152;
-    const real t154 = v[1] * 2.0;
-    const real t155 = t64 * t154;
-    const real t156 = v[2] * 2.0;
-    const real t157 = t43 * t156;
-    const real t158 = t155 - t157;
-    const real t159 = t150 * t83;
-    const real t160 = t133 * t90;
-    const real t161 = t159 - t160;
-    const real t162 = t158 + t161;
-    const real t163 = t153 + t162;
-    const real t164 = v[1] * t20;
-    const real t165 = t164 * 2.0;
-    const real t166 = v[2] * t12;
-    const real t167 = 2.0 * t166;
-    const real t168 = t165 - t167;
-    const real t169 = t168 - c[0];
-    const real t170 = motion[6] + t169;
-    const real t171 = t4 * t170;
-    const real t172 = v[2] * t5;
-    const real t173 = 2.0 * t172;
-    const real t174 = v[0] * t20;
-    const real t175 = 2.0 * t174;
-    const real t176 = t173 - t175;
-    const real t177 = t176 - c[1];
-    const real t178 = motion[7] + t177;
-    const real t179 = t11 * t178;
-    const real t180 = t171 + t179;
-    const real t181 = v[0] * t12;
-    const real t182 = 2.0 * t181;
-    const real t183 = v[1] * t5;
-    const real t184 = 2.0 * t183;
-    const real t185 = t182 - t184;
-    const real t186 = t185 - c[2];
-    const real t187 = motion[8] + t186;
-    const real t188 = t19 * t187;
-    const real t189 = t180 + t188;
-    const real t190 = t163 - t189;
-    const real t191 = t128 + t190;
-    B[6] = t191;
-    const real t192 = d_v[0] * t20;
-    const real t193 = 2.0 * t192;
-    const real t194 = d_v[2] * t5;
-    const real t195 = 2.0 * t194;
-    const real t196 = t193 - t195;
-    const real t197 = d_c[1] + t196;
-    const real t198 = t140 * t134;
-    const real t199 = t5 * t5;
-    const real t200 = t142 + t199;
-    const real t201 = t133 * t200;
-    const real t202 = t198 - t201;
-    const real t203 = t12 * t20;
-    const real t204 = t150 * t203;
-    const real t205 = t202 + t204;
-    const real t206 = t22 * t156;
-    const real t207 = v[0] * 2.0;
-    const real t208 = t64 * t207;
-    const real t209 = t206 - t208;
-    const real t210 = t140 * t90;
-    const real t211 = t150 * t77;
-    const real t212 = t210 - t211;
-    const real t213 = t209 + t212;
-    const real t214 = t205 + t213;
-    const real t215 = t28 * t170;
-    const real t216 = t34 * t178;
-    const real t217 = t215 + t216;
-    const real t218 = t41 * t187;
-    const real t219 = t217 + t218;
-    const real t220 = t214 - t219;
-    const real t221 = t197 + t220;
-    B[7] = t221;
-    const real t222 = d_v[1] * t5;
-    const real t223 = 2.0 * t222;
-    const real t224 = d_v[0] * t12;
-    const real t225 = 2.0 * t224;
-    const real t226 = t223 - t225;
-    const real t227 = d_c[2] + t226;
-    const real t228 = t140 * t151;
-    const real t229 = t133 * t203;
-    const real t230 = t228 + t229;
-    const real t231 = t141 + t199;
-    const real t232 = t150 * t231;
-    const real t233 = t230 - t232;
-    const real t234 = t43 * t207;
-    const real t235 = t22 * t154;
-    const real t236 = t234 - t235;
-    const real t237 = t133 * t77;
-    const real t238 = t140 * t83;
-    const real t239 = t237 - t238;
-    const real t240 = t236 + t239;
-    const real t241 = t233 + t240;
-    const real t242 = t49 * t170;
-    const real t243 = t55 * t178;
-    const real t244 = t242 + t243;
-    const real t245 = t62 * t187;
-    const real t246 = t244 + t245;
-    const real t247 = t241 - t246;
-    const real t248 = t227 + t247;
-    B[8] = t248;
-    const real t249 = f[0] * t4;
-    const real t250 = f[1] * t11;
-    const real t251 = t249 + t250;
-    const real t252 = f[2] * t19;
-    const real t253 = t251 + t252;
-    G[0] = t253;
-    const real t254 = f[0] * t28;
-    const real t255 = f[1] * t34;
-    const real t256 = t254 + t255;
-    const real t257 = f[2] * t41;
-    const real t258 = t256 + t257;
-    G[1] = t258;
-    const real t259 = f[0] * t49;
-    const real t260 = f[1] * t55;
-    const real t261 = t259 + t260;
-    const real t262 = f[2] * t62;
-    const real t263 = t261 + t262;
-    G[2] = t263;
-    const real t264 = f[3] * t4;
-    const real t265 = f[4] * t11;
-    const real t266 = t264 + t265;
-    const real t267 = f[5] * t19;
-    const real t268 = t266 + t267;
-    const real t269 = f[2] * t133;
-    const real t270 = f[1] * t150;
-    const real t271 = t269 - t270;
-    const real t272 = t268 + t271;
-    G[3] = t272;
-    const real t273 = f[3] * t28;
-    const real t274 = f[4] * t34;
-    const real t275 = t273 + t274;
-    const real t276 = f[5] * t41;
-    const real t277 = t275 + t276;
-    const real t278 = f[0] * t150;
-    const real t279 = f[2] * t140;
-    const real t280 = t278 - t279;
-    const real t281 = t277 + t280;
-    G[4] = t281;
-    const real t282 = f[3] * t49;
-    const real t283 = f[4] * t55;
-    const real t284 = t282 + t283;
-    const real t285 = f[5] * t62;
-    const real t286 = t284 + t285;
-    const real t287 = f[1] * t140;
-    const real t288 = f[0] * t133;
-    const real t289 = t287 - t288;
-    const real t290 = t286 + t289;
-    G[5] = t290;
+    const real t98 = t83 + t97;
+    const real t99 = theta[2] * Q[6];
+    const real t100 = t98 - t99;
+    const real t101 = t82 + t100;
+    const real t102 = d_c[1] + t101;
+    const real t103 = t81 + t102;
+    B[7] = t103;
+    const real t104 = t2 * t50;
+    const real t105 = t6 * t78;
+    const real t106 = t104 - t105;
+    const real t107 = theta[1] * Q[6];
+    const real t108 = x[1] * Q[3];
+    const real t109 = Q[0] * d_v[1];
+    const real t110 = 2.0 * t109;
+    const real t111 = Q[0] * t63;
+    const real t112 = Q[1] * t88;
+    const real t113 = t111 - t112;
+    const real t114 = t110 + t113;
+    const real t115 = Q[1] * d_v[0];
+    const real t116 = 2.0 * t115;
+    const real t117 = t114 - t116;
+    const real t118 = t108 + t117;
+    const real t119 = x[0] * Q[4];
+    const real t120 = t118 - t119;
+    const real t121 = t107 + t120;
+    const real t122 = theta[0] * Q[7];
+    const real t123 = t121 - t122;
+    const real t124 = d_c[2] + t123;
+    const real t125 = t106 + t124;
+    B[8] = t125;
+    const real t126 = theta[1] * f[2];
+    const real t127 = theta[2] * f[1];
+    const real t128 = t126 - t127;
+    G[0] = t128;
+    const real t129 = theta[2] * f[0];
+    const real t130 = theta[0] * f[2];
+    const real t131 = t129 - t130;
+    G[1] = t131;
+    const real t132 = theta[0] * f[1];
+    const real t133 = theta[1] * f[0];
+    const real t134 = t132 - t133;
+    G[2] = t134;
+    const real t135 = theta[1] * f[5];
+    const real t136 = x[1] * f[2];
+    const real t137 = x[2] * f[1];
+    const real t138 = t136 - t137;
+    const real t139 = theta[2] * f[4];
+    const real t140 = t138 - t139;
+    const real t141 = t135 + t140;
+    G[3] = t141;
+    const real t142 = theta[2] * f[3];
+    const real t143 = x[2] * f[0];
+    const real t144 = x[0] * f[2];
+    const real t145 = t143 - t144;
+    const real t146 = t142 + t145;
+    const real t147 = theta[0] * f[5];
+    const real t148 = t146 - t147;
+    G[4] = t148;
+    const real t149 = theta[0] * f[4];
+    const real t150 = x[0] * f[1];
+    const real t151 = x[1] * f[0];
+    const real t152 = t150 - t151;
+    const real t153 = theta[1] * f[3];
+    const real t154 = t152 - t153;
+    const real t155 = t149 + t154;
+    G[5] = t155;
     return 0;
 }
 
@@ -1539,27 +1496,27 @@ static int mstmm_sweep_generic0_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic0_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 0, "", 0, 0},
     {"s", 0, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 0, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 0, "", 0, 0},
+    {"J", 0, "kg*m2 or kg", 0, 0},
+    {"laws", 0, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic0_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 0, "", 0, 0},
+    {"row", 0, "", 0, 0},
 };
 
 /* forward and its derivative along a direction
@@ -2183,6 +2140,18 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic0_tangent_carrier,
+        .call = mstmm_sweep_generic0_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic0_tangent_carrier_outputs,
+        .ir_hash = "a13a909c20a689eb10da8d5270e6537d146216a21be5a1818f8bec39a972c75b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic0_tangent_column,
         .call = mstmm_sweep_generic0_tangent_column_call,
@@ -2190,7 +2159,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic0_tangent_column_inputs,
         .outputs = mstmm_sweep_generic0_tangent_column_outputs,
-        .ir_hash = "334ae64d2d6c9af6075173a109a922f7b2aefff50df275f2b5eff87e8ec4ea94",
+        .ir_hash = "070258be2fe2bf57856349d300557bfee1886a4a94d184abd16c19e25702d850",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2224,7 +2193,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "406c7df9902c0ef9d104debe15f4e3043c8367e858a31b5829fd05f9bf8b7f28",
+    .hash = "8674a131d5d3e5b7c85cc09ed9c60d33fe5f4a5a1e03b7214a83b8531cd4323f",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2234,6 +2203,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 11,
+    .n_kernels = 12,
     .kernels = mstmm_sweep_generic0_kernels,
 };

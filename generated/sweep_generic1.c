@@ -34,12 +34,22 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -1644,389 +1654,342 @@ static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 1 speeds
+/* motion of Q across a hinge with 1 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6]
  * in  s[1]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[3] * s[0];
+    const real t7 = c[3] + t6;
+    const real t8 = t5 - t7;
+    const real t9 = motion[3] + t8;
+    Q[3] = t9;
+    const real t10 = w[2] * t0;
+    const real t11 = w[0] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = H[4] * s[0];
+    const real t14 = c[4] + t13;
+    const real t15 = t12 - t14;
+    const real t16 = motion[4] + t15;
+    Q[4] = t16;
+    const real t17 = w[0] * t1;
+    const real t18 = w[1] * t0;
+    const real t19 = t17 - t18;
+    const real t20 = H[5] * s[0];
+    const real t21 = c[5] + t20;
+    const real t22 = t19 - t21;
+    const real t23 = motion[5] + t22;
+    Q[5] = t23;
+    const real t24 = v[1] * t2;
+    const real t25 = t24 * 2.0;
+    const real t26 = v[2] * t1;
+    const real t27 = 2.0 * t26;
+    const real t28 = t25 - t27;
+    const real t29 = H[0] * s[0];
+    const real t30 = c[0] + t29;
+    const real t31 = t28 - t30;
+    const real t32 = motion[6] + t31;
+    Q[6] = t32;
+    const real t33 = v[2] * t0;
+    const real t34 = 2.0 * t33;
+    const real t35 = v[0] * t2;
+    const real t36 = 2.0 * t35;
+    const real t37 = t34 - t36;
+    const real t38 = H[1] * s[0];
+    const real t39 = c[1] + t38;
+    const real t40 = t37 - t39;
+    const real t41 = motion[7] + t40;
+    Q[7] = t41;
+    const real t42 = v[0] * t1;
+    const real t43 = 2.0 * t42;
+    const real t44 = v[1] * t0;
+    const real t45 = 2.0 * t44;
+    const real t46 = t43 - t45;
+    const real t47 = H[2] * s[0];
+    const real t48 = c[2] + t47;
+    const real t49 = t46 - t48;
+    const real t50 = motion[8] + t49;
+    Q[8] = t50;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_carrier_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 1 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6]
+ * in  s[1]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[1]
- * out B[9]
- * out G[6]
- * out d_tau[1]
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[1] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic1_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[3] * d_s[0];
+    const real t16 = s[0] * d_H[3];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
-    const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
-    const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
-    const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
-    const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
+    const real t18 = d_c[3] + t17;
+    const real t19 = theta[2] * Q[4];
+    const real t20 = Q[1] * d_w[2];
+    const real t21 = Q[2] * d_w[1];
+    const real t22 = t20 - t21;
+    const real t23 = t19 + t22;
+    const real t24 = theta[1] * Q[5];
+    const real t25 = t23 - t24;
+    const real t26 = t18 + t25;
+    const real t27 = t14 + t26;
+    B[3] = t27;
+    const real t28 = w[0] * t10;
+    const real t29 = w[2] * t2;
+    const real t30 = t28 - t29;
+    const real t31 = H[4] * d_s[0];
+    const real t32 = s[0] * d_H[4];
+    const real t33 = t31 + t32;
+    const real t34 = d_c[4] + t33;
+    const real t35 = theta[0] * Q[5];
+    const real t36 = Q[2] * d_w[0];
+    const real t37 = Q[0] * d_w[2];
+    const real t38 = t36 - t37;
+    const real t39 = theta[2] * Q[3];
+    const real t40 = t38 - t39;
+    const real t41 = t35 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t30 + t42;
+    B[4] = t43;
+    const real t44 = w[1] * t2;
+    const real t45 = w[0] * t6;
+    const real t46 = t44 - t45;
+    const real t47 = H[5] * d_s[0];
+    const real t48 = s[0] * d_H[5];
     const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
-    const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
-    const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
-    const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[3] * d_s[0];
-    const real t67 = s[0] * d_H[3];
-    const real t68 = t66 + t67;
-    const real t69 = d_c[3] + t68;
-    const real t70 = d_w[2] * t12;
-    const real t71 = d_w[1] * t20;
-    const real t72 = t70 - t71;
-    const real t73 = t69 + t72;
-    const real t74 = w[1] * t64;
-    const real t75 = w[2] * t43;
-    const real t76 = t74 - t75;
-    const real t77 = w[1] * t20;
-    const real t78 = w[2] * t12;
+    const real t50 = d_c[5] + t49;
+    const real t51 = theta[1] * Q[3];
+    const real t52 = Q[0] * d_w[1];
+    const real t53 = Q[1] * d_w[0];
+    const real t54 = t52 - t53;
+    const real t55 = t51 + t54;
+    const real t56 = theta[0] * Q[4];
+    const real t57 = t55 - t56;
+    const real t58 = t50 + t57;
+    const real t59 = t46 + t58;
+    B[5] = t59;
+    const real t60 = v[2] * 2.0;
+    const real t61 = t6 * t60;
+    const real t62 = v[1] * 2.0;
+    const real t63 = t10 * t62;
+    const real t64 = t61 - t63;
+    const real t65 = H[0] * d_s[0];
+    const real t66 = s[0] * d_H[0];
+    const real t67 = t65 + t66;
+    const real t68 = d_c[0] + t67;
+    const real t69 = theta[2] * Q[7];
+    const real t70 = x[2] * Q[4];
+    const real t71 = Q[1] * d_v[2];
+    const real t72 = 2.0 * t71;
+    const real t73 = x[1] * Q[0];
+    const real t74 = x[0] * Q[1];
+    const real t75 = t73 - t74;
+    const real t76 = Q[1] * t75;
+    const real t77 = x[0] * Q[2];
+    const real t78 = x[2] * Q[0];
     const real t79 = t77 - t78;
-    const real t80 = H[3] * s[0];
-    const real t81 = c[3] + t80;
-    const real t82 = t79 - t81;
-    const real t83 = motion[3] + t82;
-    const real t84 = t4 * t83;
-    const real t85 = w[2] * t5;
-    const real t86 = w[0] * t20;
-    const real t87 = t85 - t86;
-    const real t88 = H[4] * s[0];
-    const real t89 = c[4] + t88;
-    const real t90 = t87 - t89;
-    const real t91 = motion[4] + t90;
-    const real t92 = t11 * t91;
-    const real t93 = t84 + t92;
-    const real t94 = w[0] * t12;
-    const real t95 = w[1] * t5;
-    const real t96 = t94 - t95;
-    const real t97 = H[5] * s[0];
-    const real t98 = c[5] + t97;
-    const real t99 = t96 - t98;
-    const real t100 = motion[5] + t99;
-    const real t101 = t19 * t100;
-    const real t102 = t93 + t101;
-    const real t103 = t76 - t102;
-    const real t104 = t73 + t103;
-    B[3] = t104;
-    const real t105 = H[4] * d_s[0];
-    const real t106 = s[0] * d_H[4];
-    const real t107 = t105 + t106;
-    const real t108 = d_c[4] + t107;
-    const real t109 = d_w[0] * t20;
-    const real t110 = d_w[2] * t5;
+    const real t80 = Q[2] * t79;
+    const real t81 = t76 - t80;
+    const real t82 = t72 + t81;
+    const real t83 = Q[2] * d_v[1];
+    const real t84 = 2.0 * t83;
+    const real t85 = t82 - t84;
+    const real t86 = t70 + t85;
+    const real t87 = x[1] * Q[5];
+    const real t88 = t86 - t87;
+    const real t89 = t69 + t88;
+    const real t90 = theta[1] * Q[8];
+    const real t91 = t89 - t90;
+    const real t92 = t68 + t91;
+    const real t93 = t64 + t92;
+    B[6] = t93;
+    const real t94 = v[0] * 2.0;
+    const real t95 = t10 * t94;
+    const real t96 = t2 * t60;
+    const real t97 = t95 - t96;
+    const real t98 = H[1] * d_s[0];
+    const real t99 = s[0] * d_H[1];
+    const real t100 = t98 + t99;
+    const real t101 = d_c[1] + t100;
+    const real t102 = theta[0] * Q[8];
+    const real t103 = x[0] * Q[5];
+    const real t104 = Q[2] * d_v[0];
+    const real t105 = 2.0 * t104;
+    const real t106 = x[2] * Q[1];
+    const real t107 = x[1] * Q[2];
+    const real t108 = t106 - t107;
+    const real t109 = Q[2] * t108;
+    const real t110 = Q[0] * t75;
     const real t111 = t109 - t110;
-    const real t112 = t108 + t111;
-    const real t113 = w[2] * t22;
-    const real t114 = w[0] * t64;
-    const real t115 = t113 - t114;
-    const real t116 = t28 * t83;
-    const real t117 = t34 * t91;
-    const real t118 = t116 + t117;
-    const real t119 = t41 * t100;
-    const real t120 = t118 + t119;
-    const real t121 = t115 - t120;
-    const real t122 = t112 + t121;
-    B[4] = t122;
-    const real t123 = H[5] * d_s[0];
-    const real t124 = s[0] * d_H[5];
-    const real t125 = t123 + t124;
-    const real t126 = d_c[5] + t125;
-    const real t127 = d_w[1] * t5;
-    const real t128 = d_w[0] * t12;
-    const real t129 = t127 - t128;
-    const real t130 = t126 + t129;
-    const real t131 = w[0] * t43;
-    const real t132 = w[1] * t22;
-    const real t133 = t131 - t132;
-    const real t134 = t49 * t83;
-    const real t135 = t55 * t91;
-    const real t136 = t134 + t135;
-    const real t137 = t62 * t100;
-    const real t138 = t136 + t137;
-    const real t139 = t133 - t138;
-    const real t140 = t130 + t139;
-    B[5] = t140;
-    const real t141 = H[0] * d_s[0];
-    const real t142 = s[0] * d_H[0];
-    const real t143 = t141 + t142;
-    const real t144 = d_c[0] + t143;
-    const real t145 = d_v[2] * t12;
-    const real t146 = 2.0 * t145;
-    const real t147 = d_v[1] * t20;
-    const real t148 = 2.0 * t147;
-    const real t149 = t146 - t148;
-    const real t150 = t144 + t149;
-    const real t151 = R[1] * d_d[0];
-    const real t152 = R[4] * d_d[1];
-    const real t153 = t151 + t152;
-    const real t154 = R[7] * d_d[2];
-    const real t155 = t153 + t154;
-    const real t156 = t5 * t12;
-    const real t157 = t155 * t156;
-    const real t158 = R[0] * d_d[0];
-    const real t159 = R[3] * d_d[1];
-    const real t160 = t158 + t159;
-    const real t161 = R[6] * d_d[2];
-    const real t162 = t160 + t161;
-    const real t163 = t12 * t12;
-    const real t164 = t20 * t20;
-    const real t165 = t163 + t164;
-    const real t166 = t162 * t165;
-    const real t167 = t157 - t166;
-    const real t168 = R[2] * d_d[0];
-    const real t169 = R[5] * d_d[1];
-    const real t170 = t168 + t169;
-    const real t171 = R[8] * d_d[2];
-    const real t172 = t170 + t171;
-    const real t173 = t5 * t20;
-    const real t174 = t172 * t173;
-    const real t175 = t167 + t174;
-    const real t176 = v[1] * 2.0;
-    const real t177 = t64 * t176;
-    const real t178 = v[2] * 2.0;
-    const real t179 = t43 * t178;
-    const real t180 = t177 - t179;
-    const real t181 = t172 * t91;
-    const real t182 = t155 * t100;
-    const real t183 = t181 - t182;
-    const real t184 = t180 + t183;
-    const real t185 = t175 + t184;
-    const real t186 = v[1] * t20;
-    const real t187 = t186 * 2.0;
-    const real t188 = v[2] * t12;
-    const real t189 = 2.0 * t188;
-    const real t190 = t187 - t189;
-    const real t191 = H[0] * s[0];
-    const real t192 = c[0] + t191;
-    const real t193 = t190 - t192;
-    const real t194 = motion[6] + t193;
-    const real t195 = t4 * t194;
-    const real t196 = v[2] * t5;
-    const real t197 = 2.0 * t196;
-    const real t198 = v[0] * t20;
-    const real t199 = 2.0 * t198;
-    const real t200 = t197 - t199;
-    const real t201 = H[1] * s[0];
-    const real t202 = c[1] + t201;
-    const real t203 = t200 - t202;
-    const real t204 = motion[7] + t203;
-    const real t205 = t11 * t204;
-    const real t206 = t195 + t205;
-    const real t207 = v[0] * t12;
-    const real t208 = 2.0 * t207;
-    const real t209 = v[1] * t5;
-    const real t210 = 2.0 * t209;
-    const real t211 = t208 - t210;
-    const real t212 = H[2] * s[0];
-    const real t213 = c[2] + t212;
-    const real t214 = t211 - t213;
-    const real t215 = motion[8] + t214;
-    const real t216 = t19 * t215;
-    const real t217 = t206 + t216;
-    const real t218 = t185 - t217;
-    const real t219 = t150 + t218;
-    B[6] = t219;
-    const real t220 = H[1] * d_s[0];
-    const real t221 = s[0] * d_H[1];
-    const real t222 = t220 + t221;
-    const real t223 = d_c[1] + t222;
-    const real t224 = d_v[0] * t20;
-    const real t225 = 2.0 * t224;
-    const real t226 = d_v[2] * t5;
-    const real t227 = 2.0 * t226;
-    const real t228 = t225 - t227;
-    const real t229 = t223 + t228;
-    const real t230 = t162 * t156;
-    const real t231 = t5 * t5;
-    const real t232 = t164 + t231;
-    const real t233 = t155 * t232;
-    const real t234 = t230 - t233;
-    const real t235 = t12 * t20;
-    const real t236 = t172 * t235;
-    const real t237 = t234 + t236;
-    const real t238 = t22 * t178;
-    const real t239 = v[0] * 2.0;
-    const real t240 = t64 * t239;
-    const real t241 = t238 - t240;
-    const real t242 = t162 * t100;
-    const real t243 = t172 * t83;
-    const real t244 = t242 - t243;
-    const real t245 = t241 + t244;
-    const real t246 = t237 + t245;
-    const real t247 = t28 * t194;
-    const real t248 = t34 * t204;
-    const real t249 = t247 + t248;
-    const real t250 = t41 * t215;
-    const real t251 = t249 + t250;
-    const real t252 = t246 - t251;
-    const real t253 = t229 + t252;
-    B[7] = t253;
-    const real t254 = H[2] * d_s[0];
-    const real t255 = s[0] * d_H[2];
-    const real t256 = t254 + t255;
-    const real t257 = d_c[2] + t256;
-    const real t258 = d_v[1] * t5;
-    const real t259 = 2.0 * t258;
-    const real t260 = d_v[0] * t12;
-    const real t261 = 2.0 * t260;
-    const real t262 = t259 - t261;
-    const real t263 = t257 + t262;
-    const real t264 = t162 * t173;
-    const real t265 = t155 * t235;
-    const real t266 = t264 + t265;
-    const real t267 = t163 + t231;
-    const real t268 = t172 * t267;
-    const real t269 = t266 - t268;
-    const real t270 = t43 * t239;
-    const real t271 = t22 * t176;
-    const real t272 = t270 - t271;
-    const real t273 = t155 * t83;
-    const real t274 = t162 * t91;
-    const real t275 = t273 - t274;
-    const real t276 = t272 + t275;
-    const real t277 = t269 + t276;
-    const real t278 = t49 * t194;
-    const real t279 = t55 * t204;
-    const real t280 = t278 + t279;
-    const real t281 = t62 * t215;
-    const real t282 = t280 + t281;
-    const real t283 = t277 - t282;
-    const real t284 = t263 + t283;
-    B[8] = t284;
-    const real t285 = f[0] * t4;
-    const real t286 = f[1] * t11;
-    const real t287 = t285 + t286;
-    const real t288 = f[2] * t19;
-    const real t289 = t287 + t288;
-    G[0] = t289;
-    const real t290 = f[0] * t28;
-    const real t291 = f[1] * t34;
-    const real t292 = t290 + t291;
-    const real t293 = f[2] * t41;
-    const real t294 = t292 + t293;
-    G[1] = t294;
-    const real t295 = f[0] * t49;
-    const real t296 = f[1] * t55;
-    const real t297 = t295 + t296;
-    const real t298 = f[2] * t62;
-    const real t299 = t297 + t298;
-    G[2] = t299;
-    const real t300 = f[3] * t4;
-    const real t301 = f[4] * t11;
-    const real t302 = t300 + t301;
-    const real t303 = f[5] * t19;
-    const real t304 = t302 + t303;
-    const real t305 = f[2] * t155;
-    const real t306 = f[1] * t172;
-    const real t307 = t305 - t306;
-    const real t308 = t304 + t307;
-    G[3] = t308;
-    const real t309 = f[3] * t28;
-    const real t310 = f[4] * t34;
-    const real t311 = t309 + t310;
-    const real t312 = f[5] * t41;
-    const real t313 = t311 + t312;
-    const real t314 = f[0] * t172;
-    const real t315 = f[2] * t162;
-    const real t316 = t314 - t315;
-    const real t317 = t313 + t316;
-    G[4] = t317;
-    const real t318 = f[3] * t49;
-    const real t319 = f[4] * t55;
-    const real t320 = t318 + t319;
-    const real t321 = f[5] * t62;
-    const real t322 = t320 + t321;
-    const real t323 = f[1] * t162;
-    const real t324 = f[0] * t155;
-    const real t325 = t323 - t324;
-    const real t326 = t322 + t325;
-    G[5] = t326;
-    const real t327 = f[0] * d_H[0];
-    const real t328 = f[1] * d_H[1];
-    const real t329 = t327 + t328;
-    const real t330 = f[2] * d_H[2];
-    const real t331 = t329 + t330;
-    const real t332 = f[3] * d_H[3];
-    const real t333 = t331 + t332;
-    const real t334 = f[4] * d_H[4];
-    const real t335 = t333 + t334;
-    const real t336 = f[5] * d_H[5];
-    const real t337 = t335 + t336;
-    d_tau[0] = t337;
+    const real t112 = Q[0] * d_v[2];
+    const real t113 = 2.0 * t112;
+    const real t114 = t111 - t113;
+    const real t115 = t105 + t114;
+    const real t116 = x[2] * Q[3];
+    const real t117 = t115 - t116;
+    const real t118 = t103 + t117;
+    const real t119 = theta[2] * Q[6];
+    const real t120 = t118 - t119;
+    const real t121 = t102 + t120;
+    const real t122 = t101 + t121;
+    const real t123 = t97 + t122;
+    B[7] = t123;
+    const real t124 = t2 * t62;
+    const real t125 = t6 * t94;
+    const real t126 = t124 - t125;
+    const real t127 = H[2] * d_s[0];
+    const real t128 = s[0] * d_H[2];
+    const real t129 = t127 + t128;
+    const real t130 = d_c[2] + t129;
+    const real t131 = theta[1] * Q[6];
+    const real t132 = x[1] * Q[3];
+    const real t133 = Q[0] * d_v[1];
+    const real t134 = 2.0 * t133;
+    const real t135 = Q[0] * t79;
+    const real t136 = Q[1] * t108;
+    const real t137 = t135 - t136;
+    const real t138 = t134 + t137;
+    const real t139 = Q[1] * d_v[0];
+    const real t140 = 2.0 * t139;
+    const real t141 = t138 - t140;
+    const real t142 = t132 + t141;
+    const real t143 = x[0] * Q[4];
+    const real t144 = t142 - t143;
+    const real t145 = t131 + t144;
+    const real t146 = theta[0] * Q[7];
+    const real t147 = t145 - t146;
+    const real t148 = t130 + t147;
+    const real t149 = t126 + t148;
+    B[8] = t149;
+    const real t150 = theta[1] * f[2];
+    const real t151 = theta[2] * f[1];
+    const real t152 = t150 - t151;
+    G[0] = t152;
+    const real t153 = theta[2] * f[0];
+    const real t154 = theta[0] * f[2];
+    const real t155 = t153 - t154;
+    G[1] = t155;
+    const real t156 = theta[0] * f[1];
+    const real t157 = theta[1] * f[0];
+    const real t158 = t156 - t157;
+    G[2] = t158;
+    const real t159 = theta[1] * f[5];
+    const real t160 = x[1] * f[2];
+    const real t161 = x[2] * f[1];
+    const real t162 = t160 - t161;
+    const real t163 = theta[2] * f[4];
+    const real t164 = t162 - t163;
+    const real t165 = t159 + t164;
+    G[3] = t165;
+    const real t166 = theta[2] * f[3];
+    const real t167 = x[2] * f[0];
+    const real t168 = x[0] * f[2];
+    const real t169 = t167 - t168;
+    const real t170 = t166 + t169;
+    const real t171 = theta[0] * f[5];
+    const real t172 = t170 - t171;
+    G[4] = t172;
+    const real t173 = theta[0] * f[4];
+    const real t174 = x[0] * f[1];
+    const real t175 = x[1] * f[0];
+    const real t176 = t174 - t175;
+    const real t177 = theta[1] * f[3];
+    const real t178 = t176 - t177;
+    const real t179 = t173 + t178;
+    G[5] = t179;
+    const real t180 = d_s[0] * J[0];
+    const real t181 = f[0] * d_H[0];
+    const real t182 = f[1] * d_H[1];
+    const real t183 = t181 + t182;
+    const real t184 = f[2] * d_H[2];
+    const real t185 = t183 + t184;
+    const real t186 = f[3] * d_H[3];
+    const real t187 = t185 + t186;
+    const real t188 = f[4] * d_H[4];
+    const real t189 = t187 + t188;
+    const real t190 = f[5] * d_H[5];
+    const real t191 = t189 + t190;
+    const real t192 = t191 - laws[0];
+    const real t193 = t180 + t192;
+    row[0] = t193;
     return 0;
 }
 
@@ -2037,27 +2000,332 @@ static int mstmm_sweep_generic1_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic1_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 6, "", 0, 0},
     {"s", 1, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 6, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 1, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 1, "", 0, 0},
+    {"row", 1, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 1 free speed
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6]
+ * in  d_q[1]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[3] * d_q[0];
+    theta[0] = t0;
+    const real t1 = H[4] * d_q[0];
+    theta[1] = t1;
+    const real t2 = H[5] * d_q[0];
+    theta[2] = t2;
+    const real t3 = H[0] * d_q[0];
+    x[0] = t3;
+    const real t4 = H[1] * d_q[0];
+    x[1] = t4;
+    const real t5 = H[2] * d_q[0];
+    x[2] = t5;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_along_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"d_q", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 1 free speed that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[1]
+ * in  d_s[1]
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[1] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[3] * d_u[0];
+    const real t1 = theta[2] * Q[1];
+    const real t2 = theta[1] * Q[2];
+    const real t3 = t1 - t2;
+    const real t4 = t0 + t3;
+    B[0] = t4;
+    const real t5 = H[4] * d_u[0];
+    const real t6 = theta[0] * Q[2];
+    const real t7 = theta[2] * Q[0];
+    const real t8 = t6 - t7;
+    const real t9 = t5 + t8;
+    B[1] = t9;
+    const real t10 = H[5] * d_u[0];
+    const real t11 = theta[1] * Q[0];
+    const real t12 = theta[0] * Q[1];
+    const real t13 = t11 - t12;
+    const real t14 = t10 + t13;
+    B[2] = t14;
+    const real t15 = w[2] * t8;
+    const real t16 = w[1] * t13;
+    const real t17 = t15 - t16;
+    const real t18 = H[3] * d_s[0];
+    const real t19 = theta[2] * Q[4];
+    const real t20 = Q[1] * t10;
+    const real t21 = Q[2] * t5;
+    const real t22 = t20 - t21;
+    const real t23 = t19 + t22;
+    const real t24 = theta[1] * Q[5];
+    const real t25 = t23 - t24;
+    const real t26 = t18 + t25;
+    const real t27 = t17 + t26;
+    B[3] = t27;
+    const real t28 = w[0] * t13;
+    const real t29 = w[2] * t3;
+    const real t30 = t28 - t29;
+    const real t31 = H[4] * d_s[0];
+    const real t32 = theta[0] * Q[5];
+    const real t33 = Q[2] * t0;
+    const real t34 = Q[0] * t10;
+    const real t35 = t33 - t34;
+    const real t36 = theta[2] * Q[3];
+    const real t37 = t35 - t36;
+    const real t38 = t32 + t37;
+    const real t39 = t31 + t38;
+    const real t40 = t30 + t39;
+    B[4] = t40;
+    const real t41 = w[1] * t3;
+    const real t42 = w[0] * t8;
+    const real t43 = t41 - t42;
+    const real t44 = H[5] * d_s[0];
+    const real t45 = theta[1] * Q[3];
+    const real t46 = Q[0] * t5;
+    const real t47 = Q[1] * t0;
+    const real t48 = t46 - t47;
+    const real t49 = t45 + t48;
+    const real t50 = theta[0] * Q[4];
+    const real t51 = t49 - t50;
+    const real t52 = t44 + t51;
+    const real t53 = t43 + t52;
+    B[5] = t53;
+    const real t54 = v[2] * 2.0;
+    const real t55 = t8 * t54;
+    const real t56 = v[1] * 2.0;
+    const real t57 = t13 * t56;
+    const real t58 = t55 - t57;
+    const real t59 = v[2] * t5;
+    const real t60 = H[2] * d_u[0];
+    const real t61 = w[1] * t60;
+    const real t62 = H[1] * d_u[0];
+    const real t63 = w[2] * t62;
+    const real t64 = t61 - t63;
+    const real t65 = t59 + t64;
+    const real t66 = v[1] * t10;
+    const real t67 = t65 - t66;
+    const real t68 = H[0] * d_s[0];
+    const real t69 = t67 + t68;
+    const real t70 = theta[2] * Q[7];
+    const real t71 = x[2] * Q[4];
+    const real t72 = Q[1] * t60;
+    const real t73 = 2.0 * t72;
+    const real t74 = x[1] * Q[0];
+    const real t75 = x[0] * Q[1];
+    const real t76 = t74 - t75;
+    const real t77 = Q[1] * t76;
+    const real t78 = x[0] * Q[2];
+    const real t79 = x[2] * Q[0];
+    const real t80 = t78 - t79;
+    const real t81 = Q[2] * t80;
+    const real t82 = t77 - t81;
+    const real t83 = t73 + t82;
+    const real t84 = Q[2] * t62;
+    const real t85 = 2.0 * t84;
+    const real t86 = t83 - t85;
+    const real t87 = t71 + t86;
+    const real t88 = x[1] * Q[5];
+    const real t89 = t87 - t88;
+    const real t90 = t70 + t89;
+    const real t91 = theta[1] * Q[8];
+    const real t92 = t90 - t91;
+    const real t93 = t69 + t92;
+    const real t94 = t58 + t93;
+    B[6] = t94;
+    const real t95 = v[0] * 2.0;
+    const real t96 = t13 * t95;
+    const real t97 = t3 * t54;
+    const real t98 = t96 - t97;
+    const real t99 = v[0] * t10;
+    const real t100 = H[0] * d_u[0];
+    const real t101 = w[2] * t100;
+    const real t102 = w[0] * t60;
+    const real t103 = t101 - t102;
+    const real t104 = v[2] * t0;
+    const real t105 = t103 - t104;
+    const real t106 = t99 + t105;
+    const real t107 = H[1] * d_s[0];
+    const real t108 = t106 + t107;
+    const real t109 = theta[0] * Q[8];
+    const real t110 = x[0] * Q[5];
+    const real t111 = Q[2] * t100;
+    const real t112 = 2.0 * t111;
+    const real t113 = x[2] * Q[1];
+    const real t114 = x[1] * Q[2];
+    const real t115 = t113 - t114;
+    const real t116 = Q[2] * t115;
+    const real t117 = Q[0] * t76;
+    const real t118 = t116 - t117;
+    const real t119 = Q[0] * t60;
+    const real t120 = 2.0 * t119;
+    const real t121 = t118 - t120;
+    const real t122 = t112 + t121;
+    const real t123 = x[2] * Q[3];
+    const real t124 = t122 - t123;
+    const real t125 = t110 + t124;
+    const real t126 = theta[2] * Q[6];
+    const real t127 = t125 - t126;
+    const real t128 = t109 + t127;
+    const real t129 = t108 + t128;
+    const real t130 = t98 + t129;
+    B[7] = t130;
+    const real t131 = t3 * t56;
+    const real t132 = t8 * t95;
+    const real t133 = t131 - t132;
+    const real t134 = v[1] * t0;
+    const real t135 = w[0] * t62;
+    const real t136 = w[1] * t100;
+    const real t137 = t135 - t136;
+    const real t138 = t134 + t137;
+    const real t139 = v[0] * t5;
+    const real t140 = t138 - t139;
+    const real t141 = H[2] * d_s[0];
+    const real t142 = t140 + t141;
+    const real t143 = theta[1] * Q[6];
+    const real t144 = x[1] * Q[3];
+    const real t145 = Q[0] * t62;
+    const real t146 = 2.0 * t145;
+    const real t147 = Q[0] * t80;
+    const real t148 = Q[1] * t115;
+    const real t149 = t147 - t148;
+    const real t150 = t146 + t149;
+    const real t151 = Q[1] * t100;
+    const real t152 = 2.0 * t151;
+    const real t153 = t150 - t152;
+    const real t154 = t144 + t153;
+    const real t155 = x[0] * Q[4];
+    const real t156 = t154 - t155;
+    const real t157 = t143 + t156;
+    const real t158 = theta[0] * Q[7];
+    const real t159 = t157 - t158;
+    const real t160 = t142 + t159;
+    const real t161 = t133 + t160;
+    B[8] = t161;
+    const real t162 = theta[1] * f[2];
+    const real t163 = theta[2] * f[1];
+    const real t164 = t162 - t163;
+    G[0] = t164;
+    const real t165 = theta[2] * f[0];
+    const real t166 = theta[0] * f[2];
+    const real t167 = t165 - t166;
+    G[1] = t167;
+    const real t168 = theta[0] * f[1];
+    const real t169 = theta[1] * f[0];
+    const real t170 = t168 - t169;
+    G[2] = t170;
+    const real t171 = theta[1] * f[5];
+    const real t172 = x[1] * f[2];
+    const real t173 = x[2] * f[1];
+    const real t174 = t172 - t173;
+    const real t175 = theta[2] * f[4];
+    const real t176 = t174 - t175;
+    const real t177 = t171 + t176;
+    G[3] = t177;
+    const real t178 = theta[2] * f[3];
+    const real t179 = x[2] * f[0];
+    const real t180 = x[0] * f[2];
+    const real t181 = t179 - t180;
+    const real t182 = t178 + t181;
+    const real t183 = theta[0] * f[5];
+    const real t184 = t182 - t183;
+    G[4] = t184;
+    const real t185 = theta[0] * f[4];
+    const real t186 = x[0] * f[1];
+    const real t187 = x[1] * f[0];
+    const real t188 = t186 - t187;
+    const real t189 = theta[1] * f[3];
+    const real t190 = t188 - t189;
+    const real t191 = t185 + t190;
+    G[5] = t191;
+    const real t192 = d_s[0] * J[0];
+    const real t193 = t192 - laws[0];
+    row[0] = t193;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 1, "", 0, 0},
+    {"d_s", 1, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 1, "", 0, 0},
 };
 
 /* rows of a hinge with 1 free speed
@@ -3266,6 +3534,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_carrier,
+        .call = mstmm_sweep_generic1_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_carrier_outputs,
+        .ir_hash = "a576fb8bdf631fac00373fffdc3e1ffe60f24a257d019189353f75f4405e16d1",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic1_tangent_column,
         .call = mstmm_sweep_generic1_tangent_column_call,
@@ -3273,7 +3553,31 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_column_inputs,
         .outputs = mstmm_sweep_generic1_tangent_column_outputs,
-        .ir_hash = "1741cb408391c78394e194e5e7fd4eba77d55142e772df6dc6a594e04ed76b9e",
+        .ir_hash = "11e51267ea254c7a784a06f57ce511bc29a470910b9900de9604507143ff0763",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_along,
+        .call = mstmm_sweep_generic1_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_along_outputs,
+        .ir_hash = "dc1afab64fd2d06bf296ac3636201e900f62accdc009bbd4b9baf875a0951962",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_steady,
+        .call = mstmm_sweep_generic1_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic1_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_steady_outputs,
+        .ir_hash = "d8597dab2cb6afb95925b65561de21cfdee86744a7a11506db39cf205225110c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -3355,7 +3659,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "1a9c26bd8c82ac4021467bbad579c0e74a01351cfd26122273956cb8b3dc094a",
+    .hash = "f734c77ae0c66b6a47b167e585255bfc08ed604e121f5b840a678dcc728e0329",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3365,6 +3669,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic1_kernels,
 };

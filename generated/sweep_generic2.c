@@ -34,12 +34,22 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -2118,437 +2128,393 @@ static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 2 speeds
+/* motion of Q across a hinge with 2 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][2]
  * in  s[2]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[6] * s[0];
+    const real t7 = H[7] * s[1];
+    const real t8 = t6 + t7;
+    const real t9 = c[3] + t8;
+    const real t10 = t5 - t9;
+    const real t11 = motion[3] + t10;
+    Q[3] = t11;
+    const real t12 = w[2] * t0;
+    const real t13 = w[0] * t2;
+    const real t14 = t12 - t13;
+    const real t15 = H[8] * s[0];
+    const real t16 = H[9] * s[1];
+    const real t17 = t15 + t16;
+    const real t18 = c[4] + t17;
+    const real t19 = t14 - t18;
+    const real t20 = motion[4] + t19;
+    Q[4] = t20;
+    const real t21 = w[0] * t1;
+    const real t22 = w[1] * t0;
+    const real t23 = t21 - t22;
+    const real t24 = H[10] * s[0];
+    const real t25 = H[11] * s[1];
+    const real t26 = t24 + t25;
+    const real t27 = c[5] + t26;
+    const real t28 = t23 - t27;
+    const real t29 = motion[5] + t28;
+    Q[5] = t29;
+    const real t30 = v[1] * t2;
+    const real t31 = t30 * 2.0;
+    const real t32 = v[2] * t1;
+    const real t33 = 2.0 * t32;
+    const real t34 = t31 - t33;
+    const real t35 = H[0] * s[0];
+    const real t36 = H[1] * s[1];
+    const real t37 = t35 + t36;
+    const real t38 = c[0] + t37;
+    const real t39 = t34 - t38;
+    const real t40 = motion[6] + t39;
+    Q[6] = t40;
+    const real t41 = v[2] * t0;
+    const real t42 = 2.0 * t41;
+    const real t43 = v[0] * t2;
+    const real t44 = 2.0 * t43;
+    const real t45 = t42 - t44;
+    const real t46 = H[2] * s[0];
+    const real t47 = H[3] * s[1];
+    const real t48 = t46 + t47;
+    const real t49 = c[1] + t48;
+    const real t50 = t45 - t49;
+    const real t51 = motion[7] + t50;
+    Q[7] = t51;
+    const real t52 = v[0] * t1;
+    const real t53 = 2.0 * t52;
+    const real t54 = v[1] * t0;
+    const real t55 = 2.0 * t54;
+    const real t56 = t53 - t55;
+    const real t57 = H[4] * s[0];
+    const real t58 = H[5] * s[1];
+    const real t59 = t57 + t58;
+    const real t60 = c[2] + t59;
+    const real t61 = t56 - t60;
+    const real t62 = motion[8] + t61;
+    Q[8] = t62;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_carrier_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 2 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][2]
+ * in  s[2]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][2]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[2]
- * out B[9]
- * out G[6]
- * out d_tau[2]
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[2] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[2] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic2_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[6] * d_s[0];
+    const real t16 = H[7] * d_s[1];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
-    const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
-    const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
-    const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
-    const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
-    const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
-    const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
-    const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
+    const real t18 = s[0] * d_H[6];
+    const real t19 = s[1] * d_H[7];
+    const real t20 = t18 + t19;
+    const real t21 = t17 + t20;
+    const real t22 = d_c[3] + t21;
+    const real t23 = theta[2] * Q[4];
+    const real t24 = Q[1] * d_w[2];
+    const real t25 = Q[2] * d_w[1];
+    const real t26 = t24 - t25;
+    const real t27 = t23 + t26;
+    const real t28 = theta[1] * Q[5];
+    const real t29 = t27 - t28;
+    const real t30 = t22 + t29;
+    const real t31 = t14 + t30;
+    B[3] = t31;
+    const real t32 = w[0] * t10;
+    const real t33 = w[2] * t2;
+    const real t34 = t32 - t33;
+    const real t35 = H[8] * d_s[0];
+    const real t36 = H[9] * d_s[1];
+    const real t37 = t35 + t36;
+    const real t38 = s[0] * d_H[8];
+    const real t39 = s[1] * d_H[9];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = d_c[4] + t41;
+    const real t43 = theta[0] * Q[5];
+    const real t44 = Q[2] * d_w[0];
+    const real t45 = Q[0] * d_w[2];
+    const real t46 = t44 - t45;
+    const real t47 = theta[2] * Q[3];
+    const real t48 = t46 - t47;
+    const real t49 = t43 + t48;
+    const real t50 = t42 + t49;
+    const real t51 = t34 + t50;
+    B[4] = t51;
+    const real t52 = w[1] * t2;
+    const real t53 = w[0] * t6;
+    const real t54 = t52 - t53;
+    const real t55 = H[10] * d_s[0];
+    const real t56 = H[11] * d_s[1];
+    const real t57 = t55 + t56;
+    const real t58 = s[0] * d_H[10];
+    const real t59 = s[1] * d_H[11];
     const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[6] * d_s[0];
-    const real t67 = H[7] * d_s[1];
-    const real t68 = t66 + t67;
-    const real t69 = s[0] * d_H[6];
-    const real t70 = s[1] * d_H[7];
-    const real t71 = t69 + t70;
-    const real t72 = t68 + t71;
-    const real t73 = d_c[3] + t72;
-    const real t74 = d_w[2] * t12;
-    const real t75 = d_w[1] * t20;
-    const real t76 = t74 - t75;
-    const real t77 = t73 + t76;
-    const real t78 = w[1] * t64;
-    const real t79 = w[2] * t43;
-    const real t80 = t78 - t79;
-    const real t81 = w[1] * t20;
-    const real t82 = w[2] * t12;
-    const real t83 = t81 - t82;
-    const real t84 = H[6] * s[0];
-    const real t85 = H[7] * s[1];
-    const real t86 = t84 + t85;
-    const real t87 = c[3] + t86;
-    const real t88 = t83 - t87;
-    const real t89 = motion[3] + t88;
-    const real t90 = t4 * t89;
-    const real t91 = w[2] * t5;
-    const real t92 = w[0] * t20;
-    const real t93 = t91 - t92;
-    const real t94 = H[8] * s[0];
-    const real t95 = H[9] * s[1];
-    const real t96 = t94 + t95;
-    const real t97 = c[4] + t96;
-    const real t98 = t93 - t97;
-    const real t99 = motion[4] + t98;
-    const real t100 = t11 * t99;
-    const real t101 = t90 + t100;
-    const real t102 = w[0] * t12;
-    const real t103 = w[1] * t5;
+    const real t61 = t57 + t60;
+    const real t62 = d_c[5] + t61;
+    const real t63 = theta[1] * Q[3];
+    const real t64 = Q[0] * d_w[1];
+    const real t65 = Q[1] * d_w[0];
+    const real t66 = t64 - t65;
+    const real t67 = t63 + t66;
+    const real t68 = theta[0] * Q[4];
+    const real t69 = t67 - t68;
+    const real t70 = t62 + t69;
+    const real t71 = t54 + t70;
+    B[5] = t71;
+    const real t72 = v[2] * 2.0;
+    const real t73 = t6 * t72;
+    const real t74 = v[1] * 2.0;
+    const real t75 = t10 * t74;
+    const real t76 = t73 - t75;
+    const real t77 = H[0] * d_s[0];
+    const real t78 = H[1] * d_s[1];
+    const real t79 = t77 + t78;
+    const real t80 = s[0] * d_H[0];
+    const real t81 = s[1] * d_H[1];
+    const real t82 = t80 + t81;
+    const real t83 = t79 + t82;
+    const real t84 = d_c[0] + t83;
+    const real t85 = theta[2] * Q[7];
+    const real t86 = x[2] * Q[4];
+    const real t87 = Q[1] * d_v[2];
+    const real t88 = 2.0 * t87;
+    const real t89 = x[1] * Q[0];
+    const real t90 = x[0] * Q[1];
+    const real t91 = t89 - t90;
+    const real t92 = Q[1] * t91;
+    const real t93 = x[0] * Q[2];
+    const real t94 = x[2] * Q[0];
+    const real t95 = t93 - t94;
+    const real t96 = Q[2] * t95;
+    const real t97 = t92 - t96;
+    const real t98 = t88 + t97;
+    const real t99 = Q[2] * d_v[1];
+    const real t100 = 2.0 * t99;
+    const real t101 = t98 - t100;
+    const real t102 = t86 + t101;
+    const real t103 = x[1] * Q[5];
     const real t104 = t102 - t103;
-    const real t105 = H[10] * s[0];
-    const real t106 = H[11] * s[1];
-    const real t107 = t105 + t106;
-    const real t108 = c[5] + t107;
-    const real t109 = t104 - t108;
-    const real t110 = motion[5] + t109;
-    const real t111 = t19 * t110;
-    const real t112 = t101 + t111;
-    const real t113 = t80 - t112;
-    const real t114 = t77 + t113;
-    B[3] = t114;
-    const real t115 = H[8] * d_s[0];
-    const real t116 = H[9] * d_s[1];
-    const real t117 = t115 + t116;
-    const real t118 = s[0] * d_H[8];
-    const real t119 = s[1] * d_H[9];
-    const real t120 = t118 + t119;
-    const real t121 = t117 + t120;
-    const real t122 = d_c[4] + t121;
-    const real t123 = d_w[0] * t20;
-    const real t124 = d_w[2] * t5;
-    const real t125 = t123 - t124;
-    const real t126 = t122 + t125;
-    const real t127 = w[2] * t22;
-    const real t128 = w[0] * t64;
-    const real t129 = t127 - t128;
-    const real t130 = t28 * t89;
-    const real t131 = t34 * t99;
-    const real t132 = t130 + t131;
-    const real t133 = t41 * t110;
-    const real t134 = t132 + t133;
-    const real t135 = t129 - t134;
-    const real t136 = t126 + t135;
-    B[4] = t136;
-    const real t137 = H[10] * d_s[0];
-    const real t138 = H[11] * d_s[1];
-    const real t139 = t137 + t138;
-    const real t140 = s[0] * d_H[10];
-    const real t141 = s[1] * d_H[11];
-    const real t142 = t140 + t141;
-    const real t143 = t139 + t142;
-    const real t144 = d_c[5] + t143;
-    const real t145 = d_w[1] * t5;
-    const real t146 = d_w[0] * t12;
-    const real t147 = t145 - t146;
-    const real t148 = t144 + t147;
-    const real t149 = w[0] * t43;
-    const real t150 = w[1] * t22;
-    const real t151 = t149 - t150;
-    const real t152 = t49 * t89;
-    const real t153 = t55 * t99;
-    const real t154 = t152 + t153;
-    const real t155 = t62 * t110;
-    const real t156 = t154 + t155;
-    const real t157 = t151 - t156;
-    const real t158 = t148 + t157;
-    B[5] = t158;
-    const real t159 = H[0] * d_s[0];
-    const real t160 = H[1] * d_s[1];
-    const real t161 = t159 + t160;
-    const real t162 = s[0] * d_H[0];
-    const real t163 = s[1] * d_H[1];
-    const real t164 = t162 + t163;
-    const real t165 = t161 + t164;
-    const real t166 = d_c[0] + t165;
-    const real t167 = d_v[2] * t12;
-    const real t168 = 2.0 * t167;
-    const real t169 = d_v[1] * t20;
-    const real t170 = 2.0 * t169;
-    const real t171 = t168 - t170;
-    const real t172 = t166 + t171;
-    const real t173 = R[1] * d_d[0];
-    const real t174 = R[4] * d_d[1];
-    const real t175 = t173 + t174;
-    const real t176 = R[7] * d_d[2];
-    const real t177 = t175 + t176;
-    const real t178 = t5 * t12;
-    const real t179 = t177 * t178;
-    const real t180 = R[0] * d_d[0];
-    const real t181 = R[3] * d_d[1];
-    const real t182 = t180 + t181;
-    const real t183 = R[6] * d_d[2];
-    const real t184 = t182 + t183;
-    const real t185 = t12 * t12;
-    const real t186 = t20 * t20;
-    const real t187 = t185 + t186;
-    const real t188 = t184 * t187;
-    const real t189 = t179 - t188;
-    const real t190 = R[2] * d_d[0];
-    const real t191 = R[5] * d_d[1];
-    const real t192 = t190 + t191;
-    const real t193 = R[8] * d_d[2];
-    const real t194 = t192 + t193;
-    const real t195 = t5 * t20;
-    const real t196 = t194 * t195;
-    const real t197 = t189 + t196;
-    const real t198 = v[1] * 2.0;
-    const real t199 = t64 * t198;
-    const real t200 = v[2] * 2.0;
-    const real t201 = t43 * t200;
-    const real t202 = t199 - t201;
-    const real t203 = t194 * t99;
-    const real t204 = t177 * t110;
-    const real t205 = t203 - t204;
-    const real t206 = t202 + t205;
-    const real t207 = t197 + t206;
-    const real t208 = v[1] * t20;
-    const real t209 = t208 * 2.0;
-    const real t210 = v[2] * t12;
-    const real t211 = 2.0 * t210;
-    const real t212 = t209 - t211;
-    const real t213 = H[0] * s[0];
-    const real t214 = H[1] * s[1];
+    const real t105 = t85 + t104;
+    const real t106 = theta[1] * Q[8];
+    const real t107 = t105 - t106;
+    const real t108 = t84 + t107;
+    const real t109 = t76 + t108;
+    B[6] = t109;
+    const real t110 = v[0] * 2.0;
+    const real t111 = t10 * t110;
+    const real t112 = t2 * t72;
+    const real t113 = t111 - t112;
+    const real t114 = H[2] * d_s[0];
+    const real t115 = H[3] * d_s[1];
+    const real t116 = t114 + t115;
+    const real t117 = s[0] * d_H[2];
+    const real t118 = s[1] * d_H[3];
+    const real t119 = t117 + t118;
+    const real t120 = t116 + t119;
+    const real t121 = d_c[1] + t120;
+    const real t122 = theta[0] * Q[8];
+    const real t123 = x[0] * Q[5];
+    const real t124 = Q[2] * d_v[0];
+    const real t125 = 2.0 * t124;
+    const real t126 = x[2] * Q[1];
+    const real t127 = x[1] * Q[2];
+    const real t128 = t126 - t127;
+    const real t129 = Q[2] * t128;
+    const real t130 = Q[0] * t91;
+    const real t131 = t129 - t130;
+    const real t132 = Q[0] * d_v[2];
+    const real t133 = 2.0 * t132;
+    const real t134 = t131 - t133;
+    const real t135 = t125 + t134;
+    const real t136 = x[2] * Q[3];
+    const real t137 = t135 - t136;
+    const real t138 = t123 + t137;
+    const real t139 = theta[2] * Q[6];
+    const real t140 = t138 - t139;
+    const real t141 = t122 + t140;
+    const real t142 = t121 + t141;
+    const real t143 = t113 + t142;
+    B[7] = t143;
+    const real t144 = t2 * t74;
+    const real t145 = t6 * t110;
+    const real t146 = t144 - t145;
+    const real t147 = H[4] * d_s[0];
+    const real t148 = H[5] * d_s[1];
+    const real t149 = t147 + t148;
+    const real t150 = s[0] * d_H[4];
+    const real t151 = s[1] * d_H[5];
+    const real t152 = t150 + t151;
+    const real t153 = t149 + t152;
+    const real t154 = d_c[2] + t153;
+    const real t155 = theta[1] * Q[6];
+    const real t156 = x[1] * Q[3];
+    const real t157 = Q[0] * d_v[1];
+    const real t158 = 2.0 * t157;
+    const real t159 = Q[0] * t95;
+    const real t160 = Q[1] * t128;
+    const real t161 = t159 - t160;
+    const real t162 = t158 + t161;
+    const real t163 = Q[1] * d_v[0];
+    const real t164 = 2.0 * t163;
+    const real t165 = t162 - t164;
+    const real t166 = t156 + t165;
+    const real t167 = x[0] * Q[4];
+    const real t168 = t166 - t167;
+    const real t169 = t155 + t168;
+    const real t170 = theta[0] * Q[7];
+    const real t171 = t169 - t170;
+    const real t172 = t154 + t171;
+    const real t173 = t146 + t172;
+    B[8] = t173;
+    const real t174 = theta[1] * f[2];
+    const real t175 = theta[2] * f[1];
+    const real t176 = t174 - t175;
+    G[0] = t176;
+    const real t177 = theta[2] * f[0];
+    const real t178 = theta[0] * f[2];
+    const real t179 = t177 - t178;
+    G[1] = t179;
+    const real t180 = theta[0] * f[1];
+    const real t181 = theta[1] * f[0];
+    const real t182 = t180 - t181;
+    G[2] = t182;
+    const real t183 = theta[1] * f[5];
+    const real t184 = x[1] * f[2];
+    const real t185 = x[2] * f[1];
+    const real t186 = t184 - t185;
+    const real t187 = theta[2] * f[4];
+    const real t188 = t186 - t187;
+    const real t189 = t183 + t188;
+    G[3] = t189;
+    const real t190 = theta[2] * f[3];
+    const real t191 = x[2] * f[0];
+    const real t192 = x[0] * f[2];
+    const real t193 = t191 - t192;
+    const real t194 = t190 + t193;
+    const real t195 = theta[0] * f[5];
+    const real t196 = t194 - t195;
+    G[4] = t196;
+    const real t197 = theta[0] * f[4];
+    const real t198 = x[0] * f[1];
+    const real t199 = x[1] * f[0];
+    const real t200 = t198 - t199;
+    const real t201 = theta[1] * f[3];
+    const real t202 = t200 - t201;
+    const real t203 = t197 + t202;
+    G[5] = t203;
+    const real t204 = d_s[0] * J[0];
+    const real t205 = f[0] * d_H[0];
+    const real t206 = f[1] * d_H[2];
+    const real t207 = t205 + t206;
+    const real t208 = f[2] * d_H[4];
+    const real t209 = t207 + t208;
+    const real t210 = f[3] * d_H[6];
+    const real t211 = t209 + t210;
+    const real t212 = f[4] * d_H[8];
+    const real t213 = t211 + t212;
+    const real t214 = f[5] * d_H[10];
     const real t215 = t213 + t214;
-    const real t216 = c[0] + t215;
-    const real t217 = t212 - t216;
-    const real t218 = motion[6] + t217;
-    const real t219 = t4 * t218;
-    const real t220 = v[2] * t5;
-    const real t221 = 2.0 * t220;
-    const real t222 = v[0] * t20;
-    const real t223 = 2.0 * t222;
-    const real t224 = t221 - t223;
-    const real t225 = H[2] * s[0];
-    const real t226 = H[3] * s[1];
+    const real t216 = t215 - laws[0];
+    const real t217 = t204 + t216;
+    row[0] = t217;
+    const real t218 = d_s[1] * J[1];
+    const real t219 = f[0] * d_H[1];
+    const real t220 = f[1] * d_H[3];
+    const real t221 = t219 + t220;
+    const real t222 = f[2] * d_H[5];
+    const real t223 = t221 + t222;
+    const real t224 = f[3] * d_H[7];
+    const real t225 = t223 + t224;
+    const real t226 = f[4] * d_H[9];
     const real t227 = t225 + t226;
-    const real t228 = c[1] + t227;
-    const real t229 = t224 - t228;
-    const real t230 = motion[7] + t229;
-    const real t231 = t11 * t230;
-    const real t232 = t219 + t231;
-    const real t233 = v[0] * t12;
-    const real t234 = 2.0 * t233;
-    const real t235 = v[1] * t5;
-    const real t236 = 2.0 * t235;
-    const real t237 = t234 - t236;
-    const real t238 = H[4] * s[0];
-    const real t239 = H[5] * s[1];
-    const real t240 = t238 + t239;
-    const real t241 = c[2] + t240;
-    const real t242 = t237 - t241;
-    const real t243 = motion[8] + t242;
-    const real t244 = t19 * t243;
-    const real t245 = t232 + t244;
-    const real t246 = t207 - t245;
-    const real t247 = t172 + t246;
-    B[6] = t247;
-    const real t248 = H[2] * d_s[0];
-    const real t249 = H[3] * d_s[1];
-    const real t250 = t248 + t249;
-    const real t251 = s[0] * d_H[2];
-    const real t252 = s[1] * d_H[3];
-    const real t253 = t251 + t252;
-    const real t254 = t250 + t253;
-    const real t255 = d_c[1] + t254;
-    const real t256 = d_v[0] * t20;
-    const real t257 = 2.0 * t256;
-    const real t258 = d_v[2] * t5;
-    const real t259 = 2.0 * t258;
-    const real t260 = t257 - t259;
-    const real t261 = t255 + t260;
-    const real t262 = t184 * t178;
-    const real t263 = t5 * t5;
-    const real t264 = t186 + t263;
-    const real t265 = t177 * t264;
-    const real t266 = t262 - t265;
-    const real t267 = t12 * t20;
-    const real t268 = t194 * t267;
-    const real t269 = t266 + t268;
-    const real t270 = t22 * t200;
-    const real t271 = v[0] * 2.0;
-    const real t272 = t64 * t271;
-    const real t273 = t270 - t272;
-    const real t274 = t184 * t110;
-    const real t275 = t194 * t89;
-    const real t276 = t274 - t275;
-    const real t277 = t273 + t276;
-    const real t278 = t269 + t277;
-    const real t279 = t28 * t218;
-    const real t280 = t34 * t230;
-    const real t281 = t279 + t280;
-    const real t282 = t41 * t243;
-    const real t283 = t281 + t282;
-    const real t284 = t278 - t283;
-    const real t285 = t261 + t284;
-    B[7] = t285;
-    const real t286 = H[4] * d_s[0];
-    const real t287 = H[5] * d_s[1];
-    const real t288 = t286 + t287;
-    const real t289 = s[0] * d_H[4];
-    const real t290 = s[1] * d_H[5];
-    const real t291 = t289 + t290;
-    const real t292 = t288 + t291;
-    const real t293 = d_c[2] + t292;
-    const real t294 = d_v[1] * t5;
-    const real t295 = 2.0 * t294;
-    const real t296 = d_v[0] * t12;
-    const real t297 = 2.0 * t296;
-    const real t298 = t295 - t297;
-    const real t299 = t293 + t298;
-    const real t300 = t184 * t195;
-    const real t301 = t177 * t267;
-    const real t302 = t300 + t301;
-    const real t303 = t185 + t263;
-    const real t304 = t194 * t303;
-    const real t305 = t302 - t304;
-    const real t306 = t43 * t271;
-    const real t307 = t22 * t198;
-    const real t308 = t306 - t307;
-    const real t309 = t177 * t89;
-    const real t310 = t184 * t99;
-    const real t311 = t309 - t310;
-    const real t312 = t308 + t311;
-    const real t313 = t305 + t312;
-    const real t314 = t49 * t218;
-    const real t315 = t55 * t230;
-    const real t316 = t314 + t315;
-    const real t317 = t62 * t243;
-    const real t318 = t316 + t317;
-    const real t319 = t313 - t318;
-    const real t320 = t299 + t319;
-    B[8] = t320;
-    const real t321 = f[0] * t4;
-    const real t322 = f[1] * t11;
-    const real t323 = t321 + t322;
-    const real t324 = f[2] * t19;
-    const real t325 = t323 + t324;
-    G[0] = t325;
-    const real t326 = f[0] * t28;
-    const real t327 = f[1] * t34;
-    const real t328 = t326 + t327;
-    const real t329 = f[2] * t41;
-    const real t330 = t328 + t329;
-    G[1] = t330;
-    const real t331 = f[0] * t49;
-    const real t332 = f[1] * t55;
-    const real t333 = t331 + t332;
-    const real t334 = f[2] * t62;
-    const real t335 = t333 + t334;
-    G[2] = t335;
-    const real t336 = f[3] * t4;
-    const real t337 = f[4] * t11;
-    const real t338 = t336 + t337;
-    const real t339 = f[5] * t19;
-    const real t340 = t338 + t339;
-    const real t341 = f[2] * t177;
-    const real t342 = f[1] * t194;
-    const real t343 = t341 - t342;
-    const real t344 = t340 + t343;
-    G[3] = t344;
-    const real t345 = f[3] * t28;
-    const real t346 = f[4] * t34;
-    const real t347 = t345 + t346;
-    const real t348 = f[5] * t41;
-    const real t349 = t347 + t348;
-    const real t350 = f[0] * t194;
-    const real t351 = f[2] * t184;
-    const real t352 = t350 - t351;
-    const real t353 = t349 + t352;
-    G[4] = t353;
-    const real t354 = f[3] * t49;
-    const real t355 = f[4] * t55;
-    const real t356 = t354 + t355;
-    const real t357 = f[5] * t62;
-    const real t358 = t356 + t357;
-    const real t359 = f[1] * t184;
-    const real t360 = f[0] * t177;
-    const real t361 = t359 - t360;
-    const real t362 = t358 + t361;
-    G[5] = t362;
-    const real t363 = f[0] * d_H[0];
-    const real t364 = f[1] * d_H[2];
-    const real t365 = t363 + t364;
-    const real t366 = f[2] * d_H[4];
-    const real t367 = t365 + t366;
-    const real t368 = f[3] * d_H[6];
-    const real t369 = t367 + t368;
-    const real t370 = f[4] * d_H[8];
-    const real t371 = t369 + t370;
-    const real t372 = f[5] * d_H[10];
-    const real t373 = t371 + t372;
-    d_tau[0] = t373;
-    const real t374 = f[0] * d_H[1];
-    const real t375 = f[1] * d_H[3];
-    const real t376 = t374 + t375;
-    const real t377 = f[2] * d_H[5];
-    const real t378 = t376 + t377;
-    const real t379 = f[3] * d_H[7];
-    const real t380 = t378 + t379;
-    const real t381 = f[4] * d_H[9];
-    const real t382 = t380 + t381;
-    const real t383 = f[5] * d_H[11];
-    const real t384 = t382 + t383;
-    d_tau[1] = t384;
+    const real t228 = f[5] * d_H[11];
+    const real t229 = t227 + t228;
+    const real t230 = t229 - laws[1];
+    const real t231 = t218 + t230;
+    row[1] = t231;
     return 0;
 }
 
@@ -2559,27 +2525,371 @@ static int mstmm_sweep_generic2_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic2_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 12, "", 0, 0},
     {"s", 2, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 12, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 2, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"laws", 2, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 2, "", 0, 0},
+    {"row", 2, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 2 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][2]
+ * in  d_q[2]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[6] * d_q[0];
+    const real t1 = H[7] * d_q[1];
+    const real t2 = t0 + t1;
+    theta[0] = t2;
+    const real t3 = H[8] * d_q[0];
+    const real t4 = H[9] * d_q[1];
+    const real t5 = t3 + t4;
+    theta[1] = t5;
+    const real t6 = H[10] * d_q[0];
+    const real t7 = H[11] * d_q[1];
+    const real t8 = t6 + t7;
+    theta[2] = t8;
+    const real t9 = H[0] * d_q[0];
+    const real t10 = H[1] * d_q[1];
+    const real t11 = t9 + t10;
+    x[0] = t11;
+    const real t12 = H[2] * d_q[0];
+    const real t13 = H[3] * d_q[1];
+    const real t14 = t12 + t13;
+    x[1] = t14;
+    const real t15 = H[4] * d_q[0];
+    const real t16 = H[5] * d_q[1];
+    const real t17 = t15 + t16;
+    x[2] = t17;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_along_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"d_q", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 2 free speeds that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][2]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[2]
+ * in  d_s[2]
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[2] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[2] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[6] * d_u[0];
+    const real t1 = H[7] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = theta[2] * Q[1];
+    const real t4 = theta[1] * Q[2];
+    const real t5 = t3 - t4;
+    const real t6 = t2 + t5;
+    B[0] = t6;
+    const real t7 = H[8] * d_u[0];
+    const real t8 = H[9] * d_u[1];
+    const real t9 = t7 + t8;
+    const real t10 = theta[0] * Q[2];
+    const real t11 = theta[2] * Q[0];
+    const real t12 = t10 - t11;
+    const real t13 = t9 + t12;
+    B[1] = t13;
+    const real t14 = H[10] * d_u[0];
+    const real t15 = H[11] * d_u[1];
+    const real t16 = t14 + t15;
+    const real t17 = theta[1] * Q[0];
+    const real t18 = theta[0] * Q[1];
+    const real t19 = t17 - t18;
+    const real t20 = t16 + t19;
+    B[2] = t20;
+    const real t21 = w[2] * t12;
+    const real t22 = w[1] * t19;
+    const real t23 = t21 - t22;
+    const real t24 = H[6] * d_s[0];
+    const real t25 = H[7] * d_s[1];
+    const real t26 = t24 + t25;
+    const real t27 = theta[2] * Q[4];
+    const real t28 = Q[1] * t16;
+    const real t29 = Q[2] * t9;
+    const real t30 = t28 - t29;
+    const real t31 = t27 + t30;
+    const real t32 = theta[1] * Q[5];
+    const real t33 = t31 - t32;
+    const real t34 = t26 + t33;
+    const real t35 = t23 + t34;
+    B[3] = t35;
+    const real t36 = w[0] * t19;
+    const real t37 = w[2] * t5;
+    const real t38 = t36 - t37;
+    const real t39 = H[8] * d_s[0];
+    const real t40 = H[9] * d_s[1];
+    const real t41 = t39 + t40;
+    const real t42 = theta[0] * Q[5];
+    const real t43 = Q[2] * t2;
+    const real t44 = Q[0] * t16;
+    const real t45 = t43 - t44;
+    const real t46 = theta[2] * Q[3];
+    const real t47 = t45 - t46;
+    const real t48 = t42 + t47;
+    const real t49 = t41 + t48;
+    const real t50 = t38 + t49;
+    B[4] = t50;
+    const real t51 = w[1] * t5;
+    const real t52 = w[0] * t12;
+    const real t53 = t51 - t52;
+    const real t54 = H[10] * d_s[0];
+    const real t55 = H[11] * d_s[1];
+    const real t56 = t54 + t55;
+    const real t57 = theta[1] * Q[3];
+    const real t58 = Q[0] * t9;
+    const real t59 = Q[1] * t2;
+    const real t60 = t58 - t59;
+    const real t61 = t57 + t60;
+    const real t62 = theta[0] * Q[4];
+    const real t63 = t61 - t62;
+    const real t64 = t56 + t63;
+    const real t65 = t53 + t64;
+    B[5] = t65;
+    const real t66 = v[2] * 2.0;
+    const real t67 = t12 * t66;
+    const real t68 = v[1] * 2.0;
+    const real t69 = t19 * t68;
+    const real t70 = t67 - t69;
+    const real t71 = v[2] * t9;
+    const real t72 = H[4] * d_u[0];
+    const real t73 = H[5] * d_u[1];
+    const real t74 = t72 + t73;
+    const real t75 = w[1] * t74;
+    const real t76 = H[2] * d_u[0];
+    const real t77 = H[3] * d_u[1];
+    const real t78 = t76 + t77;
+    const real t79 = w[2] * t78;
+    const real t80 = t75 - t79;
+    const real t81 = t71 + t80;
+    const real t82 = v[1] * t16;
+    const real t83 = t81 - t82;
+    const real t84 = H[0] * d_s[0];
+    const real t85 = H[1] * d_s[1];
+    const real t86 = t84 + t85;
+    const real t87 = t83 + t86;
+    const real t88 = theta[2] * Q[7];
+    const real t89 = x[2] * Q[4];
+    const real t90 = Q[1] * t74;
+    const real t91 = 2.0 * t90;
+    const real t92 = x[1] * Q[0];
+    const real t93 = x[0] * Q[1];
+    const real t94 = t92 - t93;
+    const real t95 = Q[1] * t94;
+    const real t96 = x[0] * Q[2];
+    const real t97 = x[2] * Q[0];
+    const real t98 = t96 - t97;
+    const real t99 = Q[2] * t98;
+    const real t100 = t95 - t99;
+    const real t101 = t91 + t100;
+    const real t102 = Q[2] * t78;
+    const real t103 = 2.0 * t102;
+    const real t104 = t101 - t103;
+    const real t105 = t89 + t104;
+    const real t106 = x[1] * Q[5];
+    const real t107 = t105 - t106;
+    const real t108 = t88 + t107;
+    const real t109 = theta[1] * Q[8];
+    const real t110 = t108 - t109;
+    const real t111 = t87 + t110;
+    const real t112 = t70 + t111;
+    B[6] = t112;
+    const real t113 = v[0] * 2.0;
+    const real t114 = t19 * t113;
+    const real t115 = t5 * t66;
+    const real t116 = t114 - t115;
+    const real t117 = v[0] * t16;
+    const real t118 = H[0] * d_u[0];
+    const real t119 = H[1] * d_u[1];
+    const real t120 = t118 + t119;
+    const real t121 = w[2] * t120;
+    const real t122 = w[0] * t74;
+    const real t123 = t121 - t122;
+    const real t124 = v[2] * t2;
+    const real t125 = t123 - t124;
+    const real t126 = t117 + t125;
+    const real t127 = H[2] * d_s[0];
+    const real t128 = H[3] * d_s[1];
+    const real t129 = t127 + t128;
+    const real t130 = t126 + t129;
+    const real t131 = theta[0] * Q[8];
+    const real t132 = x[0] * Q[5];
+    const real t133 = Q[2] * t120;
+    const real t134 = 2.0 * t133;
+    const real t135 = x[2] * Q[1];
+    const real t136 = x[1] * Q[2];
+    const real t137 = t135 - t136;
+    const real t138 = Q[2] * t137;
+    const real t139 = Q[0] * t94;
+    const real t140 = t138 - t139;
+    const real t141 = Q[0] * t74;
+    const real t142 = 2.0 * t141;
+    const real t143 = t140 - t142;
+    const real t144 = t134 + t143;
+    const real t145 = x[2] * Q[3];
+    const real t146 = t144 - t145;
+    const real t147 = t132 + t146;
+    const real t148 = theta[2] * Q[6];
+    const real t149 = t147 - t148;
+    const real t150 = t131 + t149;
+    const real t151 = t130 + t150;
+    const real t152 = t116 + t151;
+    B[7] = t152;
+    const real t153 = t5 * t68;
+    const real t154 = t12 * t113;
+    const real t155 = t153 - t154;
+    const real t156 = v[1] * t2;
+    const real t157 = w[0] * t78;
+    const real t158 = w[1] * t120;
+    const real t159 = t157 - t158;
+    const real t160 = t156 + t159;
+    const real t161 = v[0] * t9;
+    const real t162 = t160 - t161;
+    const real t163 = H[4] * d_s[0];
+    const real t164 = H[5] * d_s[1];
+    const real t165 = t163 + t164;
+    const real t166 = t162 + t165;
+    const real t167 = theta[1] * Q[6];
+    const real t168 = x[1] * Q[3];
+    const real t169 = Q[0] * t78;
+    const real t170 = 2.0 * t169;
+    const real t171 = Q[0] * t98;
+    const real t172 = Q[1] * t137;
+    const real t173 = t171 - t172;
+    const real t174 = t170 + t173;
+    const real t175 = Q[1] * t120;
+    const real t176 = 2.0 * t175;
+    const real t177 = t174 - t176;
+    const real t178 = t168 + t177;
+    const real t179 = x[0] * Q[4];
+    const real t180 = t178 - t179;
+    const real t181 = t167 + t180;
+    const real t182 = theta[0] * Q[7];
+    const real t183 = t181 - t182;
+    const real t184 = t166 + t183;
+    const real t185 = t155 + t184;
+    B[8] = t185;
+    const real t186 = theta[1] * f[2];
+    const real t187 = theta[2] * f[1];
+    const real t188 = t186 - t187;
+    G[0] = t188;
+    const real t189 = theta[2] * f[0];
+    const real t190 = theta[0] * f[2];
+    const real t191 = t189 - t190;
+    G[1] = t191;
+    const real t192 = theta[0] * f[1];
+    const real t193 = theta[1] * f[0];
+    const real t194 = t192 - t193;
+    G[2] = t194;
+    const real t195 = theta[1] * f[5];
+    const real t196 = x[1] * f[2];
+    const real t197 = x[2] * f[1];
+    const real t198 = t196 - t197;
+    const real t199 = theta[2] * f[4];
+    const real t200 = t198 - t199;
+    const real t201 = t195 + t200;
+    G[3] = t201;
+    const real t202 = theta[2] * f[3];
+    const real t203 = x[2] * f[0];
+    const real t204 = x[0] * f[2];
+    const real t205 = t203 - t204;
+    const real t206 = t202 + t205;
+    const real t207 = theta[0] * f[5];
+    const real t208 = t206 - t207;
+    G[4] = t208;
+    const real t209 = theta[0] * f[4];
+    const real t210 = x[0] * f[1];
+    const real t211 = x[1] * f[0];
+    const real t212 = t210 - t211;
+    const real t213 = theta[1] * f[3];
+    const real t214 = t212 - t213;
+    const real t215 = t209 + t214;
+    G[5] = t215;
+    const real t216 = d_s[0] * J[0];
+    const real t217 = t216 - laws[0];
+    row[0] = t217;
+    const real t218 = d_s[1] * J[1];
+    const real t219 = t218 - laws[1];
+    row[1] = t219;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 2, "", 0, 0},
+    {"d_s", 2, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"laws", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 2, "", 0, 0},
 };
 
 /* rows of a hinge with 2 free speeds
@@ -4008,6 +4318,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_carrier,
+        .call = mstmm_sweep_generic2_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_carrier_outputs,
+        .ir_hash = "7d62d4b72b38673ca162629d153284a300d13a7010ea99bc83f3123f3578ef2b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic2_tangent_column,
         .call = mstmm_sweep_generic2_tangent_column_call,
@@ -4015,7 +4337,31 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_tangent_column_inputs,
         .outputs = mstmm_sweep_generic2_tangent_column_outputs,
-        .ir_hash = "a778dc4ef6bed2ac484be00e0cbdf2640671c73181f089a85590297167b50dec",
+        .ir_hash = "0afe7f96a969af818f727efbad20ddbff7d8ed87c12bcca95aee9e2748dddd02",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_along,
+        .call = mstmm_sweep_generic2_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic2_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_along_outputs,
+        .ir_hash = "cd7fec4c365af7f2f021fe9e9c905fed78042efa2d186d38e73abfc1f9d5ea96",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_steady,
+        .call = mstmm_sweep_generic2_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic2_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_steady_outputs,
+        .ir_hash = "5868547630562a74f266d495add005621276a129dc26c94287799e8f4ff983e5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4097,7 +4443,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "2509ef57264953ec1f251e5b09902442967924b3fc1426c04664c81e440df4ea",
+    .hash = "c934662ef647fa256dadfde341977b9aedba42e6fda21cd01c9d1437d57170da",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4107,6 +4453,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic2_kernels,
 };

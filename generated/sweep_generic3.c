@@ -34,12 +34,22 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -2678,485 +2688,444 @@ static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 3 speeds
+/* motion of Q across a hinge with 3 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][3]
  * in  s[3]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[9] * s[0];
+    const real t7 = H[10] * s[1];
+    const real t8 = t6 + t7;
+    const real t9 = H[11] * s[2];
+    const real t10 = t8 + t9;
+    const real t11 = c[3] + t10;
+    const real t12 = t5 - t11;
+    const real t13 = motion[3] + t12;
+    Q[3] = t13;
+    const real t14 = w[2] * t0;
+    const real t15 = w[0] * t2;
+    const real t16 = t14 - t15;
+    const real t17 = H[12] * s[0];
+    const real t18 = H[13] * s[1];
+    const real t19 = t17 + t18;
+    const real t20 = H[14] * s[2];
+    const real t21 = t19 + t20;
+    const real t22 = c[4] + t21;
+    const real t23 = t16 - t22;
+    const real t24 = motion[4] + t23;
+    Q[4] = t24;
+    const real t25 = w[0] * t1;
+    const real t26 = w[1] * t0;
+    const real t27 = t25 - t26;
+    const real t28 = H[15] * s[0];
+    const real t29 = H[16] * s[1];
+    const real t30 = t28 + t29;
+    const real t31 = H[17] * s[2];
+    const real t32 = t30 + t31;
+    const real t33 = c[5] + t32;
+    const real t34 = t27 - t33;
+    const real t35 = motion[5] + t34;
+    Q[5] = t35;
+    const real t36 = v[1] * t2;
+    const real t37 = t36 * 2.0;
+    const real t38 = v[2] * t1;
+    const real t39 = 2.0 * t38;
+    const real t40 = t37 - t39;
+    const real t41 = H[0] * s[0];
+    const real t42 = H[1] * s[1];
+    const real t43 = t41 + t42;
+    const real t44 = H[2] * s[2];
+    const real t45 = t43 + t44;
+    const real t46 = c[0] + t45;
+    const real t47 = t40 - t46;
+    const real t48 = motion[6] + t47;
+    Q[6] = t48;
+    const real t49 = v[2] * t0;
+    const real t50 = 2.0 * t49;
+    const real t51 = v[0] * t2;
+    const real t52 = 2.0 * t51;
+    const real t53 = t50 - t52;
+    const real t54 = H[3] * s[0];
+    const real t55 = H[4] * s[1];
+    const real t56 = t54 + t55;
+    const real t57 = H[5] * s[2];
+    const real t58 = t56 + t57;
+    const real t59 = c[1] + t58;
+    const real t60 = t53 - t59;
+    const real t61 = motion[7] + t60;
+    Q[7] = t61;
+    const real t62 = v[0] * t1;
+    const real t63 = 2.0 * t62;
+    const real t64 = v[1] * t0;
+    const real t65 = 2.0 * t64;
+    const real t66 = t63 - t65;
+    const real t67 = H[6] * s[0];
+    const real t68 = H[7] * s[1];
+    const real t69 = t67 + t68;
+    const real t70 = H[8] * s[2];
+    const real t71 = t69 + t70;
+    const real t72 = c[2] + t71;
+    const real t73 = t66 - t72;
+    const real t74 = motion[8] + t73;
+    Q[8] = t74;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_carrier_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 3 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][3]
+ * in  s[3]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][3]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[3]
- * out B[9]
- * out G[6]
- * out d_tau[3]
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[3] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic3_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[9] * d_s[0];
+    const real t16 = H[10] * d_s[1];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
+    const real t18 = H[11] * d_s[2];
     const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
-    const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
-    const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
-    const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
+    const real t20 = s[0] * d_H[9];
+    const real t21 = s[1] * d_H[10];
+    const real t22 = t20 + t21;
+    const real t23 = s[2] * d_H[11];
+    const real t24 = t22 + t23;
+    const real t25 = t19 + t24;
+    const real t26 = d_c[3] + t25;
+    const real t27 = theta[2] * Q[4];
+    const real t28 = Q[1] * d_w[2];
+    const real t29 = Q[2] * d_w[1];
+    const real t30 = t28 - t29;
+    const real t31 = t27 + t30;
+    const real t32 = theta[1] * Q[5];
+    const real t33 = t31 - t32;
+    const real t34 = t26 + t33;
+    const real t35 = t14 + t34;
+    B[3] = t35;
+    const real t36 = w[0] * t10;
+    const real t37 = w[2] * t2;
+    const real t38 = t36 - t37;
+    const real t39 = H[12] * d_s[0];
+    const real t40 = H[13] * d_s[1];
     const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
-    const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
-    const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
-    const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
-    const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[9] * d_s[0];
-    const real t67 = H[10] * d_s[1];
-    const real t68 = t66 + t67;
-    const real t69 = H[11] * d_s[2];
+    const real t42 = H[14] * d_s[2];
+    const real t43 = t41 + t42;
+    const real t44 = s[0] * d_H[12];
+    const real t45 = s[1] * d_H[13];
+    const real t46 = t44 + t45;
+    const real t47 = s[2] * d_H[14];
+    const real t48 = t46 + t47;
+    const real t49 = t43 + t48;
+    const real t50 = d_c[4] + t49;
+    const real t51 = theta[0] * Q[5];
+    const real t52 = Q[2] * d_w[0];
+    const real t53 = Q[0] * d_w[2];
+    const real t54 = t52 - t53;
+    const real t55 = theta[2] * Q[3];
+    const real t56 = t54 - t55;
+    const real t57 = t51 + t56;
+    const real t58 = t50 + t57;
+    const real t59 = t38 + t58;
+    B[4] = t59;
+    const real t60 = w[1] * t2;
+    const real t61 = w[0] * t6;
+    const real t62 = t60 - t61;
+    const real t63 = H[15] * d_s[0];
+    const real t64 = H[16] * d_s[1];
+    const real t65 = t63 + t64;
+    const real t66 = H[17] * d_s[2];
+    const real t67 = t65 + t66;
+    const real t68 = s[0] * d_H[15];
+    const real t69 = s[1] * d_H[16];
     const real t70 = t68 + t69;
-    const real t71 = s[0] * d_H[9];
-    const real t72 = s[1] * d_H[10];
-    const real t73 = t71 + t72;
-    const real t74 = s[2] * d_H[11];
-    const real t75 = t73 + t74;
-    const real t76 = t70 + t75;
-    const real t77 = d_c[3] + t76;
-    const real t78 = d_w[2] * t12;
-    const real t79 = d_w[1] * t20;
-    const real t80 = t78 - t79;
-    const real t81 = t77 + t80;
-    const real t82 = w[1] * t64;
-    const real t83 = w[2] * t43;
-    const real t84 = t82 - t83;
-    const real t85 = w[1] * t20;
-    const real t86 = w[2] * t12;
-    const real t87 = t85 - t86;
-    const real t88 = H[9] * s[0];
-    const real t89 = H[10] * s[1];
-    const real t90 = t88 + t89;
-    const real t91 = H[11] * s[2];
-    const real t92 = t90 + t91;
-    const real t93 = c[3] + t92;
-    const real t94 = t87 - t93;
-    const real t95 = motion[3] + t94;
-    const real t96 = t4 * t95;
-    const real t97 = w[2] * t5;
-    const real t98 = w[0] * t20;
-    const real t99 = t97 - t98;
-    const real t100 = H[12] * s[0];
-    const real t101 = H[13] * s[1];
-    const real t102 = t100 + t101;
-    const real t103 = H[14] * s[2];
-    const real t104 = t102 + t103;
-    const real t105 = c[4] + t104;
-    const real t106 = t99 - t105;
-    const real t107 = motion[4] + t106;
-    const real t108 = t11 * t107;
-    const real t109 = t96 + t108;
-    const real t110 = w[0] * t12;
-    const real t111 = w[1] * t5;
-    const real t112 = t110 - t111;
-    const real t113 = H[15] * s[0];
-    const real t114 = H[16] * s[1];
-    const real t115 = t113 + t114;
-    const real t116 = H[17] * s[2];
-    const real t117 = t115 + t116;
-    const real t118 = c[5] + t117;
-    const real t119 = t112 - t118;
-    const real t120 = motion[5] + t119;
-    const real t121 = t19 * t120;
-    const real t122 = t109 + t121;
-    const real t123 = t84 - t122;
-    const real t124 = t81 + t123;
-    B[3] = t124;
-    const real t125 = H[12] * d_s[0];
-    const real t126 = H[13] * d_s[1];
-    const real t127 = t125 + t126;
-    const real t128 = H[14] * d_s[2];
-    const real t129 = t127 + t128;
-    const real t130 = s[0] * d_H[12];
-    const real t131 = s[1] * d_H[13];
+    const real t71 = s[2] * d_H[17];
+    const real t72 = t70 + t71;
+    const real t73 = t67 + t72;
+    const real t74 = d_c[5] + t73;
+    const real t75 = theta[1] * Q[3];
+    const real t76 = Q[0] * d_w[1];
+    const real t77 = Q[1] * d_w[0];
+    const real t78 = t76 - t77;
+    const real t79 = t75 + t78;
+    const real t80 = theta[0] * Q[4];
+    const real t81 = t79 - t80;
+    const real t82 = t74 + t81;
+    const real t83 = t62 + t82;
+    B[5] = t83;
+    const real t84 = v[2] * 2.0;
+    const real t85 = t6 * t84;
+    const real t86 = v[1] * 2.0;
+    const real t87 = t10 * t86;
+    const real t88 = t85 - t87;
+    const real t89 = H[0] * d_s[0];
+    const real t90 = H[1] * d_s[1];
+    const real t91 = t89 + t90;
+    const real t92 = H[2] * d_s[2];
+    const real t93 = t91 + t92;
+    const real t94 = s[0] * d_H[0];
+    const real t95 = s[1] * d_H[1];
+    const real t96 = t94 + t95;
+    const real t97 = s[2] * d_H[2];
+    const real t98 = t96 + t97;
+    const real t99 = t93 + t98;
+    const real t100 = d_c[0] + t99;
+    const real t101 = theta[2] * Q[7];
+    const real t102 = x[2] * Q[4];
+    const real t103 = Q[1] * d_v[2];
+    const real t104 = 2.0 * t103;
+    const real t105 = x[1] * Q[0];
+    const real t106 = x[0] * Q[1];
+    const real t107 = t105 - t106;
+    const real t108 = Q[1] * t107;
+    const real t109 = x[0] * Q[2];
+    const real t110 = x[2] * Q[0];
+    const real t111 = t109 - t110;
+    const real t112 = Q[2] * t111;
+    const real t113 = t108 - t112;
+    const real t114 = t104 + t113;
+    const real t115 = Q[2] * d_v[1];
+    const real t116 = 2.0 * t115;
+    const real t117 = t114 - t116;
+    const real t118 = t102 + t117;
+    const real t119 = x[1] * Q[5];
+    const real t120 = t118 - t119;
+    const real t121 = t101 + t120;
+    const real t122 = theta[1] * Q[8];
+    const real t123 = t121 - t122;
+    const real t124 = t100 + t123;
+    const real t125 = t88 + t124;
+    B[6] = t125;
+    const real t126 = v[0] * 2.0;
+    const real t127 = t10 * t126;
+    const real t128 = t2 * t84;
+    const real t129 = t127 - t128;
+    const real t130 = H[3] * d_s[0];
+    const real t131 = H[4] * d_s[1];
     const real t132 = t130 + t131;
-    const real t133 = s[2] * d_H[14];
+    const real t133 = H[5] * d_s[2];
     const real t134 = t132 + t133;
-    const real t135 = t129 + t134;
-    const real t136 = d_c[4] + t135;
-    const real t137 = d_w[0] * t20;
-    const real t138 = d_w[2] * t5;
-    const real t139 = t137 - t138;
-    const real t140 = t136 + t139;
-    const real t141 = w[2] * t22;
-    const real t142 = w[0] * t64;
-    const real t143 = t141 - t142;
-    const real t144 = t28 * t95;
-    const real t145 = t34 * t107;
-    const real t146 = t144 + t145;
-    const real t147 = t41 * t120;
-    const real t148 = t146 + t147;
-    const real t149 = t143 - t148;
-    const real t150 = t140 + t149;
-    B[4] = t150;
-    const real t151 = H[15] * d_s[0];
-    const real t152 = H[16] * d_s[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[17] * d_s[2];
-    const real t155 = t153 + t154;
-    const real t156 = s[0] * d_H[15];
-    const real t157 = s[1] * d_H[16];
-    const real t158 = t156 + t157;
-    const real t159 = s[2] * d_H[17];
-    const real t160 = t158 + t159;
-    const real t161 = t155 + t160;
-    const real t162 = d_c[5] + t161;
-    const real t163 = d_w[1] * t5;
-    const real t164 = d_w[0] * t12;
-    const real t165 = t163 - t164;
-    const real t166 = t162 + t165;
-    const real t167 = w[0] * t43;
-    const real t168 = w[1] * t22;
-    const real t169 = t167 - t168;
-    const real t170 = t49 * t95;
-    const real t171 = t55 * t107;
-    const real t172 = t170 + t171;
-    const real t173 = t62 * t120;
+    const real t135 = s[0] * d_H[3];
+    const real t136 = s[1] * d_H[4];
+    const real t137 = t135 + t136;
+    const real t138 = s[2] * d_H[5];
+    const real t139 = t137 + t138;
+    const real t140 = t134 + t139;
+    const real t141 = d_c[1] + t140;
+    const real t142 = theta[0] * Q[8];
+    const real t143 = x[0] * Q[5];
+    const real t144 = Q[2] * d_v[0];
+    const real t145 = 2.0 * t144;
+    const real t146 = x[2] * Q[1];
+    const real t147 = x[1] * Q[2];
+    const real t148 = t146 - t147;
+    const real t149 = Q[2] * t148;
+    const real t150 = Q[0] * t107;
+    const real t151 = t149 - t150;
+    const real t152 = Q[0] * d_v[2];
+    const real t153 = 2.0 * t152;
+    const real t154 = t151 - t153;
+    const real t155 = t145 + t154;
+    const real t156 = x[2] * Q[3];
+    const real t157 = t155 - t156;
+    const real t158 = t143 + t157;
+    const real t159 = theta[2] * Q[6];
+    const real t160 = t158 - t159;
+    const real t161 = t142 + t160;
+    const real t162 = t141 + t161;
+    const real t163 = t129 + t162;
+    B[7] = t163;
+    const real t164 = t2 * t86;
+    const real t165 = t6 * t126;
+    const real t166 = t164 - t165;
+    const real t167 = H[6] * d_s[0];
+    const real t168 = H[7] * d_s[1];
+    const real t169 = t167 + t168;
+    const real t170 = H[8] * d_s[2];
+    const real t171 = t169 + t170;
+    const real t172 = s[0] * d_H[6];
+    const real t173 = s[1] * d_H[7];
     const real t174 = t172 + t173;
-    const real t175 = t169 - t174;
-    const real t176 = t166 + t175;
-    B[5] = t176;
-    const real t177 = H[0] * d_s[0];
-    const real t178 = H[1] * d_s[1];
-    const real t179 = t177 + t178;
-    const real t180 = H[2] * d_s[2];
-    const real t181 = t179 + t180;
-    const real t182 = s[0] * d_H[0];
-    const real t183 = s[1] * d_H[1];
-    const real t184 = t182 + t183;
-    const real t185 = s[2] * d_H[2];
-    const real t186 = t184 + t185;
-    const real t187 = t181 + t186;
-    const real t188 = d_c[0] + t187;
-    const real t189 = d_v[2] * t12;
-    const real t190 = 2.0 * t189;
-    const real t191 = d_v[1] * t20;
-    const real t192 = 2.0 * t191;
-    const real t193 = t190 - t192;
-    const real t194 = t188 + t193;
-    const real t195 = R[1] * d_d[0];
-    const real t196 = R[4] * d_d[1];
-    const real t197 = t195 + t196;
-    const real t198 = R[7] * d_d[2];
-    const real t199 = t197 + t198;
-    const real t200 = t5 * t12;
-    const real t201 = t199 * t200;
-    const real t202 = R[0] * d_d[0];
-    const real t203 = R[3] * d_d[1];
-    const real t204 = t202 + t203;
-    const real t205 = R[6] * d_d[2];
-    const real t206 = t204 + t205;
-    const real t207 = t12 * t12;
-    const real t208 = t20 * t20;
-    const real t209 = t207 + t208;
-    const real t210 = t206 * t209;
-    const real t211 = t201 - t210;
-    const real t212 = R[2] * d_d[0];
-    const real t213 = R[5] * d_d[1];
-    const real t214 = t212 + t213;
-    const real t215 = R[8] * d_d[2];
-    const real t216 = t214 + t215;
-    const real t217 = t5 * t20;
-    const real t218 = t216 * t217;
-    const real t219 = t211 + t218;
-    const real t220 = v[1] * 2.0;
-    const real t221 = t64 * t220;
-    const real t222 = v[2] * 2.0;
-    const real t223 = t43 * t222;
-    const real t224 = t221 - t223;
-    const real t225 = t216 * t107;
-    const real t226 = t199 * t120;
-    const real t227 = t225 - t226;
-    const real t228 = t224 + t227;
-    const real t229 = t219 + t228;
-    const real t230 = v[1] * t20;
-    const real t231 = t230 * 2.0;
-    const real t232 = v[2] * t12;
-    const real t233 = 2.0 * t232;
-    const real t234 = t231 - t233;
-    const real t235 = H[0] * s[0];
-    const real t236 = H[1] * s[1];
+    const real t175 = s[2] * d_H[8];
+    const real t176 = t174 + t175;
+    const real t177 = t171 + t176;
+    const real t178 = d_c[2] + t177;
+    const real t179 = theta[1] * Q[6];
+    const real t180 = x[1] * Q[3];
+    const real t181 = Q[0] * d_v[1];
+    const real t182 = 2.0 * t181;
+    const real t183 = Q[0] * t111;
+    const real t184 = Q[1] * t148;
+    const real t185 = t183 - t184;
+    const real t186 = t182 + t185;
+    const real t187 = Q[1] * d_v[0];
+    const real t188 = 2.0 * t187;
+    const real t189 = t186 - t188;
+    const real t190 = t180 + t189;
+    const real t191 = x[0] * Q[4];
+    const real t192 = t190 - t191;
+    const real t193 = t179 + t192;
+    const real t194 = theta[0] * Q[7];
+    const real t195 = t193 - t194;
+    const real t196 = t178 + t195;
+    const real t197 = t166 + t196;
+    B[8] = t197;
+    const real t198 = theta[1] * f[2];
+    const real t199 = theta[2] * f[1];
+    const real t200 = t198 - t199;
+    G[0] = t200;
+    const real t201 = theta[2] * f[0];
+    const real t202 = theta[0] * f[2];
+    const real t203 = t201 - t202;
+    G[1] = t203;
+    const real t204 = theta[0] * f[1];
+    const real t205 = theta[1] * f[0];
+    const real t206 = t204 - t205;
+    G[2] = t206;
+    const real t207 = theta[1] * f[5];
+    const real t208 = x[1] * f[2];
+    const real t209 = x[2] * f[1];
+    const real t210 = t208 - t209;
+    const real t211 = theta[2] * f[4];
+    const real t212 = t210 - t211;
+    const real t213 = t207 + t212;
+    G[3] = t213;
+    const real t214 = theta[2] * f[3];
+    const real t215 = x[2] * f[0];
+    const real t216 = x[0] * f[2];
+    const real t217 = t215 - t216;
+    const real t218 = t214 + t217;
+    const real t219 = theta[0] * f[5];
+    const real t220 = t218 - t219;
+    G[4] = t220;
+    const real t221 = theta[0] * f[4];
+    const real t222 = x[0] * f[1];
+    const real t223 = x[1] * f[0];
+    const real t224 = t222 - t223;
+    const real t225 = theta[1] * f[3];
+    const real t226 = t224 - t225;
+    const real t227 = t221 + t226;
+    G[5] = t227;
+    const real t228 = d_s[0] * J[0];
+    const real t229 = f[0] * d_H[0];
+    const real t230 = f[1] * d_H[3];
+    const real t231 = t229 + t230;
+    const real t232 = f[2] * d_H[6];
+    const real t233 = t231 + t232;
+    const real t234 = f[3] * d_H[9];
+    const real t235 = t233 + t234;
+    const real t236 = f[4] * d_H[12];
     const real t237 = t235 + t236;
-    const real t238 = H[2] * s[2];
+    const real t238 = f[5] * d_H[15];
     const real t239 = t237 + t238;
-    const real t240 = c[0] + t239;
-    const real t241 = t234 - t240;
-    const real t242 = motion[6] + t241;
-    const real t243 = t4 * t242;
-    const real t244 = v[2] * t5;
-    const real t245 = 2.0 * t244;
-    const real t246 = v[0] * t20;
-    const real t247 = 2.0 * t246;
-    const real t248 = t245 - t247;
-    const real t249 = H[3] * s[0];
-    const real t250 = H[4] * s[1];
+    const real t240 = t239 - laws[0];
+    const real t241 = t228 + t240;
+    row[0] = t241;
+    const real t242 = d_s[1] * J[1];
+    const real t243 = f[0] * d_H[1];
+    const real t244 = f[1] * d_H[4];
+    const real t245 = t243 + t244;
+    const real t246 = f[2] * d_H[7];
+    const real t247 = t245 + t246;
+    const real t248 = f[3] * d_H[10];
+    const real t249 = t247 + t248;
+    const real t250 = f[4] * d_H[13];
     const real t251 = t249 + t250;
-    const real t252 = H[5] * s[2];
+    const real t252 = f[5] * d_H[16];
     const real t253 = t251 + t252;
-    const real t254 = c[1] + t253;
-    const real t255 = t248 - t254;
-    const real t256 = motion[7] + t255;
-    const real t257 = t11 * t256;
-    const real t258 = t243 + t257;
-    const real t259 = v[0] * t12;
-    const real t260 = 2.0 * t259;
-    const real t261 = v[1] * t5;
-    const real t262 = 2.0 * t261;
-    const real t263 = t260 - t262;
-    const real t264 = H[6] * s[0];
-    const real t265 = H[7] * s[1];
-    const real t266 = t264 + t265;
-    const real t267 = H[8] * s[2];
-    const real t268 = t266 + t267;
-    const real t269 = c[2] + t268;
-    const real t270 = t263 - t269;
-    const real t271 = motion[8] + t270;
-    const real t272 = t19 * t271;
-    const real t273 = t258 + t272;
-    const real t274 = t229 - t273;
-    const real t275 = t194 + t274;
-    B[6] = t275;
-    const real t276 = H[3] * d_s[0];
-    const real t277 = H[4] * d_s[1];
-    const real t278 = t276 + t277;
-    const real t279 = H[5] * d_s[2];
-    const real t280 = t278 + t279;
-    const real t281 = s[0] * d_H[3];
-    const real t282 = s[1] * d_H[4];
-    const real t283 = t281 + t282;
-    const real t284 = s[2] * d_H[5];
-    const real t285 = t283 + t284;
-    const real t286 = t280 + t285;
-    const real t287 = d_c[1] + t286;
-    const real t288 = d_v[0] * t20;
-    const real t289 = 2.0 * t288;
-    const real t290 = d_v[2] * t5;
-    const real t291 = 2.0 * t290;
-    const real t292 = t289 - t291;
-    const real t293 = t287 + t292;
-    const real t294 = t206 * t200;
-    const real t295 = t5 * t5;
-    const real t296 = t208 + t295;
-    const real t297 = t199 * t296;
-    const real t298 = t294 - t297;
-    const real t299 = t12 * t20;
-    const real t300 = t216 * t299;
-    const real t301 = t298 + t300;
-    const real t302 = t22 * t222;
-    const real t303 = v[0] * 2.0;
-    const real t304 = t64 * t303;
-    const real t305 = t302 - t304;
-    const real t306 = t206 * t120;
-    const real t307 = t216 * t95;
-    const real t308 = t306 - t307;
-    const real t309 = t305 + t308;
-    const real t310 = t301 + t309;
-    const real t311 = t28 * t242;
-    const real t312 = t34 * t256;
-    const real t313 = t311 + t312;
-    const real t314 = t41 * t271;
-    const real t315 = t313 + t314;
-    const real t316 = t310 - t315;
-    const real t317 = t293 + t316;
-    B[7] = t317;
-    const real t318 = H[6] * d_s[0];
-    const real t319 = H[7] * d_s[1];
-    const real t320 = t318 + t319;
-    const real t321 = H[8] * d_s[2];
-    const real t322 = t320 + t321;
-    const real t323 = s[0] * d_H[6];
-    const real t324 = s[1] * d_H[7];
-    const real t325 = t323 + t324;
-    const real t326 = s[2] * d_H[8];
-    const real t327 = t325 + t326;
-    const real t328 = t322 + t327;
-    const real t329 = d_c[2] + t328;
-    const real t330 = d_v[1] * t5;
-    const real t331 = 2.0 * t330;
-    const real t332 = d_v[0] * t12;
-    const real t333 = 2.0 * t332;
-    const real t334 = t331 - t333;
-    const real t335 = t329 + t334;
-    const real t336 = t206 * t217;
-    const real t337 = t199 * t299;
-    const real t338 = t336 + t337;
-    const real t339 = t207 + t295;
-    const real t340 = t216 * t339;
-    const real t341 = t338 - t340;
-    const real t342 = t43 * t303;
-    const real t343 = t22 * t220;
-    const real t344 = t342 - t343;
-    const real t345 = t199 * t95;
-    const real t346 = t206 * t107;
-    const real t347 = t345 - t346;
-    const real t348 = t344 + t347;
-    const real t349 = t341 + t348;
-    const real t350 = t49 * t242;
-    const real t351 = t55 * t256;
-    const real t352 = t350 + t351;
-    const real t353 = t62 * t271;
-    const real t354 = t352 + t353;
-    const real t355 = t349 - t354;
-    const real t356 = t335 + t355;
-    B[8] = t356;
-    const real t357 = f[0] * t4;
-    const real t358 = f[1] * t11;
-    const real t359 = t357 + t358;
-    const real t360 = f[2] * t19;
-    const real t361 = t359 + t360;
-    G[0] = t361;
-    const real t362 = f[0] * t28;
-    const real t363 = f[1] * t34;
-    const real t364 = t362 + t363;
-    const real t365 = f[2] * t41;
-    const real t366 = t364 + t365;
-    G[1] = t366;
-    const real t367 = f[0] * t49;
-    const real t368 = f[1] * t55;
-    const real t369 = t367 + t368;
-    const real t370 = f[2] * t62;
-    const real t371 = t369 + t370;
-    G[2] = t371;
-    const real t372 = f[3] * t4;
-    const real t373 = f[4] * t11;
-    const real t374 = t372 + t373;
-    const real t375 = f[5] * t19;
-    const real t376 = t374 + t375;
-    const real t377 = f[2] * t199;
-    const real t378 = f[1] * t216;
-    const real t379 = t377 - t378;
-    const real t380 = t376 + t379;
-    G[3] = t380;
-    const real t381 = f[3] * t28;
-    const real t382 = f[4] * t34;
-    const real t383 = t381 + t382;
-    const real t384 = f[5] * t41;
-    const real t385 = t383 + t384;
-    const real t386 = f[0] * t216;
-    const real t387 = f[2] * t206;
-    const real t388 = t386 - t387;
-    const real t389 = t385 + t388;
-    G[4] = t389;
-    const real t390 = f[3] * t49;
-    const real t391 = f[4] * t55;
-    const real t392 = t390 + t391;
-    const real t393 = f[5] * t62;
-    const real t394 = t392 + t393;
-    const real t395 = f[1] * t206;
-    const real t396 = f[0] * t199;
-    const real t397 = t395 - t396;
-    const real t398 = t394 + t397;
-    G[5] = t398;
-    const real t399 = f[0] * d_H[0];
-    const real t400 = f[1] * d_H[3];
-    const real t401 = t399 + t400;
-    const real t402 = f[2] * d_H[6];
-    const real t403 = t401 + t402;
-    const real t404 = f[3] * d_H[9];
-    const real t405 = t403 + t404;
-    const real t406 = f[4] * d_H[12];
-    const real t407 = t405 + t406;
-    const real t408 = f[5] * d_H[15];
-    const real t409 = t407 + t408;
-    d_tau[0] = t409;
-    const real t410 = f[0] * d_H[1];
-    const real t411 = f[1] * d_H[4];
-    const real t412 = t410 + t411;
-    const real t413 = f[2] * d_H[7];
-    const real t414 = t412 + t413;
-    const real t415 = f[3] * d_H[10];
-    const real t416 = t414 + t415;
-    const real t417 = f[4] * d_H[13];
-    const real t418 = t416 + t417;
-    const real t419 = f[5] * d_H[16];
-    const real t420 = t418 + t419;
-    d_tau[1] = t420;
-    const real t421 = f[0] * d_H[2];
-    const real t422 = f[1] * d_H[5];
-    const real t423 = t421 + t422;
-    const real t424 = f[2] * d_H[8];
-    const real t425 = t423 + t424;
-    const real t426 = f[3] * d_H[11];
-    const real t427 = t425 + t426;
-    const real t428 = f[4] * d_H[14];
-    const real t429 = t427 + t428;
-    const real t430 = f[5] * d_H[17];
-    const real t431 = t429 + t430;
-    d_tau[2] = t431;
+    const real t254 = t253 - laws[1];
+    const real t255 = t242 + t254;
+    row[1] = t255;
+    const real t256 = d_s[2] * J[2];
+    const real t257 = f[0] * d_H[2];
+    const real t258 = f[1] * d_H[5];
+    const real t259 = t257 + t258;
+    const real t260 = f[2] * d_H[8];
+    const real t261 = t259 + t260;
+    const real t262 = f[3] * d_H[11];
+    const real t263 = t261 + t262;
+    const real t264 = f[4] * d_H[14];
+    const real t265 = t263 + t264;
+    const real t266 = f[5] * d_H[17];
+    const real t267 = t265 + t266;
+    const real t268 = t267 - laws[2];
+    const real t269 = t256 + t268;
+    row[2] = t269;
     return 0;
 }
 
@@ -3167,27 +3136,410 @@ static int mstmm_sweep_generic3_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic3_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 18, "", 0, 0},
     {"s", 3, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 18, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 3, "", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 3, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 3, "", 0, 0},
+    {"row", 3, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 3 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][3]
+ * in  d_q[3]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[9] * d_q[0];
+    const real t1 = H[10] * d_q[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[11] * d_q[2];
+    const real t4 = t2 + t3;
+    theta[0] = t4;
+    const real t5 = H[12] * d_q[0];
+    const real t6 = H[13] * d_q[1];
+    const real t7 = t5 + t6;
+    const real t8 = H[14] * d_q[2];
+    const real t9 = t7 + t8;
+    theta[1] = t9;
+    const real t10 = H[15] * d_q[0];
+    const real t11 = H[16] * d_q[1];
+    const real t12 = t10 + t11;
+    const real t13 = H[17] * d_q[2];
+    const real t14 = t12 + t13;
+    theta[2] = t14;
+    const real t15 = H[0] * d_q[0];
+    const real t16 = H[1] * d_q[1];
+    const real t17 = t15 + t16;
+    const real t18 = H[2] * d_q[2];
+    const real t19 = t17 + t18;
+    x[0] = t19;
+    const real t20 = H[3] * d_q[0];
+    const real t21 = H[4] * d_q[1];
+    const real t22 = t20 + t21;
+    const real t23 = H[5] * d_q[2];
+    const real t24 = t22 + t23;
+    x[1] = t24;
+    const real t25 = H[6] * d_q[0];
+    const real t26 = H[7] * d_q[1];
+    const real t27 = t25 + t26;
+    const real t28 = H[8] * d_q[2];
+    const real t29 = t27 + t28;
+    x[2] = t29;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_along_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"d_q", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 3 free speeds that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][3]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[3]
+ * in  d_s[3]
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[3] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[9] * d_u[0];
+    const real t1 = H[10] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[11] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = theta[2] * Q[1];
+    const real t6 = theta[1] * Q[2];
+    const real t7 = t5 - t6;
+    const real t8 = t4 + t7;
+    B[0] = t8;
+    const real t9 = H[12] * d_u[0];
+    const real t10 = H[13] * d_u[1];
+    const real t11 = t9 + t10;
+    const real t12 = H[14] * d_u[2];
+    const real t13 = t11 + t12;
+    const real t14 = theta[0] * Q[2];
+    const real t15 = theta[2] * Q[0];
+    const real t16 = t14 - t15;
+    const real t17 = t13 + t16;
+    B[1] = t17;
+    const real t18 = H[15] * d_u[0];
+    const real t19 = H[16] * d_u[1];
+    const real t20 = t18 + t19;
+    const real t21 = H[17] * d_u[2];
+    const real t22 = t20 + t21;
+    const real t23 = theta[1] * Q[0];
+    const real t24 = theta[0] * Q[1];
+    const real t25 = t23 - t24;
+    const real t26 = t22 + t25;
+    B[2] = t26;
+    const real t27 = w[2] * t16;
+    const real t28 = w[1] * t25;
+    const real t29 = t27 - t28;
+    const real t30 = H[9] * d_s[0];
+    const real t31 = H[10] * d_s[1];
+    const real t32 = t30 + t31;
+    const real t33 = H[11] * d_s[2];
+    const real t34 = t32 + t33;
+    const real t35 = theta[2] * Q[4];
+    const real t36 = Q[1] * t22;
+    const real t37 = Q[2] * t13;
+    const real t38 = t36 - t37;
+    const real t39 = t35 + t38;
+    const real t40 = theta[1] * Q[5];
+    const real t41 = t39 - t40;
+    const real t42 = t34 + t41;
+    const real t43 = t29 + t42;
+    B[3] = t43;
+    const real t44 = w[0] * t25;
+    const real t45 = w[2] * t7;
+    const real t46 = t44 - t45;
+    const real t47 = H[12] * d_s[0];
+    const real t48 = H[13] * d_s[1];
+    const real t49 = t47 + t48;
+    const real t50 = H[14] * d_s[2];
+    const real t51 = t49 + t50;
+    const real t52 = theta[0] * Q[5];
+    const real t53 = Q[2] * t4;
+    const real t54 = Q[0] * t22;
+    const real t55 = t53 - t54;
+    const real t56 = theta[2] * Q[3];
+    const real t57 = t55 - t56;
+    const real t58 = t52 + t57;
+    const real t59 = t51 + t58;
+    const real t60 = t46 + t59;
+    B[4] = t60;
+    const real t61 = w[1] * t7;
+    const real t62 = w[0] * t16;
+    const real t63 = t61 - t62;
+    const real t64 = H[15] * d_s[0];
+    const real t65 = H[16] * d_s[1];
+    const real t66 = t64 + t65;
+    const real t67 = H[17] * d_s[2];
+    const real t68 = t66 + t67;
+    const real t69 = theta[1] * Q[3];
+    const real t70 = Q[0] * t13;
+    const real t71 = Q[1] * t4;
+    const real t72 = t70 - t71;
+    const real t73 = t69 + t72;
+    const real t74 = theta[0] * Q[4];
+    const real t75 = t73 - t74;
+    const real t76 = t68 + t75;
+    const real t77 = t63 + t76;
+    B[5] = t77;
+    const real t78 = v[2] * 2.0;
+    const real t79 = t16 * t78;
+    const real t80 = v[1] * 2.0;
+    const real t81 = t25 * t80;
+    const real t82 = t79 - t81;
+    const real t83 = v[2] * t13;
+    const real t84 = H[6] * d_u[0];
+    const real t85 = H[7] * d_u[1];
+    const real t86 = t84 + t85;
+    const real t87 = H[8] * d_u[2];
+    const real t88 = t86 + t87;
+    const real t89 = w[1] * t88;
+    const real t90 = H[3] * d_u[0];
+    const real t91 = H[4] * d_u[1];
+    const real t92 = t90 + t91;
+    const real t93 = H[5] * d_u[2];
+    const real t94 = t92 + t93;
+    const real t95 = w[2] * t94;
+    const real t96 = t89 - t95;
+    const real t97 = t83 + t96;
+    const real t98 = v[1] * t22;
+    const real t99 = t97 - t98;
+    const real t100 = H[0] * d_s[0];
+    const real t101 = H[1] * d_s[1];
+    const real t102 = t100 + t101;
+    const real t103 = H[2] * d_s[2];
+    const real t104 = t102 + t103;
+    const real t105 = t99 + t104;
+    const real t106 = theta[2] * Q[7];
+    const real t107 = x[2] * Q[4];
+    const real t108 = Q[1] * t88;
+    const real t109 = 2.0 * t108;
+    const real t110 = x[1] * Q[0];
+    const real t111 = x[0] * Q[1];
+    const real t112 = t110 - t111;
+    const real t113 = Q[1] * t112;
+    const real t114 = x[0] * Q[2];
+    const real t115 = x[2] * Q[0];
+    const real t116 = t114 - t115;
+    const real t117 = Q[2] * t116;
+    const real t118 = t113 - t117;
+    const real t119 = t109 + t118;
+    const real t120 = Q[2] * t94;
+    const real t121 = 2.0 * t120;
+    const real t122 = t119 - t121;
+    const real t123 = t107 + t122;
+    const real t124 = x[1] * Q[5];
+    const real t125 = t123 - t124;
+    const real t126 = t106 + t125;
+    const real t127 = theta[1] * Q[8];
+    const real t128 = t126 - t127;
+    const real t129 = t105 + t128;
+    const real t130 = t82 + t129;
+    B[6] = t130;
+    const real t131 = v[0] * 2.0;
+    const real t132 = t25 * t131;
+    const real t133 = t7 * t78;
+    const real t134 = t132 - t133;
+    const real t135 = v[0] * t22;
+    const real t136 = H[0] * d_u[0];
+    const real t137 = H[1] * d_u[1];
+    const real t138 = t136 + t137;
+    const real t139 = H[2] * d_u[2];
+    const real t140 = t138 + t139;
+    const real t141 = w[2] * t140;
+    const real t142 = w[0] * t88;
+    const real t143 = t141 - t142;
+    const real t144 = v[2] * t4;
+    const real t145 = t143 - t144;
+    const real t146 = t135 + t145;
+    const real t147 = H[3] * d_s[0];
+    const real t148 = H[4] * d_s[1];
+    const real t149 = t147 + t148;
+    const real t150 = H[5] * d_s[2];
+    const real t151 = t149 + t150;
+    const real t152 = t146 + t151;
+    const real t153 = theta[0] * Q[8];
+    const real t154 = x[0] * Q[5];
+    const real t155 = Q[2] * t140;
+    const real t156 = 2.0 * t155;
+    const real t157 = x[2] * Q[1];
+    const real t158 = x[1] * Q[2];
+    const real t159 = t157 - t158;
+    const real t160 = Q[2] * t159;
+    const real t161 = Q[0] * t112;
+    const real t162 = t160 - t161;
+    const real t163 = Q[0] * t88;
+    const real t164 = 2.0 * t163;
+    const real t165 = t162 - t164;
+    const real t166 = t156 + t165;
+    const real t167 = x[2] * Q[3];
+    const real t168 = t166 - t167;
+    const real t169 = t154 + t168;
+    const real t170 = theta[2] * Q[6];
+    const real t171 = t169 - t170;
+    const real t172 = t153 + t171;
+    const real t173 = t152 + t172;
+    const real t174 = t134 + t173;
+    B[7] = t174;
+    const real t175 = t7 * t80;
+    const real t176 = t16 * t131;
+    const real t177 = t175 - t176;
+    const real t178 = v[1] * t4;
+    const real t179 = w[0] * t94;
+    const real t180 = w[1] * t140;
+    const real t181 = t179 - t180;
+    const real t182 = t178 + t181;
+    const real t183 = v[0] * t13;
+    const real t184 = t182 - t183;
+    const real t185 = H[6] * d_s[0];
+    const real t186 = H[7] * d_s[1];
+    const real t187 = t185 + t186;
+    const real t188 = H[8] * d_s[2];
+    const real t189 = t187 + t188;
+    const real t190 = t184 + t189;
+    const real t191 = theta[1] * Q[6];
+    const real t192 = x[1] * Q[3];
+    const real t193 = Q[0] * t94;
+    const real t194 = 2.0 * t193;
+    const real t195 = Q[0] * t116;
+    const real t196 = Q[1] * t159;
+    const real t197 = t195 - t196;
+    const real t198 = t194 + t197;
+    const real t199 = Q[1] * t140;
+    const real t200 = 2.0 * t199;
+    const real t201 = t198 - t200;
+    const real t202 = t192 + t201;
+    const real t203 = x[0] * Q[4];
+    const real t204 = t202 - t203;
+    const real t205 = t191 + t204;
+    const real t206 = theta[0] * Q[7];
+    const real t207 = t205 - t206;
+    const real t208 = t190 + t207;
+    const real t209 = t177 + t208;
+    B[8] = t209;
+    const real t210 = theta[1] * f[2];
+    const real t211 = theta[2] * f[1];
+    const real t212 = t210 - t211;
+    G[0] = t212;
+    const real t213 = theta[2] * f[0];
+    const real t214 = theta[0] * f[2];
+    const real t215 = t213 - t214;
+    G[1] = t215;
+    const real t216 = theta[0] * f[1];
+    const real t217 = theta[1] * f[0];
+    const real t218 = t216 - t217;
+    G[2] = t218;
+    const real t219 = theta[1] * f[5];
+    const real t220 = x[1] * f[2];
+    const real t221 = x[2] * f[1];
+    const real t222 = t220 - t221;
+    const real t223 = theta[2] * f[4];
+    const real t224 = t222 - t223;
+    const real t225 = t219 + t224;
+    G[3] = t225;
+    const real t226 = theta[2] * f[3];
+    const real t227 = x[2] * f[0];
+    const real t228 = x[0] * f[2];
+    const real t229 = t227 - t228;
+    const real t230 = t226 + t229;
+    const real t231 = theta[0] * f[5];
+    const real t232 = t230 - t231;
+    G[4] = t232;
+    const real t233 = theta[0] * f[4];
+    const real t234 = x[0] * f[1];
+    const real t235 = x[1] * f[0];
+    const real t236 = t234 - t235;
+    const real t237 = theta[1] * f[3];
+    const real t238 = t236 - t237;
+    const real t239 = t233 + t238;
+    G[5] = t239;
+    const real t240 = d_s[0] * J[0];
+    const real t241 = t240 - laws[0];
+    row[0] = t241;
+    const real t242 = d_s[1] * J[1];
+    const real t243 = t242 - laws[1];
+    row[1] = t243;
+    const real t244 = d_s[2] * J[2];
+    const real t245 = t244 - laws[2];
+    row[2] = t245;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 3, "", 0, 0},
+    {"d_s", 3, "", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 3, "", 0, 0},
 };
 
 /* rows of a hinge with 3 free speeds
@@ -4872,6 +5224,18 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_carrier,
+        .call = mstmm_sweep_generic3_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_carrier_outputs,
+        .ir_hash = "0ac3293c3d45850c91b5113baa183ca71c312167f6f0980e89f7887fbfe3402f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic3_tangent_column,
         .call = mstmm_sweep_generic3_tangent_column_call,
@@ -4879,7 +5243,31 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_tangent_column_inputs,
         .outputs = mstmm_sweep_generic3_tangent_column_outputs,
-        .ir_hash = "1a67c01c304b1b999d48fbe4539614cd722dd373ee72c2193c50ef3812a73b13",
+        .ir_hash = "1301914cdf7d76eb95aeec3c3011d7c5a183fad636ff602c3c57c657c1c2ff67",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_along,
+        .call = mstmm_sweep_generic3_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_along_outputs,
+        .ir_hash = "4741fab1c15fda1b1d563ee3da440c28d8f4e541f1e352a62fb62cb99a0773e4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_steady,
+        .call = mstmm_sweep_generic3_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic3_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_steady_outputs,
+        .ir_hash = "077529c936900a187cec0ade199d974e8b129f3c8ed65c00f1089cf20597d266",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4961,7 +5349,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "240e4d281fc143971fe9ef945abb8ddfbc284a287ab478ef14371b669d8eb421",
+    .hash = "821cc7d6e909018d8893398244dfd4c887ad7fe438f7b7d6aede83a0c7c87867",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4971,6 +5359,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -34,12 +34,22 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -3330,533 +3340,495 @@ static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 4 speeds
+/* motion of Q across a hinge with 4 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][4]
  * in  s[4]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[12] * s[0];
+    const real t7 = H[13] * s[1];
+    const real t8 = t6 + t7;
+    const real t9 = H[14] * s[2];
+    const real t10 = t8 + t9;
+    const real t11 = H[15] * s[3];
+    const real t12 = t10 + t11;
+    const real t13 = c[3] + t12;
+    const real t14 = t5 - t13;
+    const real t15 = motion[3] + t14;
+    Q[3] = t15;
+    const real t16 = w[2] * t0;
+    const real t17 = w[0] * t2;
+    const real t18 = t16 - t17;
+    const real t19 = H[16] * s[0];
+    const real t20 = H[17] * s[1];
+    const real t21 = t19 + t20;
+    const real t22 = H[18] * s[2];
+    const real t23 = t21 + t22;
+    const real t24 = H[19] * s[3];
+    const real t25 = t23 + t24;
+    const real t26 = c[4] + t25;
+    const real t27 = t18 - t26;
+    const real t28 = motion[4] + t27;
+    Q[4] = t28;
+    const real t29 = w[0] * t1;
+    const real t30 = w[1] * t0;
+    const real t31 = t29 - t30;
+    const real t32 = H[20] * s[0];
+    const real t33 = H[21] * s[1];
+    const real t34 = t32 + t33;
+    const real t35 = H[22] * s[2];
+    const real t36 = t34 + t35;
+    const real t37 = H[23] * s[3];
+    const real t38 = t36 + t37;
+    const real t39 = c[5] + t38;
+    const real t40 = t31 - t39;
+    const real t41 = motion[5] + t40;
+    Q[5] = t41;
+    const real t42 = v[1] * t2;
+    const real t43 = t42 * 2.0;
+    const real t44 = v[2] * t1;
+    const real t45 = 2.0 * t44;
+    const real t46 = t43 - t45;
+    const real t47 = H[0] * s[0];
+    const real t48 = H[1] * s[1];
+    const real t49 = t47 + t48;
+    const real t50 = H[2] * s[2];
+    const real t51 = t49 + t50;
+    const real t52 = H[3] * s[3];
+    const real t53 = t51 + t52;
+    const real t54 = c[0] + t53;
+    const real t55 = t46 - t54;
+    const real t56 = motion[6] + t55;
+    Q[6] = t56;
+    const real t57 = v[2] * t0;
+    const real t58 = 2.0 * t57;
+    const real t59 = v[0] * t2;
+    const real t60 = 2.0 * t59;
+    const real t61 = t58 - t60;
+    const real t62 = H[4] * s[0];
+    const real t63 = H[5] * s[1];
+    const real t64 = t62 + t63;
+    const real t65 = H[6] * s[2];
+    const real t66 = t64 + t65;
+    const real t67 = H[7] * s[3];
+    const real t68 = t66 + t67;
+    const real t69 = c[1] + t68;
+    const real t70 = t61 - t69;
+    const real t71 = motion[7] + t70;
+    Q[7] = t71;
+    const real t72 = v[0] * t1;
+    const real t73 = 2.0 * t72;
+    const real t74 = v[1] * t0;
+    const real t75 = 2.0 * t74;
+    const real t76 = t73 - t75;
+    const real t77 = H[8] * s[0];
+    const real t78 = H[9] * s[1];
+    const real t79 = t77 + t78;
+    const real t80 = H[10] * s[2];
+    const real t81 = t79 + t80;
+    const real t82 = H[11] * s[3];
+    const real t83 = t81 + t82;
+    const real t84 = c[2] + t83;
+    const real t85 = t76 - t84;
+    const real t86 = motion[8] + t85;
+    Q[8] = t86;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_carrier_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"s", 4, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 4 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][4]
+ * in  s[4]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][4]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[4]
- * out B[9]
- * out G[6]
- * out d_tau[4]
+ * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[4] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[4] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic4_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[12] * d_s[0];
+    const real t16 = H[13] * d_s[1];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
+    const real t18 = H[14] * d_s[2];
     const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
+    const real t20 = H[15] * d_s[3];
+    const real t21 = t19 + t20;
+    const real t22 = s[0] * d_H[12];
+    const real t23 = s[1] * d_H[13];
+    const real t24 = t22 + t23;
+    const real t25 = s[2] * d_H[14];
     const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
+    const real t27 = s[3] * d_H[15];
     const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
-    const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
+    const real t29 = t21 + t28;
+    const real t30 = d_c[3] + t29;
+    const real t31 = theta[2] * Q[4];
+    const real t32 = Q[1] * d_w[2];
+    const real t33 = Q[2] * d_w[1];
+    const real t34 = t32 - t33;
+    const real t35 = t31 + t34;
+    const real t36 = theta[1] * Q[5];
+    const real t37 = t35 - t36;
+    const real t38 = t30 + t37;
+    const real t39 = t14 + t38;
+    B[3] = t39;
+    const real t40 = w[0] * t10;
+    const real t41 = w[2] * t2;
+    const real t42 = t40 - t41;
+    const real t43 = H[16] * d_s[0];
+    const real t44 = H[17] * d_s[1];
+    const real t45 = t43 + t44;
+    const real t46 = H[18] * d_s[2];
     const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
+    const real t48 = H[19] * d_s[3];
     const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
-    const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
-    const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
-    const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[12] * d_s[0];
-    const real t67 = H[13] * d_s[1];
-    const real t68 = t66 + t67;
-    const real t69 = H[14] * d_s[2];
-    const real t70 = t68 + t69;
-    const real t71 = H[15] * d_s[3];
-    const real t72 = t70 + t71;
-    const real t73 = s[0] * d_H[12];
-    const real t74 = s[1] * d_H[13];
+    const real t50 = s[0] * d_H[16];
+    const real t51 = s[1] * d_H[17];
+    const real t52 = t50 + t51;
+    const real t53 = s[2] * d_H[18];
+    const real t54 = t52 + t53;
+    const real t55 = s[3] * d_H[19];
+    const real t56 = t54 + t55;
+    const real t57 = t49 + t56;
+    const real t58 = d_c[4] + t57;
+    const real t59 = theta[0] * Q[5];
+    const real t60 = Q[2] * d_w[0];
+    const real t61 = Q[0] * d_w[2];
+    const real t62 = t60 - t61;
+    const real t63 = theta[2] * Q[3];
+    const real t64 = t62 - t63;
+    const real t65 = t59 + t64;
+    const real t66 = t58 + t65;
+    const real t67 = t42 + t66;
+    B[4] = t67;
+    const real t68 = w[1] * t2;
+    const real t69 = w[0] * t6;
+    const real t70 = t68 - t69;
+    const real t71 = H[20] * d_s[0];
+    const real t72 = H[21] * d_s[1];
+    const real t73 = t71 + t72;
+    const real t74 = H[22] * d_s[2];
     const real t75 = t73 + t74;
-    const real t76 = s[2] * d_H[14];
+    const real t76 = H[23] * d_s[3];
     const real t77 = t75 + t76;
-    const real t78 = s[3] * d_H[15];
-    const real t79 = t77 + t78;
-    const real t80 = t72 + t79;
-    const real t81 = d_c[3] + t80;
-    const real t82 = d_w[2] * t12;
-    const real t83 = d_w[1] * t20;
-    const real t84 = t82 - t83;
-    const real t85 = t81 + t84;
-    const real t86 = w[1] * t64;
-    const real t87 = w[2] * t43;
-    const real t88 = t86 - t87;
-    const real t89 = w[1] * t20;
-    const real t90 = w[2] * t12;
-    const real t91 = t89 - t90;
-    const real t92 = H[12] * s[0];
-    const real t93 = H[13] * s[1];
-    const real t94 = t92 + t93;
-    const real t95 = H[14] * s[2];
-    const real t96 = t94 + t95;
-    const real t97 = H[15] * s[3];
-    const real t98 = t96 + t97;
-    const real t99 = c[3] + t98;
-    const real t100 = t91 - t99;
-    const real t101 = motion[3] + t100;
-    const real t102 = t4 * t101;
-    const real t103 = w[2] * t5;
-    const real t104 = w[0] * t20;
-    const real t105 = t103 - t104;
-    const real t106 = H[16] * s[0];
-    const real t107 = H[17] * s[1];
-    const real t108 = t106 + t107;
-    const real t109 = H[18] * s[2];
+    const real t78 = s[0] * d_H[20];
+    const real t79 = s[1] * d_H[21];
+    const real t80 = t78 + t79;
+    const real t81 = s[2] * d_H[22];
+    const real t82 = t80 + t81;
+    const real t83 = s[3] * d_H[23];
+    const real t84 = t82 + t83;
+    const real t85 = t77 + t84;
+    const real t86 = d_c[5] + t85;
+    const real t87 = theta[1] * Q[3];
+    const real t88 = Q[0] * d_w[1];
+    const real t89 = Q[1] * d_w[0];
+    const real t90 = t88 - t89;
+    const real t91 = t87 + t90;
+    const real t92 = theta[0] * Q[4];
+    const real t93 = t91 - t92;
+    const real t94 = t86 + t93;
+    const real t95 = t70 + t94;
+    B[5] = t95;
+    const real t96 = v[2] * 2.0;
+    const real t97 = t6 * t96;
+    const real t98 = v[1] * 2.0;
+    const real t99 = t10 * t98;
+    const real t100 = t97 - t99;
+    const real t101 = H[0] * d_s[0];
+    const real t102 = H[1] * d_s[1];
+    const real t103 = t101 + t102;
+    const real t104 = H[2] * d_s[2];
+    const real t105 = t103 + t104;
+    const real t106 = H[3] * d_s[3];
+    const real t107 = t105 + t106;
+    const real t108 = s[0] * d_H[0];
+    const real t109 = s[1] * d_H[1];
     const real t110 = t108 + t109;
-    const real t111 = H[19] * s[3];
+    const real t111 = s[2] * d_H[2];
     const real t112 = t110 + t111;
-    const real t113 = c[4] + t112;
-    const real t114 = t105 - t113;
-    const real t115 = motion[4] + t114;
-    const real t116 = t11 * t115;
-    const real t117 = t102 + t116;
-    const real t118 = w[0] * t12;
-    const real t119 = w[1] * t5;
-    const real t120 = t118 - t119;
-    const real t121 = H[20] * s[0];
-    const real t122 = H[21] * s[1];
-    const real t123 = t121 + t122;
-    const real t124 = H[22] * s[2];
-    const real t125 = t123 + t124;
-    const real t126 = H[23] * s[3];
-    const real t127 = t125 + t126;
-    const real t128 = c[5] + t127;
-    const real t129 = t120 - t128;
-    const real t130 = motion[5] + t129;
-    const real t131 = t19 * t130;
-    const real t132 = t117 + t131;
-    const real t133 = t88 - t132;
-    const real t134 = t85 + t133;
-    B[3] = t134;
-    const real t135 = H[16] * d_s[0];
-    const real t136 = H[17] * d_s[1];
-    const real t137 = t135 + t136;
-    const real t138 = H[18] * d_s[2];
-    const real t139 = t137 + t138;
-    const real t140 = H[19] * d_s[3];
-    const real t141 = t139 + t140;
-    const real t142 = s[0] * d_H[16];
-    const real t143 = s[1] * d_H[17];
-    const real t144 = t142 + t143;
-    const real t145 = s[2] * d_H[18];
-    const real t146 = t144 + t145;
-    const real t147 = s[3] * d_H[19];
+    const real t113 = s[3] * d_H[3];
+    const real t114 = t112 + t113;
+    const real t115 = t107 + t114;
+    const real t116 = d_c[0] + t115;
+    const real t117 = theta[2] * Q[7];
+    const real t118 = x[2] * Q[4];
+    const real t119 = Q[1] * d_v[2];
+    const real t120 = 2.0 * t119;
+    const real t121 = x[1] * Q[0];
+    const real t122 = x[0] * Q[1];
+    const real t123 = t121 - t122;
+    const real t124 = Q[1] * t123;
+    const real t125 = x[0] * Q[2];
+    const real t126 = x[2] * Q[0];
+    const real t127 = t125 - t126;
+    const real t128 = Q[2] * t127;
+    const real t129 = t124 - t128;
+    const real t130 = t120 + t129;
+    const real t131 = Q[2] * d_v[1];
+    const real t132 = 2.0 * t131;
+    const real t133 = t130 - t132;
+    const real t134 = t118 + t133;
+    const real t135 = x[1] * Q[5];
+    const real t136 = t134 - t135;
+    const real t137 = t117 + t136;
+    const real t138 = theta[1] * Q[8];
+    const real t139 = t137 - t138;
+    const real t140 = t116 + t139;
+    const real t141 = t100 + t140;
+    B[6] = t141;
+    const real t142 = v[0] * 2.0;
+    const real t143 = t10 * t142;
+    const real t144 = t2 * t96;
+    const real t145 = t143 - t144;
+    const real t146 = H[4] * d_s[0];
+    const real t147 = H[5] * d_s[1];
     const real t148 = t146 + t147;
-    const real t149 = t141 + t148;
-    const real t150 = d_c[4] + t149;
-    const real t151 = d_w[0] * t20;
-    const real t152 = d_w[2] * t5;
-    const real t153 = t151 - t152;
-    const real t154 = t150 + t153;
-    const real t155 = w[2] * t22;
-    const real t156 = w[0] * t64;
-    const real t157 = t155 - t156;
-    const real t158 = t28 * t101;
-    const real t159 = t34 * t115;
-    const real t160 = t158 + t159;
-    const real t161 = t41 * t130;
-    const real t162 = t160 + t161;
-    const real t163 = t157 - t162;
-    const real t164 = t154 + t163;
-    B[4] = t164;
-    const real t165 = H[20] * d_s[0];
-    const real t166 = H[21] * d_s[1];
-    const real t167 = t165 + t166;
-    const real t168 = H[22] * d_s[2];
-    const real t169 = t167 + t168;
-    const real t170 = H[23] * d_s[3];
-    const real t171 = t169 + t170;
-    const real t172 = s[0] * d_H[20];
-    const real t173 = s[1] * d_H[21];
-    const real t174 = t172 + t173;
-    const real t175 = s[2] * d_H[22];
-    const real t176 = t174 + t175;
-    const real t177 = s[3] * d_H[23];
-    const real t178 = t176 + t177;
-    const real t179 = t171 + t178;
-    const real t180 = d_c[5] + t179;
-    const real t181 = d_w[1] * t5;
-    const real t182 = d_w[0] * t12;
-    const real t183 = t181 - t182;
-    const real t184 = t180 + t183;
-    const real t185 = w[0] * t43;
-    const real t186 = w[1] * t22;
-    const real t187 = t185 - t186;
-    const real t188 = t49 * t101;
-    const real t189 = t55 * t115;
-    const real t190 = t188 + t189;
-    const real t191 = t62 * t130;
-    const real t192 = t190 + t191;
-    const real t193 = t187 - t192;
-    const real t194 = t184 + t193;
-    B[5] = t194;
-    const real t195 = H[0] * d_s[0];
-    const real t196 = H[1] * d_s[1];
-    const real t197 = t195 + t196;
-    const real t198 = H[2] * d_s[2];
-    const real t199 = t197 + t198;
-    const real t200 = H[3] * d_s[3];
-    const real t201 = t199 + t200;
-    const real t202 = s[0] * d_H[0];
-    const real t203 = s[1] * d_H[1];
-    const real t204 = t202 + t203;
-    const real t205 = s[2] * d_H[2];
-    const real t206 = t204 + t205;
-    const real t207 = s[3] * d_H[3];
-    const real t208 = t206 + t207;
-    const real t209 = t201 + t208;
-    const real t210 = d_c[0] + t209;
-    const real t211 = d_v[2] * t12;
+    const real t149 = H[6] * d_s[2];
+    const real t150 = t148 + t149;
+    const real t151 = H[7] * d_s[3];
+    const real t152 = t150 + t151;
+    const real t153 = s[0] * d_H[4];
+    const real t154 = s[1] * d_H[5];
+    const real t155 = t153 + t154;
+    const real t156 = s[2] * d_H[6];
+    const real t157 = t155 + t156;
+    const real t158 = s[3] * d_H[7];
+    const real t159 = t157 + t158;
+    const real t160 = t152 + t159;
+    const real t161 = d_c[1] + t160;
+    const real t162 = theta[0] * Q[8];
+    const real t163 = x[0] * Q[5];
+    const real t164 = Q[2] * d_v[0];
+    const real t165 = 2.0 * t164;
+    const real t166 = x[2] * Q[1];
+    const real t167 = x[1] * Q[2];
+    const real t168 = t166 - t167;
+    const real t169 = Q[2] * t168;
+    const real t170 = Q[0] * t123;
+    const real t171 = t169 - t170;
+    const real t172 = Q[0] * d_v[2];
+    const real t173 = 2.0 * t172;
+    const real t174 = t171 - t173;
+    const real t175 = t165 + t174;
+    const real t176 = x[2] * Q[3];
+    const real t177 = t175 - t176;
+    const real t178 = t163 + t177;
+    const real t179 = theta[2] * Q[6];
+    const real t180 = t178 - t179;
+    const real t181 = t162 + t180;
+    const real t182 = t161 + t181;
+    const real t183 = t145 + t182;
+    B[7] = t183;
+    const real t184 = t2 * t98;
+    const real t185 = t6 * t142;
+    const real t186 = t184 - t185;
+    const real t187 = H[8] * d_s[0];
+    const real t188 = H[9] * d_s[1];
+    const real t189 = t187 + t188;
+    const real t190 = H[10] * d_s[2];
+    const real t191 = t189 + t190;
+    const real t192 = H[11] * d_s[3];
+    const real t193 = t191 + t192;
+    const real t194 = s[0] * d_H[8];
+    const real t195 = s[1] * d_H[9];
+    const real t196 = t194 + t195;
+    const real t197 = s[2] * d_H[10];
+    const real t198 = t196 + t197;
+    const real t199 = s[3] * d_H[11];
+    const real t200 = t198 + t199;
+    const real t201 = t193 + t200;
+    const real t202 = d_c[2] + t201;
+    const real t203 = theta[1] * Q[6];
+    const real t204 = x[1] * Q[3];
+    const real t205 = Q[0] * d_v[1];
+    const real t206 = 2.0 * t205;
+    const real t207 = Q[0] * t127;
+    const real t208 = Q[1] * t168;
+    const real t209 = t207 - t208;
+    const real t210 = t206 + t209;
+    const real t211 = Q[1] * d_v[0];
     const real t212 = 2.0 * t211;
-    const real t213 = d_v[1] * t20;
-    const real t214 = 2.0 * t213;
-    const real t215 = t212 - t214;
-    const real t216 = t210 + t215;
-    const real t217 = R[1] * d_d[0];
-    const real t218 = R[4] * d_d[1];
-    const real t219 = t217 + t218;
-    const real t220 = R[7] * d_d[2];
-    const real t221 = t219 + t220;
-    const real t222 = t5 * t12;
-    const real t223 = t221 * t222;
-    const real t224 = R[0] * d_d[0];
-    const real t225 = R[3] * d_d[1];
-    const real t226 = t224 + t225;
-    const real t227 = R[6] * d_d[2];
-    const real t228 = t226 + t227;
-    const real t229 = t12 * t12;
-    const real t230 = t20 * t20;
-    const real t231 = t229 + t230;
-    const real t232 = t228 * t231;
-    const real t233 = t223 - t232;
-    const real t234 = R[2] * d_d[0];
-    const real t235 = R[5] * d_d[1];
-    const real t236 = t234 + t235;
-    const real t237 = R[8] * d_d[2];
-    const real t238 = t236 + t237;
-    const real t239 = t5 * t20;
-    const real t240 = t238 * t239;
-    const real t241 = t233 + t240;
-    const real t242 = v[1] * 2.0;
-    const real t243 = t64 * t242;
-    const real t244 = v[2] * 2.0;
-    const real t245 = t43 * t244;
-    const real t246 = t243 - t245;
-    const real t247 = t238 * t115;
-    const real t248 = t221 * t130;
-    const real t249 = t247 - t248;
-    const real t250 = t246 + t249;
-    const real t251 = t241 + t250;
-    const real t252 = v[1] * t20;
-    const real t253 = t252 * 2.0;
-    const real t254 = v[2] * t12;
-    const real t255 = 2.0 * t254;
-    const real t256 = t253 - t255;
-    const real t257 = H[0] * s[0];
-    const real t258 = H[1] * s[1];
+    const real t213 = t210 - t212;
+    const real t214 = t204 + t213;
+    const real t215 = x[0] * Q[4];
+    const real t216 = t214 - t215;
+    const real t217 = t203 + t216;
+    const real t218 = theta[0] * Q[7];
+    const real t219 = t217 - t218;
+    const real t220 = t202 + t219;
+    const real t221 = t186 + t220;
+    B[8] = t221;
+    const real t222 = theta[1] * f[2];
+    const real t223 = theta[2] * f[1];
+    const real t224 = t222 - t223;
+    G[0] = t224;
+    const real t225 = theta[2] * f[0];
+    const real t226 = theta[0] * f[2];
+    const real t227 = t225 - t226;
+    G[1] = t227;
+    const real t228 = theta[0] * f[1];
+    const real t229 = theta[1] * f[0];
+    const real t230 = t228 - t229;
+    G[2] = t230;
+    const real t231 = theta[1] * f[5];
+    const real t232 = x[1] * f[2];
+    const real t233 = x[2] * f[1];
+    const real t234 = t232 - t233;
+    const real t235 = theta[2] * f[4];
+    const real t236 = t234 - t235;
+    const real t237 = t231 + t236;
+    G[3] = t237;
+    const real t238 = theta[2] * f[3];
+    const real t239 = x[2] * f[0];
+    const real t240 = x[0] * f[2];
+    const real t241 = t239 - t240;
+    const real t242 = t238 + t241;
+    const real t243 = theta[0] * f[5];
+    const real t244 = t242 - t243;
+    G[4] = t244;
+    const real t245 = theta[0] * f[4];
+    const real t246 = x[0] * f[1];
+    const real t247 = x[1] * f[0];
+    const real t248 = t246 - t247;
+    const real t249 = theta[1] * f[3];
+    const real t250 = t248 - t249;
+    const real t251 = t245 + t250;
+    G[5] = t251;
+    const real t252 = d_s[0] * J[0];
+    const real t253 = f[0] * d_H[0];
+    const real t254 = f[1] * d_H[4];
+    const real t255 = t253 + t254;
+    const real t256 = f[2] * d_H[8];
+    const real t257 = t255 + t256;
+    const real t258 = f[3] * d_H[12];
     const real t259 = t257 + t258;
-    const real t260 = H[2] * s[2];
+    const real t260 = f[4] * d_H[16];
     const real t261 = t259 + t260;
-    const real t262 = H[3] * s[3];
+    const real t262 = f[5] * d_H[20];
     const real t263 = t261 + t262;
-    const real t264 = c[0] + t263;
-    const real t265 = t256 - t264;
-    const real t266 = motion[6] + t265;
-    const real t267 = t4 * t266;
-    const real t268 = v[2] * t5;
-    const real t269 = 2.0 * t268;
-    const real t270 = v[0] * t20;
-    const real t271 = 2.0 * t270;
-    const real t272 = t269 - t271;
-    const real t273 = H[4] * s[0];
-    const real t274 = H[5] * s[1];
+    const real t264 = t263 - laws[0];
+    const real t265 = t252 + t264;
+    row[0] = t265;
+    const real t266 = d_s[1] * J[1];
+    const real t267 = f[0] * d_H[1];
+    const real t268 = f[1] * d_H[5];
+    const real t269 = t267 + t268;
+    const real t270 = f[2] * d_H[9];
+    const real t271 = t269 + t270;
+    const real t272 = f[3] * d_H[13];
+    const real t273 = t271 + t272;
+    const real t274 = f[4] * d_H[17];
     const real t275 = t273 + t274;
-    const real t276 = H[6] * s[2];
+    const real t276 = f[5] * d_H[21];
     const real t277 = t275 + t276;
-    const real t278 = H[7] * s[3];
-    const real t279 = t277 + t278;
-    const real t280 = c[1] + t279;
-    const real t281 = t272 - t280;
-    const real t282 = motion[7] + t281;
-    const real t283 = t11 * t282;
-    const real t284 = t267 + t283;
-    const real t285 = v[0] * t12;
-    const real t286 = 2.0 * t285;
-    const real t287 = v[1] * t5;
-    const real t288 = 2.0 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = H[8] * s[0];
-    const real t291 = H[9] * s[1];
-    const real t292 = t290 + t291;
-    const real t293 = H[10] * s[2];
-    const real t294 = t292 + t293;
-    const real t295 = H[11] * s[3];
-    const real t296 = t294 + t295;
-    const real t297 = c[2] + t296;
-    const real t298 = t289 - t297;
-    const real t299 = motion[8] + t298;
-    const real t300 = t19 * t299;
-    const real t301 = t284 + t300;
-    const real t302 = t251 - t301;
-    const real t303 = t216 + t302;
-    B[6] = t303;
-    const real t304 = H[4] * d_s[0];
-    const real t305 = H[5] * d_s[1];
-    const real t306 = t304 + t305;
-    const real t307 = H[6] * d_s[2];
-    const real t308 = t306 + t307;
-    const real t309 = H[7] * d_s[3];
-    const real t310 = t308 + t309;
-    const real t311 = s[0] * d_H[4];
-    const real t312 = s[1] * d_H[5];
-    const real t313 = t311 + t312;
-    const real t314 = s[2] * d_H[6];
-    const real t315 = t313 + t314;
-    const real t316 = s[3] * d_H[7];
-    const real t317 = t315 + t316;
-    const real t318 = t310 + t317;
-    const real t319 = d_c[1] + t318;
-    const real t320 = d_v[0] * t20;
-    const real t321 = 2.0 * t320;
-    const real t322 = d_v[2] * t5;
-    const real t323 = 2.0 * t322;
-    const real t324 = t321 - t323;
-    const real t325 = t319 + t324;
-    const real t326 = t228 * t222;
-    const real t327 = t5 * t5;
-    const real t328 = t230 + t327;
-    const real t329 = t221 * t328;
-    const real t330 = t326 - t329;
-    const real t331 = t12 * t20;
-    const real t332 = t238 * t331;
-    const real t333 = t330 + t332;
-    const real t334 = t22 * t244;
-    const real t335 = v[0] * 2.0;
-    const real t336 = t64 * t335;
-    const real t337 = t334 - t336;
-    const real t338 = t228 * t130;
-    const real t339 = t238 * t101;
-    const real t340 = t338 - t339;
-    const real t341 = t337 + t340;
-    const real t342 = t333 + t341;
-    const real t343 = t28 * t266;
-    const real t344 = t34 * t282;
-    const real t345 = t343 + t344;
-    const real t346 = t41 * t299;
-    const real t347 = t345 + t346;
-    const real t348 = t342 - t347;
-    const real t349 = t325 + t348;
-    B[7] = t349;
-    const real t350 = H[8] * d_s[0];
-    const real t351 = H[9] * d_s[1];
-    const real t352 = t350 + t351;
-    const real t353 = H[10] * d_s[2];
-    const real t354 = t352 + t353;
-    const real t355 = H[11] * d_s[3];
-    const real t356 = t354 + t355;
-    const real t357 = s[0] * d_H[8];
-    const real t358 = s[1] * d_H[9];
-    const real t359 = t357 + t358;
-    const real t360 = s[2] * d_H[10];
-    const real t361 = t359 + t360;
-    const real t362 = s[3] * d_H[11];
-    const real t363 = t361 + t362;
-    const real t364 = t356 + t363;
-    const real t365 = d_c[2] + t364;
-    const real t366 = d_v[1] * t5;
-    const real t367 = 2.0 * t366;
-    const real t368 = d_v[0] * t12;
-    const real t369 = 2.0 * t368;
-    const real t370 = t367 - t369;
-    const real t371 = t365 + t370;
-    const real t372 = t228 * t239;
-    const real t373 = t221 * t331;
-    const real t374 = t372 + t373;
-    const real t375 = t229 + t327;
-    const real t376 = t238 * t375;
-    const real t377 = t374 - t376;
-    const real t378 = t43 * t335;
-    const real t379 = t22 * t242;
-    const real t380 = t378 - t379;
-    const real t381 = t221 * t101;
-    const real t382 = t228 * t115;
-    const real t383 = t381 - t382;
-    const real t384 = t380 + t383;
-    const real t385 = t377 + t384;
-    const real t386 = t49 * t266;
-    const real t387 = t55 * t282;
-    const real t388 = t386 + t387;
-    const real t389 = t62 * t299;
-    const real t390 = t388 + t389;
-    const real t391 = t385 - t390;
-    const real t392 = t371 + t391;
-    B[8] = t392;
-    const real t393 = f[0] * t4;
-    const real t394 = f[1] * t11;
-    const real t395 = t393 + t394;
-    const real t396 = f[2] * t19;
-    const real t397 = t395 + t396;
-    G[0] = t397;
-    const real t398 = f[0] * t28;
-    const real t399 = f[1] * t34;
-    const real t400 = t398 + t399;
-    const real t401 = f[2] * t41;
-    const real t402 = t400 + t401;
-    G[1] = t402;
-    const real t403 = f[0] * t49;
-    const real t404 = f[1] * t55;
-    const real t405 = t403 + t404;
-    const real t406 = f[2] * t62;
-    const real t407 = t405 + t406;
-    G[2] = t407;
-    const real t408 = f[3] * t4;
-    const real t409 = f[4] * t11;
-    const real t410 = t408 + t409;
-    const real t411 = f[5] * t19;
-    const real t412 = t410 + t411;
-    const real t413 = f[2] * t221;
-    const real t414 = f[1] * t238;
-    const real t415 = t413 - t414;
-    const real t416 = t412 + t415;
-    G[3] = t416;
-    const real t417 = f[3] * t28;
-    const real t418 = f[4] * t34;
-    const real t419 = t417 + t418;
-    const real t420 = f[5] * t41;
-    const real t421 = t419 + t420;
-    const real t422 = f[0] * t238;
-    const real t423 = f[2] * t228;
-    const real t424 = t422 - t423;
-    const real t425 = t421 + t424;
-    G[4] = t425;
-    const real t426 = f[3] * t49;
-    const real t427 = f[4] * t55;
-    const real t428 = t426 + t427;
-    const real t429 = f[5] * t62;
-    const real t430 = t428 + t429;
-    const real t431 = f[1] * t228;
-    const real t432 = f[0] * t221;
-    const real t433 = t431 - t432;
-    const real t434 = t430 + t433;
-    G[5] = t434;
-    const real t435 = f[0] * d_H[0];
-    const real t436 = f[1] * d_H[4];
-    const real t437 = t435 + t436;
-    const real t438 = f[2] * d_H[8];
-    const real t439 = t437 + t438;
-    const real t440 = f[3] * d_H[12];
-    const real t441 = t439 + t440;
-    const real t442 = f[4] * d_H[16];
-    const real t443 = t441 + t442;
-    const real t444 = f[5] * d_H[20];
-    const real t445 = t443 + t444;
-    d_tau[0] = t445;
-    const real t446 = f[0] * d_H[1];
-    const real t447 = f[1] * d_H[5];
-    const real t448 = t446 + t447;
-    const real t449 = f[2] * d_H[9];
-    const real t450 = t448 + t449;
-    const real t451 = f[3] * d_H[13];
-    const real t452 = t450 + t451;
-    const real t453 = f[4] * d_H[17];
-    const real t454 = t452 + t453;
-    const real t455 = f[5] * d_H[21];
-    const real t456 = t454 + t455;
-    d_tau[1] = t456;
-    const real t457 = f[0] * d_H[2];
-    const real t458 = f[1] * d_H[6];
-    const real t459 = t457 + t458;
-    const real t460 = f[2] * d_H[10];
-    const real t461 = t459 + t460;
-    const real t462 = f[3] * d_H[14];
-    const real t463 = t461 + t462;
-    const real t464 = f[4] * d_H[18];
-    const real t465 = t463 + t464;
-    const real t466 = f[5] * d_H[22];
-    const real t467 = t465 + t466;
-    d_tau[2] = t467;
-    const real t468 = f[0] * d_H[3];
-    const real t469 = f[1] * d_H[7];
-    const real t470 = t468 + t469;
-    const real t471 = f[2] * d_H[11];
-    const real t472 = t470 + t471;
-    const real t473 = f[3] * d_H[15];
-    const real t474 = t472 + t473;
-    const real t475 = f[4] * d_H[19];
-    const real t476 = t474 + t475;
-    const real t477 = f[5] * d_H[23];
-    const real t478 = t476 + t477;
-    d_tau[3] = t478;
+    const real t278 = t277 - laws[1];
+    const real t279 = t266 + t278;
+    row[1] = t279;
+    const real t280 = d_s[2] * J[2];
+    const real t281 = f[0] * d_H[2];
+    const real t282 = f[1] * d_H[6];
+    const real t283 = t281 + t282;
+    const real t284 = f[2] * d_H[10];
+    const real t285 = t283 + t284;
+    const real t286 = f[3] * d_H[14];
+    const real t287 = t285 + t286;
+    const real t288 = f[4] * d_H[18];
+    const real t289 = t287 + t288;
+    const real t290 = f[5] * d_H[22];
+    const real t291 = t289 + t290;
+    const real t292 = t291 - laws[2];
+    const real t293 = t280 + t292;
+    row[2] = t293;
+    const real t294 = d_s[3] * J[3];
+    const real t295 = f[0] * d_H[3];
+    const real t296 = f[1] * d_H[7];
+    const real t297 = t295 + t296;
+    const real t298 = f[2] * d_H[11];
+    const real t299 = t297 + t298;
+    const real t300 = f[3] * d_H[15];
+    const real t301 = t299 + t300;
+    const real t302 = f[4] * d_H[19];
+    const real t303 = t301 + t302;
+    const real t304 = f[5] * d_H[23];
+    const real t305 = t303 + t304;
+    const real t306 = t305 - laws[3];
+    const real t307 = t294 + t306;
+    row[3] = t307;
     return 0;
 }
 
@@ -3867,27 +3839,449 @@ static int mstmm_sweep_generic4_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic4_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 24, "", 0, 0},
     {"s", 4, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 24, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 4, "", 0, 0},
+    {"J", 4, "kg*m2 or kg", 0, 0},
+    {"laws", 4, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 4, "", 0, 0},
+    {"row", 4, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 4 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][4]
+ * in  d_q[4]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[12] * d_q[0];
+    const real t1 = H[13] * d_q[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[14] * d_q[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * d_q[3];
+    const real t6 = t4 + t5;
+    theta[0] = t6;
+    const real t7 = H[16] * d_q[0];
+    const real t8 = H[17] * d_q[1];
+    const real t9 = t7 + t8;
+    const real t10 = H[18] * d_q[2];
+    const real t11 = t9 + t10;
+    const real t12 = H[19] * d_q[3];
+    const real t13 = t11 + t12;
+    theta[1] = t13;
+    const real t14 = H[20] * d_q[0];
+    const real t15 = H[21] * d_q[1];
+    const real t16 = t14 + t15;
+    const real t17 = H[22] * d_q[2];
+    const real t18 = t16 + t17;
+    const real t19 = H[23] * d_q[3];
+    const real t20 = t18 + t19;
+    theta[2] = t20;
+    const real t21 = H[0] * d_q[0];
+    const real t22 = H[1] * d_q[1];
+    const real t23 = t21 + t22;
+    const real t24 = H[2] * d_q[2];
+    const real t25 = t23 + t24;
+    const real t26 = H[3] * d_q[3];
+    const real t27 = t25 + t26;
+    x[0] = t27;
+    const real t28 = H[4] * d_q[0];
+    const real t29 = H[5] * d_q[1];
+    const real t30 = t28 + t29;
+    const real t31 = H[6] * d_q[2];
+    const real t32 = t30 + t31;
+    const real t33 = H[7] * d_q[3];
+    const real t34 = t32 + t33;
+    x[1] = t34;
+    const real t35 = H[8] * d_q[0];
+    const real t36 = H[9] * d_q[1];
+    const real t37 = t35 + t36;
+    const real t38 = H[10] * d_q[2];
+    const real t39 = t37 + t38;
+    const real t40 = H[11] * d_q[3];
+    const real t41 = t39 + t40;
+    x[2] = t41;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_along_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"d_q", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 4 free speeds that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][4]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[4]
+ * in  d_s[4]
+ * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[4] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[4] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[12] * d_u[0];
+    const real t1 = H[13] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[14] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = theta[2] * Q[1];
+    const real t8 = theta[1] * Q[2];
+    const real t9 = t7 - t8;
+    const real t10 = t6 + t9;
+    B[0] = t10;
+    const real t11 = H[16] * d_u[0];
+    const real t12 = H[17] * d_u[1];
+    const real t13 = t11 + t12;
+    const real t14 = H[18] * d_u[2];
+    const real t15 = t13 + t14;
+    const real t16 = H[19] * d_u[3];
+    const real t17 = t15 + t16;
+    const real t18 = theta[0] * Q[2];
+    const real t19 = theta[2] * Q[0];
+    const real t20 = t18 - t19;
+    const real t21 = t17 + t20;
+    B[1] = t21;
+    const real t22 = H[20] * d_u[0];
+    const real t23 = H[21] * d_u[1];
+    const real t24 = t22 + t23;
+    const real t25 = H[22] * d_u[2];
+    const real t26 = t24 + t25;
+    const real t27 = H[23] * d_u[3];
+    const real t28 = t26 + t27;
+    const real t29 = theta[1] * Q[0];
+    const real t30 = theta[0] * Q[1];
+    const real t31 = t29 - t30;
+    const real t32 = t28 + t31;
+    B[2] = t32;
+    const real t33 = w[2] * t20;
+    const real t34 = w[1] * t31;
+    const real t35 = t33 - t34;
+    const real t36 = H[12] * d_s[0];
+    const real t37 = H[13] * d_s[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[14] * d_s[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[15] * d_s[3];
+    const real t42 = t40 + t41;
+    const real t43 = theta[2] * Q[4];
+    const real t44 = Q[1] * t28;
+    const real t45 = Q[2] * t17;
+    const real t46 = t44 - t45;
+    const real t47 = t43 + t46;
+    const real t48 = theta[1] * Q[5];
+    const real t49 = t47 - t48;
+    const real t50 = t42 + t49;
+    const real t51 = t35 + t50;
+    B[3] = t51;
+    const real t52 = w[0] * t31;
+    const real t53 = w[2] * t9;
+    const real t54 = t52 - t53;
+    const real t55 = H[16] * d_s[0];
+    const real t56 = H[17] * d_s[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[18] * d_s[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[19] * d_s[3];
+    const real t61 = t59 + t60;
+    const real t62 = theta[0] * Q[5];
+    const real t63 = Q[2] * t6;
+    const real t64 = Q[0] * t28;
+    const real t65 = t63 - t64;
+    const real t66 = theta[2] * Q[3];
+    const real t67 = t65 - t66;
+    const real t68 = t62 + t67;
+    const real t69 = t61 + t68;
+    const real t70 = t54 + t69;
+    B[4] = t70;
+    const real t71 = w[1] * t9;
+    const real t72 = w[0] * t20;
+    const real t73 = t71 - t72;
+    const real t74 = H[20] * d_s[0];
+    const real t75 = H[21] * d_s[1];
+    const real t76 = t74 + t75;
+    const real t77 = H[22] * d_s[2];
+    const real t78 = t76 + t77;
+    const real t79 = H[23] * d_s[3];
+    const real t80 = t78 + t79;
+    const real t81 = theta[1] * Q[3];
+    const real t82 = Q[0] * t17;
+    const real t83 = Q[1] * t6;
+    const real t84 = t82 - t83;
+    const real t85 = t81 + t84;
+    const real t86 = theta[0] * Q[4];
+    const real t87 = t85 - t86;
+    const real t88 = t80 + t87;
+    const real t89 = t73 + t88;
+    B[5] = t89;
+    const real t90 = v[2] * 2.0;
+    const real t91 = t20 * t90;
+    const real t92 = v[1] * 2.0;
+    const real t93 = t31 * t92;
+    const real t94 = t91 - t93;
+    const real t95 = v[2] * t17;
+    const real t96 = H[8] * d_u[0];
+    const real t97 = H[9] * d_u[1];
+    const real t98 = t96 + t97;
+    const real t99 = H[10] * d_u[2];
+    const real t100 = t98 + t99;
+    const real t101 = H[11] * d_u[3];
+    const real t102 = t100 + t101;
+    const real t103 = w[1] * t102;
+    const real t104 = H[4] * d_u[0];
+    const real t105 = H[5] * d_u[1];
+    const real t106 = t104 + t105;
+    const real t107 = H[6] * d_u[2];
+    const real t108 = t106 + t107;
+    const real t109 = H[7] * d_u[3];
+    const real t110 = t108 + t109;
+    const real t111 = w[2] * t110;
+    const real t112 = t103 - t111;
+    const real t113 = t95 + t112;
+    const real t114 = v[1] * t28;
+    const real t115 = t113 - t114;
+    const real t116 = H[0] * d_s[0];
+    const real t117 = H[1] * d_s[1];
+    const real t118 = t116 + t117;
+    const real t119 = H[2] * d_s[2];
+    const real t120 = t118 + t119;
+    const real t121 = H[3] * d_s[3];
+    const real t122 = t120 + t121;
+    const real t123 = t115 + t122;
+    const real t124 = theta[2] * Q[7];
+    const real t125 = x[2] * Q[4];
+    const real t126 = Q[1] * t102;
+    const real t127 = 2.0 * t126;
+    const real t128 = x[1] * Q[0];
+    const real t129 = x[0] * Q[1];
+    const real t130 = t128 - t129;
+    const real t131 = Q[1] * t130;
+    const real t132 = x[0] * Q[2];
+    const real t133 = x[2] * Q[0];
+    const real t134 = t132 - t133;
+    const real t135 = Q[2] * t134;
+    const real t136 = t131 - t135;
+    const real t137 = t127 + t136;
+    const real t138 = Q[2] * t110;
+    const real t139 = 2.0 * t138;
+    const real t140 = t137 - t139;
+    const real t141 = t125 + t140;
+    const real t142 = x[1] * Q[5];
+    const real t143 = t141 - t142;
+    const real t144 = t124 + t143;
+    const real t145 = theta[1] * Q[8];
+    const real t146 = t144 - t145;
+    const real t147 = t123 + t146;
+    const real t148 = t94 + t147;
+    B[6] = t148;
+    const real t149 = v[0] * 2.0;
+    const real t150 = t31 * t149;
+    const real t151 = t9 * t90;
+    const real t152 = t150 - t151;
+    const real t153 = v[0] * t28;
+    const real t154 = H[0] * d_u[0];
+    const real t155 = H[1] * d_u[1];
+    const real t156 = t154 + t155;
+    const real t157 = H[2] * d_u[2];
+    const real t158 = t156 + t157;
+    const real t159 = H[3] * d_u[3];
+    const real t160 = t158 + t159;
+    const real t161 = w[2] * t160;
+    const real t162 = w[0] * t102;
+    const real t163 = t161 - t162;
+    const real t164 = v[2] * t6;
+    const real t165 = t163 - t164;
+    const real t166 = t153 + t165;
+    const real t167 = H[4] * d_s[0];
+    const real t168 = H[5] * d_s[1];
+    const real t169 = t167 + t168;
+    const real t170 = H[6] * d_s[2];
+    const real t171 = t169 + t170;
+    const real t172 = H[7] * d_s[3];
+    const real t173 = t171 + t172;
+    const real t174 = t166 + t173;
+    const real t175 = theta[0] * Q[8];
+    const real t176 = x[0] * Q[5];
+    const real t177 = Q[2] * t160;
+    const real t178 = 2.0 * t177;
+    const real t179 = x[2] * Q[1];
+    const real t180 = x[1] * Q[2];
+    const real t181 = t179 - t180;
+    const real t182 = Q[2] * t181;
+    const real t183 = Q[0] * t130;
+    const real t184 = t182 - t183;
+    const real t185 = Q[0] * t102;
+    const real t186 = 2.0 * t185;
+    const real t187 = t184 - t186;
+    const real t188 = t178 + t187;
+    const real t189 = x[2] * Q[3];
+    const real t190 = t188 - t189;
+    const real t191 = t176 + t190;
+    const real t192 = theta[2] * Q[6];
+    const real t193 = t191 - t192;
+    const real t194 = t175 + t193;
+    const real t195 = t174 + t194;
+    const real t196 = t152 + t195;
+    B[7] = t196;
+    const real t197 = t9 * t92;
+    const real t198 = t20 * t149;
+    const real t199 = t197 - t198;
+    const real t200 = v[1] * t6;
+    const real t201 = w[0] * t110;
+    const real t202 = w[1] * t160;
+    const real t203 = t201 - t202;
+    const real t204 = t200 + t203;
+    const real t205 = v[0] * t17;
+    const real t206 = t204 - t205;
+    const real t207 = H[8] * d_s[0];
+    const real t208 = H[9] * d_s[1];
+    const real t209 = t207 + t208;
+    const real t210 = H[10] * d_s[2];
+    const real t211 = t209 + t210;
+    const real t212 = H[11] * d_s[3];
+    const real t213 = t211 + t212;
+    const real t214 = t206 + t213;
+    const real t215 = theta[1] * Q[6];
+    const real t216 = x[1] * Q[3];
+    const real t217 = Q[0] * t110;
+    const real t218 = 2.0 * t217;
+    const real t219 = Q[0] * t134;
+    const real t220 = Q[1] * t181;
+    const real t221 = t219 - t220;
+    const real t222 = t218 + t221;
+    const real t223 = Q[1] * t160;
+    const real t224 = 2.0 * t223;
+    const real t225 = t222 - t224;
+    const real t226 = t216 + t225;
+    const real t227 = x[0] * Q[4];
+    const real t228 = t226 - t227;
+    const real t229 = t215 + t228;
+    const real t230 = theta[0] * Q[7];
+    const real t231 = t229 - t230;
+    const real t232 = t214 + t231;
+    const real t233 = t199 + t232;
+    B[8] = t233;
+    const real t234 = theta[1] * f[2];
+    const real t235 = theta[2] * f[1];
+    const real t236 = t234 - t235;
+    G[0] = t236;
+    const real t237 = theta[2] * f[0];
+    const real t238 = theta[0] * f[2];
+    const real t239 = t237 - t238;
+    G[1] = t239;
+    const real t240 = theta[0] * f[1];
+    const real t241 = theta[1] * f[0];
+    const real t242 = t240 - t241;
+    G[2] = t242;
+    const real t243 = theta[1] * f[5];
+    const real t244 = x[1] * f[2];
+    const real t245 = x[2] * f[1];
+    const real t246 = t244 - t245;
+    const real t247 = theta[2] * f[4];
+    const real t248 = t246 - t247;
+    const real t249 = t243 + t248;
+    G[3] = t249;
+    const real t250 = theta[2] * f[3];
+    const real t251 = x[2] * f[0];
+    const real t252 = x[0] * f[2];
+    const real t253 = t251 - t252;
+    const real t254 = t250 + t253;
+    const real t255 = theta[0] * f[5];
+    const real t256 = t254 - t255;
+    G[4] = t256;
+    const real t257 = theta[0] * f[4];
+    const real t258 = x[0] * f[1];
+    const real t259 = x[1] * f[0];
+    const real t260 = t258 - t259;
+    const real t261 = theta[1] * f[3];
+    const real t262 = t260 - t261;
+    const real t263 = t257 + t262;
+    G[5] = t263;
+    const real t264 = d_s[0] * J[0];
+    const real t265 = t264 - laws[0];
+    row[0] = t265;
+    const real t266 = d_s[1] * J[1];
+    const real t267 = t266 - laws[1];
+    row[1] = t267;
+    const real t268 = d_s[2] * J[2];
+    const real t269 = t268 - laws[2];
+    row[2] = t269;
+    const real t270 = d_s[3] * J[3];
+    const real t271 = t270 - laws[3];
+    row[3] = t271;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 4, "", 0, 0},
+    {"d_s", 4, "", 0, 0},
+    {"J", 4, "kg*m2 or kg", 0, 0},
+    {"laws", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 4, "", 0, 0},
 };
 
 /* rows of a hinge with 4 free speeds
@@ -5864,6 +6258,18 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_carrier,
+        .call = mstmm_sweep_generic4_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_carrier_outputs,
+        .ir_hash = "6221f1959af2f3075fe95648cdc25c4ee1b586fff064d4dcb8c91a47210e95a6",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic4_tangent_column,
         .call = mstmm_sweep_generic4_tangent_column_call,
@@ -5871,7 +6277,31 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_tangent_column_inputs,
         .outputs = mstmm_sweep_generic4_tangent_column_outputs,
-        .ir_hash = "03a49af94272b4025d78d298dac651d824f350a3dd0c726e7ba5bd2fe22839e7",
+        .ir_hash = "45c1305dac3cc0b3b9ad63787b792947714af7c8bb5152bbd1f7a21eeeff8234",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_along,
+        .call = mstmm_sweep_generic4_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic4_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_along_outputs,
+        .ir_hash = "9149ab7186a3a273d2d7c7f498f50e113970b46d41a328e195da36ac165374f5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_steady,
+        .call = mstmm_sweep_generic4_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic4_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_steady_outputs,
+        .ir_hash = "88dfe893b17e929520aaa0a26450a7a13a6e3108aa8a7951e78685b345224357",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5953,7 +6383,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "0c8ccc6a3b08da32ac70ee2e9b7466c12084ccb2f9306cae8ee2e5c3cd90157a",
+    .hash = "8cef7923a1aaa35665436b43e1ef232a2f76513d08d8cde81f075d42737c83bb",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5963,6 +6393,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic4_kernels,
 };

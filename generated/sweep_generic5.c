@@ -34,12 +34,22 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic5_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -4080,581 +4090,546 @@ static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 5 speeds
+/* motion of Q across a hinge with 5 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][5]
  * in  s[5]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[15] * s[0];
+    const real t7 = H[16] * s[1];
+    const real t8 = t6 + t7;
+    const real t9 = H[17] * s[2];
+    const real t10 = t8 + t9;
+    const real t11 = H[18] * s[3];
+    const real t12 = t10 + t11;
+    const real t13 = H[19] * s[4];
+    const real t14 = t12 + t13;
+    const real t15 = c[3] + t14;
+    const real t16 = t5 - t15;
+    const real t17 = motion[3] + t16;
+    Q[3] = t17;
+    const real t18 = w[2] * t0;
+    const real t19 = w[0] * t2;
+    const real t20 = t18 - t19;
+    const real t21 = H[20] * s[0];
+    const real t22 = H[21] * s[1];
+    const real t23 = t21 + t22;
+    const real t24 = H[22] * s[2];
+    const real t25 = t23 + t24;
+    const real t26 = H[23] * s[3];
+    const real t27 = t25 + t26;
+    const real t28 = H[24] * s[4];
+    const real t29 = t27 + t28;
+    const real t30 = c[4] + t29;
+    const real t31 = t20 - t30;
+    const real t32 = motion[4] + t31;
+    Q[4] = t32;
+    const real t33 = w[0] * t1;
+    const real t34 = w[1] * t0;
+    const real t35 = t33 - t34;
+    const real t36 = H[25] * s[0];
+    const real t37 = H[26] * s[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[27] * s[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[28] * s[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[29] * s[4];
+    const real t44 = t42 + t43;
+    const real t45 = c[5] + t44;
+    const real t46 = t35 - t45;
+    const real t47 = motion[5] + t46;
+    Q[5] = t47;
+    const real t48 = v[1] * t2;
+    const real t49 = t48 * 2.0;
+    const real t50 = v[2] * t1;
+    const real t51 = 2.0 * t50;
+    const real t52 = t49 - t51;
+    const real t53 = H[0] * s[0];
+    const real t54 = H[1] * s[1];
+    const real t55 = t53 + t54;
+    const real t56 = H[2] * s[2];
+    const real t57 = t55 + t56;
+    const real t58 = H[3] * s[3];
+    const real t59 = t57 + t58;
+    const real t60 = H[4] * s[4];
+    const real t61 = t59 + t60;
+    const real t62 = c[0] + t61;
+    const real t63 = t52 - t62;
+    const real t64 = motion[6] + t63;
+    Q[6] = t64;
+    const real t65 = v[2] * t0;
+    const real t66 = 2.0 * t65;
+    const real t67 = v[0] * t2;
+    const real t68 = 2.0 * t67;
+    const real t69 = t66 - t68;
+    const real t70 = H[5] * s[0];
+    const real t71 = H[6] * s[1];
+    const real t72 = t70 + t71;
+    const real t73 = H[7] * s[2];
+    const real t74 = t72 + t73;
+    const real t75 = H[8] * s[3];
+    const real t76 = t74 + t75;
+    const real t77 = H[9] * s[4];
+    const real t78 = t76 + t77;
+    const real t79 = c[1] + t78;
+    const real t80 = t69 - t79;
+    const real t81 = motion[7] + t80;
+    Q[7] = t81;
+    const real t82 = v[0] * t1;
+    const real t83 = 2.0 * t82;
+    const real t84 = v[1] * t0;
+    const real t85 = 2.0 * t84;
+    const real t86 = t83 - t85;
+    const real t87 = H[10] * s[0];
+    const real t88 = H[11] * s[1];
+    const real t89 = t87 + t88;
+    const real t90 = H[12] * s[2];
+    const real t91 = t89 + t90;
+    const real t92 = H[13] * s[3];
+    const real t93 = t91 + t92;
+    const real t94 = H[14] * s[4];
+    const real t95 = t93 + t94;
+    const real t96 = c[2] + t95;
+    const real t97 = t86 - t96;
+    const real t98 = motion[8] + t97;
+    Q[8] = t98;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_carrier_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"s", 5, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 5 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][5]
+ * in  s[5]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][5]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[5]
- * out B[9]
- * out G[6]
- * out d_tau[5]
+ * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[5] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[5] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic5_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[15] * d_s[0];
+    const real t16 = H[16] * d_s[1];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
+    const real t18 = H[17] * d_s[2];
     const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
+    const real t20 = H[18] * d_s[3];
+    const real t21 = t19 + t20;
+    const real t22 = H[19] * d_s[4];
+    const real t23 = t21 + t22;
+    const real t24 = s[0] * d_H[15];
+    const real t25 = s[1] * d_H[16];
     const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
+    const real t27 = s[2] * d_H[17];
     const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
+    const real t29 = s[3] * d_H[18];
+    const real t30 = t28 + t29;
+    const real t31 = s[4] * d_H[19];
     const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
-    const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
+    const real t33 = t23 + t32;
+    const real t34 = d_c[3] + t33;
+    const real t35 = theta[2] * Q[4];
+    const real t36 = Q[1] * d_w[2];
+    const real t37 = Q[2] * d_w[1];
+    const real t38 = t36 - t37;
+    const real t39 = t35 + t38;
+    const real t40 = theta[1] * Q[5];
+    const real t41 = t39 - t40;
+    const real t42 = t34 + t41;
+    const real t43 = t14 + t42;
+    B[3] = t43;
+    const real t44 = w[0] * t10;
+    const real t45 = w[2] * t2;
+    const real t46 = t44 - t45;
+    const real t47 = H[20] * d_s[0];
+    const real t48 = H[21] * d_s[1];
     const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
+    const real t50 = H[22] * d_s[2];
+    const real t51 = t49 + t50;
+    const real t52 = H[23] * d_s[3];
     const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
+    const real t54 = H[24] * d_s[4];
     const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
+    const real t56 = s[0] * d_H[20];
+    const real t57 = s[1] * d_H[21];
+    const real t58 = t56 + t57;
+    const real t59 = s[2] * d_H[22];
     const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
+    const real t61 = s[3] * d_H[23];
     const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[15] * d_s[0];
-    const real t67 = H[16] * d_s[1];
-    const real t68 = t66 + t67;
-    const real t69 = H[17] * d_s[2];
-    const real t70 = t68 + t69;
-    const real t71 = H[18] * d_s[3];
-    const real t72 = t70 + t71;
-    const real t73 = H[19] * d_s[4];
-    const real t74 = t72 + t73;
-    const real t75 = s[0] * d_H[15];
-    const real t76 = s[1] * d_H[16];
-    const real t77 = t75 + t76;
-    const real t78 = s[2] * d_H[17];
-    const real t79 = t77 + t78;
-    const real t80 = s[3] * d_H[18];
+    const real t63 = s[4] * d_H[24];
+    const real t64 = t62 + t63;
+    const real t65 = t55 + t64;
+    const real t66 = d_c[4] + t65;
+    const real t67 = theta[0] * Q[5];
+    const real t68 = Q[2] * d_w[0];
+    const real t69 = Q[0] * d_w[2];
+    const real t70 = t68 - t69;
+    const real t71 = theta[2] * Q[3];
+    const real t72 = t70 - t71;
+    const real t73 = t67 + t72;
+    const real t74 = t66 + t73;
+    const real t75 = t46 + t74;
+    B[4] = t75;
+    const real t76 = w[1] * t2;
+    const real t77 = w[0] * t6;
+    const real t78 = t76 - t77;
+    const real t79 = H[25] * d_s[0];
+    const real t80 = H[26] * d_s[1];
     const real t81 = t79 + t80;
-    const real t82 = s[4] * d_H[19];
+    const real t82 = H[27] * d_s[2];
     const real t83 = t81 + t82;
-    const real t84 = t74 + t83;
-    const real t85 = d_c[3] + t84;
-    const real t86 = d_w[2] * t12;
-    const real t87 = d_w[1] * t20;
-    const real t88 = t86 - t87;
-    const real t89 = t85 + t88;
-    const real t90 = w[1] * t64;
-    const real t91 = w[2] * t43;
-    const real t92 = t90 - t91;
-    const real t93 = w[1] * t20;
-    const real t94 = w[2] * t12;
-    const real t95 = t93 - t94;
-    const real t96 = H[15] * s[0];
-    const real t97 = H[16] * s[1];
-    const real t98 = t96 + t97;
-    const real t99 = H[17] * s[2];
-    const real t100 = t98 + t99;
-    const real t101 = H[18] * s[3];
-    const real t102 = t100 + t101;
-    const real t103 = H[19] * s[4];
-    const real t104 = t102 + t103;
-    const real t105 = c[3] + t104;
-    const real t106 = t95 - t105;
-    const real t107 = motion[3] + t106;
-    const real t108 = t4 * t107;
-    const real t109 = w[2] * t5;
-    const real t110 = w[0] * t20;
-    const real t111 = t109 - t110;
-    const real t112 = H[20] * s[0];
-    const real t113 = H[21] * s[1];
-    const real t114 = t112 + t113;
-    const real t115 = H[22] * s[2];
-    const real t116 = t114 + t115;
-    const real t117 = H[23] * s[3];
-    const real t118 = t116 + t117;
-    const real t119 = H[24] * s[4];
-    const real t120 = t118 + t119;
-    const real t121 = c[4] + t120;
-    const real t122 = t111 - t121;
-    const real t123 = motion[4] + t122;
-    const real t124 = t11 * t123;
-    const real t125 = t108 + t124;
-    const real t126 = w[0] * t12;
-    const real t127 = w[1] * t5;
-    const real t128 = t126 - t127;
-    const real t129 = H[25] * s[0];
-    const real t130 = H[26] * s[1];
-    const real t131 = t129 + t130;
-    const real t132 = H[27] * s[2];
-    const real t133 = t131 + t132;
-    const real t134 = H[28] * s[3];
-    const real t135 = t133 + t134;
-    const real t136 = H[29] * s[4];
-    const real t137 = t135 + t136;
-    const real t138 = c[5] + t137;
-    const real t139 = t128 - t138;
-    const real t140 = motion[5] + t139;
-    const real t141 = t19 * t140;
-    const real t142 = t125 + t141;
-    const real t143 = t92 - t142;
-    const real t144 = t89 + t143;
-    B[3] = t144;
-    const real t145 = H[20] * d_s[0];
-    const real t146 = H[21] * d_s[1];
-    const real t147 = t145 + t146;
-    const real t148 = H[22] * d_s[2];
-    const real t149 = t147 + t148;
-    const real t150 = H[23] * d_s[3];
-    const real t151 = t149 + t150;
-    const real t152 = H[24] * d_s[4];
-    const real t153 = t151 + t152;
-    const real t154 = s[0] * d_H[20];
-    const real t155 = s[1] * d_H[21];
-    const real t156 = t154 + t155;
-    const real t157 = s[2] * d_H[22];
-    const real t158 = t156 + t157;
-    const real t159 = s[3] * d_H[23];
-    const real t160 = t158 + t159;
-    const real t161 = s[4] * d_H[24];
-    const real t162 = t160 + t161;
-    const real t163 = t153 + t162;
-    const real t164 = d_c[4] + t163;
-    const real t165 = d_w[0] * t20;
-    const real t166 = d_w[2] * t5;
-    const real t167 = t165 - t166;
-    const real t168 = t164 + t167;
-    const real t169 = w[2] * t22;
-    const real t170 = w[0] * t64;
-    const real t171 = t169 - t170;
-    const real t172 = t28 * t107;
-    const real t173 = t34 * t123;
-    const real t174 = t172 + t173;
-    const real t175 = t41 * t140;
-    const real t176 = t174 + t175;
-    const real t177 = t171 - t176;
-    const real t178 = t168 + t177;
-    B[4] = t178;
-    const real t179 = H[25] * d_s[0];
-    const real t180 = H[26] * d_s[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[27] * d_s[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[28] * d_s[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[29] * d_s[4];
-    const real t187 = t185 + t186;
-    const real t188 = s[0] * d_H[25];
-    const real t189 = s[1] * d_H[26];
-    const real t190 = t188 + t189;
-    const real t191 = s[2] * d_H[27];
-    const real t192 = t190 + t191;
-    const real t193 = s[3] * d_H[28];
-    const real t194 = t192 + t193;
-    const real t195 = s[4] * d_H[29];
-    const real t196 = t194 + t195;
-    const real t197 = t187 + t196;
-    const real t198 = d_c[5] + t197;
-    const real t199 = d_w[1] * t5;
-    const real t200 = d_w[0] * t12;
-    const real t201 = t199 - t200;
-    const real t202 = t198 + t201;
-    const real t203 = w[0] * t43;
-    const real t204 = w[1] * t22;
-    const real t205 = t203 - t204;
-    const real t206 = t49 * t107;
-    const real t207 = t55 * t123;
-    const real t208 = t206 + t207;
-    const real t209 = t62 * t140;
-    const real t210 = t208 + t209;
-    const real t211 = t205 - t210;
-    const real t212 = t202 + t211;
-    B[5] = t212;
-    const real t213 = H[0] * d_s[0];
-    const real t214 = H[1] * d_s[1];
+    const real t84 = H[28] * d_s[3];
+    const real t85 = t83 + t84;
+    const real t86 = H[29] * d_s[4];
+    const real t87 = t85 + t86;
+    const real t88 = s[0] * d_H[25];
+    const real t89 = s[1] * d_H[26];
+    const real t90 = t88 + t89;
+    const real t91 = s[2] * d_H[27];
+    const real t92 = t90 + t91;
+    const real t93 = s[3] * d_H[28];
+    const real t94 = t92 + t93;
+    const real t95 = s[4] * d_H[29];
+    const real t96 = t94 + t95;
+    const real t97 = t87 + t96;
+    const real t98 = d_c[5] + t97;
+    const real t99 = theta[1] * Q[3];
+    const real t100 = Q[0] * d_w[1];
+    const real t101 = Q[1] * d_w[0];
+    const real t102 = t100 - t101;
+    const real t103 = t99 + t102;
+    const real t104 = theta[0] * Q[4];
+    const real t105 = t103 - t104;
+    const real t106 = t98 + t105;
+    const real t107 = t78 + t106;
+    B[5] = t107;
+    const real t108 = v[2] * 2.0;
+    const real t109 = t6 * t108;
+    const real t110 = v[1] * 2.0;
+    const real t111 = t10 * t110;
+    const real t112 = t109 - t111;
+    const real t113 = H[0] * d_s[0];
+    const real t114 = H[1] * d_s[1];
+    const real t115 = t113 + t114;
+    const real t116 = H[2] * d_s[2];
+    const real t117 = t115 + t116;
+    const real t118 = H[3] * d_s[3];
+    const real t119 = t117 + t118;
+    const real t120 = H[4] * d_s[4];
+    const real t121 = t119 + t120;
+    const real t122 = s[0] * d_H[0];
+    const real t123 = s[1] * d_H[1];
+    const real t124 = t122 + t123;
+    const real t125 = s[2] * d_H[2];
+    const real t126 = t124 + t125;
+    const real t127 = s[3] * d_H[3];
+    const real t128 = t126 + t127;
+    const real t129 = s[4] * d_H[4];
+    const real t130 = t128 + t129;
+    const real t131 = t121 + t130;
+    const real t132 = d_c[0] + t131;
+    const real t133 = theta[2] * Q[7];
+    const real t134 = x[2] * Q[4];
+    const real t135 = Q[1] * d_v[2];
+    const real t136 = 2.0 * t135;
+    const real t137 = x[1] * Q[0];
+    const real t138 = x[0] * Q[1];
+    const real t139 = t137 - t138;
+    const real t140 = Q[1] * t139;
+    const real t141 = x[0] * Q[2];
+    const real t142 = x[2] * Q[0];
+    const real t143 = t141 - t142;
+    const real t144 = Q[2] * t143;
+    const real t145 = t140 - t144;
+    const real t146 = t136 + t145;
+    const real t147 = Q[2] * d_v[1];
+    const real t148 = 2.0 * t147;
+    const real t149 = t146 - t148;
+    const real t150 = t134 + t149;
+    const real t151 = x[1] * Q[5];
+    const real t152 = t150 - t151;
+    const real t153 = t133 + t152;
+    const real t154 = theta[1] * Q[8];
+    const real t155 = t153 - t154;
+    const real t156 = t132 + t155;
+    const real t157 = t112 + t156;
+    B[6] = t157;
+    const real t158 = v[0] * 2.0;
+    const real t159 = t10 * t158;
+    const real t160 = t2 * t108;
+    const real t161 = t159 - t160;
+    const real t162 = H[5] * d_s[0];
+    const real t163 = H[6] * d_s[1];
+    const real t164 = t162 + t163;
+    const real t165 = H[7] * d_s[2];
+    const real t166 = t164 + t165;
+    const real t167 = H[8] * d_s[3];
+    const real t168 = t166 + t167;
+    const real t169 = H[9] * d_s[4];
+    const real t170 = t168 + t169;
+    const real t171 = s[0] * d_H[5];
+    const real t172 = s[1] * d_H[6];
+    const real t173 = t171 + t172;
+    const real t174 = s[2] * d_H[7];
+    const real t175 = t173 + t174;
+    const real t176 = s[3] * d_H[8];
+    const real t177 = t175 + t176;
+    const real t178 = s[4] * d_H[9];
+    const real t179 = t177 + t178;
+    const real t180 = t170 + t179;
+    const real t181 = d_c[1] + t180;
+    const real t182 = theta[0] * Q[8];
+    const real t183 = x[0] * Q[5];
+    const real t184 = Q[2] * d_v[0];
+    const real t185 = 2.0 * t184;
+    const real t186 = x[2] * Q[1];
+    const real t187 = x[1] * Q[2];
+    const real t188 = t186 - t187;
+    const real t189 = Q[2] * t188;
+    const real t190 = Q[0] * t139;
+    const real t191 = t189 - t190;
+    const real t192 = Q[0] * d_v[2];
+    const real t193 = 2.0 * t192;
+    const real t194 = t191 - t193;
+    const real t195 = t185 + t194;
+    const real t196 = x[2] * Q[3];
+    const real t197 = t195 - t196;
+    const real t198 = t183 + t197;
+    const real t199 = theta[2] * Q[6];
+    const real t200 = t198 - t199;
+    const real t201 = t182 + t200;
+    const real t202 = t181 + t201;
+    const real t203 = t161 + t202;
+    B[7] = t203;
+    const real t204 = t2 * t110;
+    const real t205 = t6 * t158;
+    const real t206 = t204 - t205;
+    const real t207 = H[10] * d_s[0];
+    const real t208 = H[11] * d_s[1];
+    const real t209 = t207 + t208;
+    const real t210 = H[12] * d_s[2];
+    const real t211 = t209 + t210;
+    const real t212 = H[13] * d_s[3];
+    const real t213 = t211 + t212;
+    const real t214 = H[14] * d_s[4];
     const real t215 = t213 + t214;
-    const real t216 = H[2] * d_s[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[3] * d_s[3];
-    const real t219 = t217 + t218;
-    const real t220 = H[4] * d_s[4];
-    const real t221 = t219 + t220;
-    const real t222 = s[0] * d_H[0];
-    const real t223 = s[1] * d_H[1];
+    const real t216 = s[0] * d_H[10];
+    const real t217 = s[1] * d_H[11];
+    const real t218 = t216 + t217;
+    const real t219 = s[2] * d_H[12];
+    const real t220 = t218 + t219;
+    const real t221 = s[3] * d_H[13];
+    const real t222 = t220 + t221;
+    const real t223 = s[4] * d_H[14];
     const real t224 = t222 + t223;
-    const real t225 = s[2] * d_H[2];
-    const real t226 = t224 + t225;
-    const real t227 = s[3] * d_H[3];
-    const real t228 = t226 + t227;
-    const real t229 = s[4] * d_H[4];
-    const real t230 = t228 + t229;
-    const real t231 = t221 + t230;
-    const real t232 = d_c[0] + t231;
-    const real t233 = d_v[2] * t12;
-    const real t234 = 2.0 * t233;
-    const real t235 = d_v[1] * t20;
+    const real t225 = t215 + t224;
+    const real t226 = d_c[2] + t225;
+    const real t227 = theta[1] * Q[6];
+    const real t228 = x[1] * Q[3];
+    const real t229 = Q[0] * d_v[1];
+    const real t230 = 2.0 * t229;
+    const real t231 = Q[0] * t143;
+    const real t232 = Q[1] * t188;
+    const real t233 = t231 - t232;
+    const real t234 = t230 + t233;
+    const real t235 = Q[1] * d_v[0];
     const real t236 = 2.0 * t235;
     const real t237 = t234 - t236;
-    const real t238 = t232 + t237;
-    const real t239 = R[1] * d_d[0];
-    const real t240 = R[4] * d_d[1];
-    const real t241 = t239 + t240;
-    const real t242 = R[7] * d_d[2];
-    const real t243 = t241 + t242;
-    const real t244 = t5 * t12;
-    const real t245 = t243 * t244;
-    const real t246 = R[0] * d_d[0];
-    const real t247 = R[3] * d_d[1];
-    const real t248 = t246 + t247;
-    const real t249 = R[6] * d_d[2];
-    const real t250 = t248 + t249;
-    const real t251 = t12 * t12;
-    const real t252 = t20 * t20;
-    const real t253 = t251 + t252;
-    const real t254 = t250 * t253;
-    const real t255 = t245 - t254;
-    const real t256 = R[2] * d_d[0];
-    const real t257 = R[5] * d_d[1];
-    const real t258 = t256 + t257;
-    const real t259 = R[8] * d_d[2];
-    const real t260 = t258 + t259;
-    const real t261 = t5 * t20;
-    const real t262 = t260 * t261;
-    const real t263 = t255 + t262;
-    const real t264 = v[1] * 2.0;
-    const real t265 = t64 * t264;
-    const real t266 = v[2] * 2.0;
-    const real t267 = t43 * t266;
-    const real t268 = t265 - t267;
-    const real t269 = t260 * t123;
-    const real t270 = t243 * t140;
-    const real t271 = t269 - t270;
-    const real t272 = t268 + t271;
-    const real t273 = t263 + t272;
-    const real t274 = v[1] * t20;
-    const real t275 = t274 * 2.0;
-    const real t276 = v[2] * t12;
-    const real t277 = 2.0 * t276;
-    const real t278 = t275 - t277;
-    const real t279 = H[0] * s[0];
-    const real t280 = H[1] * s[1];
+    const real t238 = t228 + t237;
+    const real t239 = x[0] * Q[4];
+    const real t240 = t238 - t239;
+    const real t241 = t227 + t240;
+    const real t242 = theta[0] * Q[7];
+    const real t243 = t241 - t242;
+    const real t244 = t226 + t243;
+    const real t245 = t206 + t244;
+    B[8] = t245;
+    const real t246 = theta[1] * f[2];
+    const real t247 = theta[2] * f[1];
+    const real t248 = t246 - t247;
+    G[0] = t248;
+    const real t249 = theta[2] * f[0];
+    const real t250 = theta[0] * f[2];
+    const real t251 = t249 - t250;
+    G[1] = t251;
+    const real t252 = theta[0] * f[1];
+    const real t253 = theta[1] * f[0];
+    const real t254 = t252 - t253;
+    G[2] = t254;
+    const real t255 = theta[1] * f[5];
+    const real t256 = x[1] * f[2];
+    const real t257 = x[2] * f[1];
+    const real t258 = t256 - t257;
+    const real t259 = theta[2] * f[4];
+    const real t260 = t258 - t259;
+    const real t261 = t255 + t260;
+    G[3] = t261;
+    const real t262 = theta[2] * f[3];
+    const real t263 = x[2] * f[0];
+    const real t264 = x[0] * f[2];
+    const real t265 = t263 - t264;
+    const real t266 = t262 + t265;
+    const real t267 = theta[0] * f[5];
+    const real t268 = t266 - t267;
+    G[4] = t268;
+    const real t269 = theta[0] * f[4];
+    const real t270 = x[0] * f[1];
+    const real t271 = x[1] * f[0];
+    const real t272 = t270 - t271;
+    const real t273 = theta[1] * f[3];
+    const real t274 = t272 - t273;
+    const real t275 = t269 + t274;
+    G[5] = t275;
+    const real t276 = d_s[0] * J[0];
+    const real t277 = f[0] * d_H[0];
+    const real t278 = f[1] * d_H[5];
+    const real t279 = t277 + t278;
+    const real t280 = f[2] * d_H[10];
     const real t281 = t279 + t280;
-    const real t282 = H[2] * s[2];
+    const real t282 = f[3] * d_H[15];
     const real t283 = t281 + t282;
-    const real t284 = H[3] * s[3];
+    const real t284 = f[4] * d_H[20];
     const real t285 = t283 + t284;
-    const real t286 = H[4] * s[4];
+    const real t286 = f[5] * d_H[25];
     const real t287 = t285 + t286;
-    const real t288 = c[0] + t287;
-    const real t289 = t278 - t288;
-    const real t290 = motion[6] + t289;
-    const real t291 = t4 * t290;
-    const real t292 = v[2] * t5;
-    const real t293 = 2.0 * t292;
-    const real t294 = v[0] * t20;
-    const real t295 = 2.0 * t294;
-    const real t296 = t293 - t295;
-    const real t297 = H[5] * s[0];
-    const real t298 = H[6] * s[1];
+    const real t288 = t287 - laws[0];
+    const real t289 = t276 + t288;
+    row[0] = t289;
+    const real t290 = d_s[1] * J[1];
+    const real t291 = f[0] * d_H[1];
+    const real t292 = f[1] * d_H[6];
+    const real t293 = t291 + t292;
+    const real t294 = f[2] * d_H[11];
+    const real t295 = t293 + t294;
+    const real t296 = f[3] * d_H[16];
+    const real t297 = t295 + t296;
+    const real t298 = f[4] * d_H[21];
     const real t299 = t297 + t298;
-    const real t300 = H[7] * s[2];
+    const real t300 = f[5] * d_H[26];
     const real t301 = t299 + t300;
-    const real t302 = H[8] * s[3];
-    const real t303 = t301 + t302;
-    const real t304 = H[9] * s[4];
-    const real t305 = t303 + t304;
-    const real t306 = c[1] + t305;
-    const real t307 = t296 - t306;
-    const real t308 = motion[7] + t307;
-    const real t309 = t11 * t308;
-    const real t310 = t291 + t309;
-    const real t311 = v[0] * t12;
-    const real t312 = 2.0 * t311;
-    const real t313 = v[1] * t5;
-    const real t314 = 2.0 * t313;
-    const real t315 = t312 - t314;
-    const real t316 = H[10] * s[0];
-    const real t317 = H[11] * s[1];
-    const real t318 = t316 + t317;
-    const real t319 = H[12] * s[2];
-    const real t320 = t318 + t319;
-    const real t321 = H[13] * s[3];
-    const real t322 = t320 + t321;
-    const real t323 = H[14] * s[4];
-    const real t324 = t322 + t323;
-    const real t325 = c[2] + t324;
-    const real t326 = t315 - t325;
-    const real t327 = motion[8] + t326;
-    const real t328 = t19 * t327;
-    const real t329 = t310 + t328;
-    const real t330 = t273 - t329;
-    const real t331 = t238 + t330;
-    B[6] = t331;
-    const real t332 = H[5] * d_s[0];
-    const real t333 = H[6] * d_s[1];
-    const real t334 = t332 + t333;
-    const real t335 = H[7] * d_s[2];
-    const real t336 = t334 + t335;
-    const real t337 = H[8] * d_s[3];
-    const real t338 = t336 + t337;
-    const real t339 = H[9] * d_s[4];
-    const real t340 = t338 + t339;
-    const real t341 = s[0] * d_H[5];
-    const real t342 = s[1] * d_H[6];
+    const real t302 = t301 - laws[1];
+    const real t303 = t290 + t302;
+    row[1] = t303;
+    const real t304 = d_s[2] * J[2];
+    const real t305 = f[0] * d_H[2];
+    const real t306 = f[1] * d_H[7];
+    const real t307 = t305 + t306;
+    const real t308 = f[2] * d_H[12];
+    const real t309 = t307 + t308;
+    const real t310 = f[3] * d_H[17];
+    const real t311 = t309 + t310;
+    const real t312 = f[4] * d_H[22];
+    const real t313 = t311 + t312;
+    const real t314 = f[5] * d_H[27];
+    const real t315 = t313 + t314;
+    const real t316 = t315 - laws[2];
+    const real t317 = t304 + t316;
+    row[2] = t317;
+    const real t318 = d_s[3] * J[3];
+    const real t319 = f[0] * d_H[3];
+    const real t320 = f[1] * d_H[8];
+    const real t321 = t319 + t320;
+    const real t322 = f[2] * d_H[13];
+    const real t323 = t321 + t322;
+    const real t324 = f[3] * d_H[18];
+    const real t325 = t323 + t324;
+    const real t326 = f[4] * d_H[23];
+    const real t327 = t325 + t326;
+    const real t328 = f[5] * d_H[28];
+    const real t329 = t327 + t328;
+    const real t330 = t329 - laws[3];
+    const real t331 = t318 + t330;
+    row[3] = t331;
+    const real t332 = d_s[4] * J[4];
+    const real t333 = f[0] * d_H[4];
+    const real t334 = f[1] * d_H[9];
+    const real t335 = t333 + t334;
+    const real t336 = f[2] * d_H[14];
+    const real t337 = t335 + t336;
+    const real t338 = f[3] * d_H[19];
+    const real t339 = t337 + t338;
+    const real t340 = f[4] * d_H[24];
+    const real t341 = t339 + t340;
+    const real t342 = f[5] * d_H[29];
     const real t343 = t341 + t342;
-    const real t344 = s[2] * d_H[7];
-    const real t345 = t343 + t344;
-    const real t346 = s[3] * d_H[8];
-    const real t347 = t345 + t346;
-    const real t348 = s[4] * d_H[9];
-    const real t349 = t347 + t348;
-    const real t350 = t340 + t349;
-    const real t351 = d_c[1] + t350;
-    const real t352 = d_v[0] * t20;
-    const real t353 = 2.0 * t352;
-    const real t354 = d_v[2] * t5;
-    const real t355 = 2.0 * t354;
-    const real t356 = t353 - t355;
-    const real t357 = t351 + t356;
-    const real t358 = t250 * t244;
-    const real t359 = t5 * t5;
-    const real t360 = t252 + t359;
-    const real t361 = t243 * t360;
-    const real t362 = t358 - t361;
-    const real t363 = t12 * t20;
-    const real t364 = t260 * t363;
-    const real t365 = t362 + t364;
-    const real t366 = t22 * t266;
-    const real t367 = v[0] * 2.0;
-    const real t368 = t64 * t367;
-    const real t369 = t366 - t368;
-    const real t370 = t250 * t140;
-    const real t371 = t260 * t107;
-    const real t372 = t370 - t371;
-    const real t373 = t369 + t372;
-    const real t374 = t365 + t373;
-    const real t375 = t28 * t290;
-    const real t376 = t34 * t308;
-    const real t377 = t375 + t376;
-    const real t378 = t41 * t327;
-    const real t379 = t377 + t378;
-    const real t380 = t374 - t379;
-    const real t381 = t357 + t380;
-    B[7] = t381;
-    const real t382 = H[10] * d_s[0];
-    const real t383 = H[11] * d_s[1];
-    const real t384 = t382 + t383;
-    const real t385 = H[12] * d_s[2];
-    const real t386 = t384 + t385;
-    const real t387 = H[13] * d_s[3];
-    const real t388 = t386 + t387;
-    const real t389 = H[14] * d_s[4];
-    const real t390 = t388 + t389;
-    const real t391 = s[0] * d_H[10];
-    const real t392 = s[1] * d_H[11];
-    const real t393 = t391 + t392;
-    const real t394 = s[2] * d_H[12];
-    const real t395 = t393 + t394;
-    const real t396 = s[3] * d_H[13];
-    const real t397 = t395 + t396;
-    const real t398 = s[4] * d_H[14];
-    const real t399 = t397 + t398;
-    const real t400 = t390 + t399;
-    const real t401 = d_c[2] + t400;
-    const real t402 = d_v[1] * t5;
-    const real t403 = 2.0 * t402;
-    const real t404 = d_v[0] * t12;
-    const real t405 = 2.0 * t404;
-    const real t406 = t403 - t405;
-    const real t407 = t401 + t406;
-    const real t408 = t250 * t261;
-    const real t409 = t243 * t363;
-    const real t410 = t408 + t409;
-    const real t411 = t251 + t359;
-    const real t412 = t260 * t411;
-    const real t413 = t410 - t412;
-    const real t414 = t43 * t367;
-    const real t415 = t22 * t264;
-    const real t416 = t414 - t415;
-    const real t417 = t243 * t107;
-    const real t418 = t250 * t123;
-    const real t419 = t417 - t418;
-    const real t420 = t416 + t419;
-    const real t421 = t413 + t420;
-    const real t422 = t49 * t290;
-    const real t423 = t55 * t308;
-    const real t424 = t422 + t423;
-    const real t425 = t62 * t327;
-    const real t426 = t424 + t425;
-    const real t427 = t421 - t426;
-    const real t428 = t407 + t427;
-    B[8] = t428;
-    const real t429 = f[0] * t4;
-    const real t430 = f[1] * t11;
-    const real t431 = t429 + t430;
-    const real t432 = f[2] * t19;
-    const real t433 = t431 + t432;
-    G[0] = t433;
-    const real t434 = f[0] * t28;
-    const real t435 = f[1] * t34;
-    const real t436 = t434 + t435;
-    const real t437 = f[2] * t41;
-    const real t438 = t436 + t437;
-    G[1] = t438;
-    const real t439 = f[0] * t49;
-    const real t440 = f[1] * t55;
-    const real t441 = t439 + t440;
-    const real t442 = f[2] * t62;
-    const real t443 = t441 + t442;
-    G[2] = t443;
-    const real t444 = f[3] * t4;
-    const real t445 = f[4] * t11;
-    const real t446 = t444 + t445;
-    const real t447 = f[5] * t19;
-    const real t448 = t446 + t447;
-    const real t449 = f[2] * t243;
-    const real t450 = f[1] * t260;
-    const real t451 = t449 - t450;
-    const real t452 = t448 + t451;
-    G[3] = t452;
-    const real t453 = f[3] * t28;
-    const real t454 = f[4] * t34;
-    const real t455 = t453 + t454;
-    const real t456 = f[5] * t41;
-    const real t457 = t455 + t456;
-    const real t458 = f[0] * t260;
-    const real t459 = f[2] * t250;
-    const real t460 = t458 - t459;
-    const real t461 = t457 + t460;
-    G[4] = t461;
-    const real t462 = f[3] * t49;
-    const real t463 = f[4] * t55;
-    const real t464 = t462 + t463;
-    const real t465 = f[5] * t62;
-    const real t466 = t464 + t465;
-    const real t467 = f[1] * t250;
-    const real t468 = f[0] * t243;
-    const real t469 = t467 - t468;
-    const real t470 = t466 + t469;
-    G[5] = t470;
-    const real t471 = f[0] * d_H[0];
-    const real t472 = f[1] * d_H[5];
-    const real t473 = t471 + t472;
-    const real t474 = f[2] * d_H[10];
-    const real t475 = t473 + t474;
-    const real t476 = f[3] * d_H[15];
-    const real t477 = t475 + t476;
-    const real t478 = f[4] * d_H[20];
-    const real t479 = t477 + t478;
-    const real t480 = f[5] * d_H[25];
-    const real t481 = t479 + t480;
-    d_tau[0] = t481;
-    const real t482 = f[0] * d_H[1];
-    const real t483 = f[1] * d_H[6];
-    const real t484 = t482 + t483;
-    const real t485 = f[2] * d_H[11];
-    const real t486 = t484 + t485;
-    const real t487 = f[3] * d_H[16];
-    const real t488 = t486 + t487;
-    const real t489 = f[4] * d_H[21];
-    const real t490 = t488 + t489;
-    const real t491 = f[5] * d_H[26];
-    const real t492 = t490 + t491;
-    d_tau[1] = t492;
-    const real t493 = f[0] * d_H[2];
-    const real t494 = f[1] * d_H[7];
-    const real t495 = t493 + t494;
-    const real t496 = f[2] * d_H[12];
-    const real t497 = t495 + t496;
-    const real t498 = f[3] * d_H[17];
-    const real t499 = t497 + t498;
-    const real t500 = f[4] * d_H[22];
-    const real t501 = t499 + t500;
-    const real t502 = f[5] * d_H[27];
-    const real t503 = t501 + t502;
-    d_tau[2] = t503;
-    const real t504 = f[0] * d_H[3];
-    const real t505 = f[1] * d_H[8];
-    const real t506 = t504 + t505;
-    const real t507 = f[2] * d_H[13];
-    const real t508 = t506 + t507;
-    const real t509 = f[3] * d_H[18];
-    const real t510 = t508 + t509;
-    const real t511 = f[4] * d_H[23];
-    const real t512 = t510 + t511;
-    const real t513 = f[5] * d_H[28];
-    const real t514 = t512 + t513;
-    d_tau[3] = t514;
-    const real t515 = f[0] * d_H[4];
-    const real t516 = f[1] * d_H[9];
-    const real t517 = t515 + t516;
-    const real t518 = f[2] * d_H[14];
-    const real t519 = t517 + t518;
-    const real t520 = f[3] * d_H[19];
-    const real t521 = t519 + t520;
-    const real t522 = f[4] * d_H[24];
-    const real t523 = t521 + t522;
-    const real t524 = f[5] * d_H[29];
-    const real t525 = t523 + t524;
-    d_tau[4] = t525;
+    const real t344 = t343 - laws[4];
+    const real t345 = t332 + t344;
+    row[4] = t345;
     return 0;
 }
 
@@ -4665,27 +4640,488 @@ static int mstmm_sweep_generic5_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic5_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 30, "", 0, 0},
     {"s", 5, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 30, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 5, "", 0, 0},
+    {"J", 5, "kg*m2 or kg", 0, 0},
+    {"laws", 5, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 5, "", 0, 0},
+    {"row", 5, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 5 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][5]
+ * in  d_q[5]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[15] * d_q[0];
+    const real t1 = H[16] * d_q[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[17] * d_q[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[18] * d_q[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[19] * d_q[4];
+    const real t8 = t6 + t7;
+    theta[0] = t8;
+    const real t9 = H[20] * d_q[0];
+    const real t10 = H[21] * d_q[1];
+    const real t11 = t9 + t10;
+    const real t12 = H[22] * d_q[2];
+    const real t13 = t11 + t12;
+    const real t14 = H[23] * d_q[3];
+    const real t15 = t13 + t14;
+    const real t16 = H[24] * d_q[4];
+    const real t17 = t15 + t16;
+    theta[1] = t17;
+    const real t18 = H[25] * d_q[0];
+    const real t19 = H[26] * d_q[1];
+    const real t20 = t18 + t19;
+    const real t21 = H[27] * d_q[2];
+    const real t22 = t20 + t21;
+    const real t23 = H[28] * d_q[3];
+    const real t24 = t22 + t23;
+    const real t25 = H[29] * d_q[4];
+    const real t26 = t24 + t25;
+    theta[2] = t26;
+    const real t27 = H[0] * d_q[0];
+    const real t28 = H[1] * d_q[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[2] * d_q[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[3] * d_q[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[4] * d_q[4];
+    const real t35 = t33 + t34;
+    x[0] = t35;
+    const real t36 = H[5] * d_q[0];
+    const real t37 = H[6] * d_q[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[7] * d_q[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[8] * d_q[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[9] * d_q[4];
+    const real t44 = t42 + t43;
+    x[1] = t44;
+    const real t45 = H[10] * d_q[0];
+    const real t46 = H[11] * d_q[1];
+    const real t47 = t45 + t46;
+    const real t48 = H[12] * d_q[2];
+    const real t49 = t47 + t48;
+    const real t50 = H[13] * d_q[3];
+    const real t51 = t49 + t50;
+    const real t52 = H[14] * d_q[4];
+    const real t53 = t51 + t52;
+    x[2] = t53;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_along_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"d_q", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 5 free speeds that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][5]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[5]
+ * in  d_s[5]
+ * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[5] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[5] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[15] * d_u[0];
+    const real t1 = H[16] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[17] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[18] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[19] * d_u[4];
+    const real t8 = t6 + t7;
+    const real t9 = theta[2] * Q[1];
+    const real t10 = theta[1] * Q[2];
+    const real t11 = t9 - t10;
+    const real t12 = t8 + t11;
+    B[0] = t12;
+    const real t13 = H[20] * d_u[0];
+    const real t14 = H[21] * d_u[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[22] * d_u[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[23] * d_u[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[24] * d_u[4];
+    const real t21 = t19 + t20;
+    const real t22 = theta[0] * Q[2];
+    const real t23 = theta[2] * Q[0];
+    const real t24 = t22 - t23;
+    const real t25 = t21 + t24;
+    B[1] = t25;
+    const real t26 = H[25] * d_u[0];
+    const real t27 = H[26] * d_u[1];
+    const real t28 = t26 + t27;
+    const real t29 = H[27] * d_u[2];
+    const real t30 = t28 + t29;
+    const real t31 = H[28] * d_u[3];
+    const real t32 = t30 + t31;
+    const real t33 = H[29] * d_u[4];
+    const real t34 = t32 + t33;
+    const real t35 = theta[1] * Q[0];
+    const real t36 = theta[0] * Q[1];
+    const real t37 = t35 - t36;
+    const real t38 = t34 + t37;
+    B[2] = t38;
+    const real t39 = w[2] * t24;
+    const real t40 = w[1] * t37;
+    const real t41 = t39 - t40;
+    const real t42 = H[15] * d_s[0];
+    const real t43 = H[16] * d_s[1];
+    const real t44 = t42 + t43;
+    const real t45 = H[17] * d_s[2];
+    const real t46 = t44 + t45;
+    const real t47 = H[18] * d_s[3];
+    const real t48 = t46 + t47;
+    const real t49 = H[19] * d_s[4];
+    const real t50 = t48 + t49;
+    const real t51 = theta[2] * Q[4];
+    const real t52 = Q[1] * t34;
+    const real t53 = Q[2] * t21;
+    const real t54 = t52 - t53;
+    const real t55 = t51 + t54;
+    const real t56 = theta[1] * Q[5];
+    const real t57 = t55 - t56;
+    const real t58 = t50 + t57;
+    const real t59 = t41 + t58;
+    B[3] = t59;
+    const real t60 = w[0] * t37;
+    const real t61 = w[2] * t11;
+    const real t62 = t60 - t61;
+    const real t63 = H[20] * d_s[0];
+    const real t64 = H[21] * d_s[1];
+    const real t65 = t63 + t64;
+    const real t66 = H[22] * d_s[2];
+    const real t67 = t65 + t66;
+    const real t68 = H[23] * d_s[3];
+    const real t69 = t67 + t68;
+    const real t70 = H[24] * d_s[4];
+    const real t71 = t69 + t70;
+    const real t72 = theta[0] * Q[5];
+    const real t73 = Q[2] * t8;
+    const real t74 = Q[0] * t34;
+    const real t75 = t73 - t74;
+    const real t76 = theta[2] * Q[3];
+    const real t77 = t75 - t76;
+    const real t78 = t72 + t77;
+    const real t79 = t71 + t78;
+    const real t80 = t62 + t79;
+    B[4] = t80;
+    const real t81 = w[1] * t11;
+    const real t82 = w[0] * t24;
+    const real t83 = t81 - t82;
+    const real t84 = H[25] * d_s[0];
+    const real t85 = H[26] * d_s[1];
+    const real t86 = t84 + t85;
+    const real t87 = H[27] * d_s[2];
+    const real t88 = t86 + t87;
+    const real t89 = H[28] * d_s[3];
+    const real t90 = t88 + t89;
+    const real t91 = H[29] * d_s[4];
+    const real t92 = t90 + t91;
+    const real t93 = theta[1] * Q[3];
+    const real t94 = Q[0] * t21;
+    const real t95 = Q[1] * t8;
+    const real t96 = t94 - t95;
+    const real t97 = t93 + t96;
+    const real t98 = theta[0] * Q[4];
+    const real t99 = t97 - t98;
+    const real t100 = t92 + t99;
+    const real t101 = t83 + t100;
+    B[5] = t101;
+    const real t102 = v[2] * 2.0;
+    const real t103 = t24 * t102;
+    const real t104 = v[1] * 2.0;
+    const real t105 = t37 * t104;
+    const real t106 = t103 - t105;
+    const real t107 = v[2] * t21;
+    const real t108 = H[10] * d_u[0];
+    const real t109 = H[11] * d_u[1];
+    const real t110 = t108 + t109;
+    const real t111 = H[12] * d_u[2];
+    const real t112 = t110 + t111;
+    const real t113 = H[13] * d_u[3];
+    const real t114 = t112 + t113;
+    const real t115 = H[14] * d_u[4];
+    const real t116 = t114 + t115;
+    const real t117 = w[1] * t116;
+    const real t118 = H[5] * d_u[0];
+    const real t119 = H[6] * d_u[1];
+    const real t120 = t118 + t119;
+    const real t121 = H[7] * d_u[2];
+    const real t122 = t120 + t121;
+    const real t123 = H[8] * d_u[3];
+    const real t124 = t122 + t123;
+    const real t125 = H[9] * d_u[4];
+    const real t126 = t124 + t125;
+    const real t127 = w[2] * t126;
+    const real t128 = t117 - t127;
+    const real t129 = t107 + t128;
+    const real t130 = v[1] * t34;
+    const real t131 = t129 - t130;
+    const real t132 = H[0] * d_s[0];
+    const real t133 = H[1] * d_s[1];
+    const real t134 = t132 + t133;
+    const real t135 = H[2] * d_s[2];
+    const real t136 = t134 + t135;
+    const real t137 = H[3] * d_s[3];
+    const real t138 = t136 + t137;
+    const real t139 = H[4] * d_s[4];
+    const real t140 = t138 + t139;
+    const real t141 = t131 + t140;
+    const real t142 = theta[2] * Q[7];
+    const real t143 = x[2] * Q[4];
+    const real t144 = Q[1] * t116;
+    const real t145 = 2.0 * t144;
+    const real t146 = x[1] * Q[0];
+    const real t147 = x[0] * Q[1];
+    const real t148 = t146 - t147;
+    const real t149 = Q[1] * t148;
+    const real t150 = x[0] * Q[2];
+    const real t151 = x[2] * Q[0];
+    const real t152 = t150 - t151;
+    const real t153 = Q[2] * t152;
+    const real t154 = t149 - t153;
+    const real t155 = t145 + t154;
+    const real t156 = Q[2] * t126;
+    const real t157 = 2.0 * t156;
+    const real t158 = t155 - t157;
+    const real t159 = t143 + t158;
+    const real t160 = x[1] * Q[5];
+    const real t161 = t159 - t160;
+    const real t162 = t142 + t161;
+    const real t163 = theta[1] * Q[8];
+    const real t164 = t162 - t163;
+    const real t165 = t141 + t164;
+    const real t166 = t106 + t165;
+    B[6] = t166;
+    const real t167 = v[0] * 2.0;
+    const real t168 = t37 * t167;
+    const real t169 = t11 * t102;
+    const real t170 = t168 - t169;
+    const real t171 = v[0] * t34;
+    const real t172 = H[0] * d_u[0];
+    const real t173 = H[1] * d_u[1];
+    const real t174 = t172 + t173;
+    const real t175 = H[2] * d_u[2];
+    const real t176 = t174 + t175;
+    const real t177 = H[3] * d_u[3];
+    const real t178 = t176 + t177;
+    const real t179 = H[4] * d_u[4];
+    const real t180 = t178 + t179;
+    const real t181 = w[2] * t180;
+    const real t182 = w[0] * t116;
+    const real t183 = t181 - t182;
+    const real t184 = v[2] * t8;
+    const real t185 = t183 - t184;
+    const real t186 = t171 + t185;
+    const real t187 = H[5] * d_s[0];
+    const real t188 = H[6] * d_s[1];
+    const real t189 = t187 + t188;
+    const real t190 = H[7] * d_s[2];
+    const real t191 = t189 + t190;
+    const real t192 = H[8] * d_s[3];
+    const real t193 = t191 + t192;
+    const real t194 = H[9] * d_s[4];
+    const real t195 = t193 + t194;
+    const real t196 = t186 + t195;
+    const real t197 = theta[0] * Q[8];
+    const real t198 = x[0] * Q[5];
+    const real t199 = Q[2] * t180;
+    const real t200 = 2.0 * t199;
+    const real t201 = x[2] * Q[1];
+    const real t202 = x[1] * Q[2];
+    const real t203 = t201 - t202;
+    const real t204 = Q[2] * t203;
+    const real t205 = Q[0] * t148;
+    const real t206 = t204 - t205;
+    const real t207 = Q[0] * t116;
+    const real t208 = 2.0 * t207;
+    const real t209 = t206 - t208;
+    const real t210 = t200 + t209;
+    const real t211 = x[2] * Q[3];
+    const real t212 = t210 - t211;
+    const real t213 = t198 + t212;
+    const real t214 = theta[2] * Q[6];
+    const real t215 = t213 - t214;
+    const real t216 = t197 + t215;
+    const real t217 = t196 + t216;
+    const real t218 = t170 + t217;
+    B[7] = t218;
+    const real t219 = t11 * t104;
+    const real t220 = t24 * t167;
+    const real t221 = t219 - t220;
+    const real t222 = v[1] * t8;
+    const real t223 = w[0] * t126;
+    const real t224 = w[1] * t180;
+    const real t225 = t223 - t224;
+    const real t226 = t222 + t225;
+    const real t227 = v[0] * t21;
+    const real t228 = t226 - t227;
+    const real t229 = H[10] * d_s[0];
+    const real t230 = H[11] * d_s[1];
+    const real t231 = t229 + t230;
+    const real t232 = H[12] * d_s[2];
+    const real t233 = t231 + t232;
+    const real t234 = H[13] * d_s[3];
+    const real t235 = t233 + t234;
+    const real t236 = H[14] * d_s[4];
+    const real t237 = t235 + t236;
+    const real t238 = t228 + t237;
+    const real t239 = theta[1] * Q[6];
+    const real t240 = x[1] * Q[3];
+    const real t241 = Q[0] * t126;
+    const real t242 = 2.0 * t241;
+    const real t243 = Q[0] * t152;
+    const real t244 = Q[1] * t203;
+    const real t245 = t243 - t244;
+    const real t246 = t242 + t245;
+    const real t247 = Q[1] * t180;
+    const real t248 = 2.0 * t247;
+    const real t249 = t246 - t248;
+    const real t250 = t240 + t249;
+    const real t251 = x[0] * Q[4];
+    const real t252 = t250 - t251;
+    const real t253 = t239 + t252;
+    const real t254 = theta[0] * Q[7];
+    const real t255 = t253 - t254;
+    const real t256 = t238 + t255;
+    const real t257 = t221 + t256;
+    B[8] = t257;
+    const real t258 = theta[1] * f[2];
+    const real t259 = theta[2] * f[1];
+    const real t260 = t258 - t259;
+    G[0] = t260;
+    const real t261 = theta[2] * f[0];
+    const real t262 = theta[0] * f[2];
+    const real t263 = t261 - t262;
+    G[1] = t263;
+    const real t264 = theta[0] * f[1];
+    const real t265 = theta[1] * f[0];
+    const real t266 = t264 - t265;
+    G[2] = t266;
+    const real t267 = theta[1] * f[5];
+    const real t268 = x[1] * f[2];
+    const real t269 = x[2] * f[1];
+    const real t270 = t268 - t269;
+    const real t271 = theta[2] * f[4];
+    const real t272 = t270 - t271;
+    const real t273 = t267 + t272;
+    G[3] = t273;
+    const real t274 = theta[2] * f[3];
+    const real t275 = x[2] * f[0];
+    const real t276 = x[0] * f[2];
+    const real t277 = t275 - t276;
+    const real t278 = t274 + t277;
+    const real t279 = theta[0] * f[5];
+    const real t280 = t278 - t279;
+    G[4] = t280;
+    const real t281 = theta[0] * f[4];
+    const real t282 = x[0] * f[1];
+    const real t283 = x[1] * f[0];
+    const real t284 = t282 - t283;
+    const real t285 = theta[1] * f[3];
+    const real t286 = t284 - t285;
+    const real t287 = t281 + t286;
+    G[5] = t287;
+    const real t288 = d_s[0] * J[0];
+    const real t289 = t288 - laws[0];
+    row[0] = t289;
+    const real t290 = d_s[1] * J[1];
+    const real t291 = t290 - laws[1];
+    row[1] = t291;
+    const real t292 = d_s[2] * J[2];
+    const real t293 = t292 - laws[2];
+    row[2] = t293;
+    const real t294 = d_s[3] * J[3];
+    const real t295 = t294 - laws[3];
+    row[3] = t295;
+    const real t296 = d_s[4] * J[4];
+    const real t297 = t296 - laws[4];
+    row[4] = t297;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 5, "", 0, 0},
+    {"d_s", 5, "", 0, 0},
+    {"J", 5, "kg*m2 or kg", 0, 0},
+    {"laws", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 5, "", 0, 0},
 };
 
 /* rows of a hinge with 5 free speeds
@@ -6990,6 +7426,18 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_carrier,
+        .call = mstmm_sweep_generic5_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_carrier_outputs,
+        .ir_hash = "3a1cd1b1c6935fe0c00d67ee37b00438b309b4c983614d127e4d81d7471941b2",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic5_tangent_column,
         .call = mstmm_sweep_generic5_tangent_column_call,
@@ -6997,7 +7445,31 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_tangent_column_inputs,
         .outputs = mstmm_sweep_generic5_tangent_column_outputs,
-        .ir_hash = "81cc93dced262430dbb5e59b0e00ca80082532185cf7a3ca19cde410a4e4200b",
+        .ir_hash = "daba5d469bc40e0e2ae02644562ce07fd62b8a4b7674c95dd8f9222cebe71ef2",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_along,
+        .call = mstmm_sweep_generic5_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic5_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_along_outputs,
+        .ir_hash = "532ce798cb5dda96e61fd066a76417f7cecad2fe62e7af0b8f653b9e786e85fb",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_steady,
+        .call = mstmm_sweep_generic5_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic5_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_steady_outputs,
+        .ir_hash = "7ed85e7614f9de39fc4c57dd442e1fc7d20e6aaa22551a16ac2ae7c22dc5b98d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7079,7 +7551,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "8fe7280a6ef07e082b0e43baf006c39bb142e1ba3c7c46cfe1c7332d6a8b98e1",
+    .hash = "855dd16fe0abbeb8bd5920462bcfb7a1e55994d37722c052487dd06b4be0e59c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -7089,6 +7561,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic5_kernels,
 };

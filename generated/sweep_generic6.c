@@ -34,12 +34,22 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic6_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau);
+int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q);
+int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row);
+int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x);
+int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row);
 int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -4934,629 +4944,597 @@ static const mstmm_port mstmm_sweep_generic6_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 6 speeds
+/* motion of Q across a hinge with 6 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  R[3][3]
  * in  H[6][6]
  * in  s[6]
  * in  v[3]
  * in  w[3]
  * in  c[6]
  * in  motion[9]
- * in  f[6]
- * in  d_R[3][3]
- * in  d_d[3]
+ * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ */
+int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
+    const real *restrict v, const real *restrict w, const real *restrict c,
+    const real *restrict motion, real *restrict Q)
+{
+    const real t0 = motion[0] - w[0];
+    Q[0] = t0;
+    const real t1 = motion[1] - w[1];
+    Q[1] = t1;
+    const real t2 = motion[2] - w[2];
+    Q[2] = t2;
+    const real t3 = w[1] * t2;
+    const real t4 = w[2] * t1;
+    const real t5 = t3 - t4;
+    const real t6 = H[18] * s[0];
+    const real t7 = H[19] * s[1];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * s[2];
+    const real t10 = t8 + t9;
+    const real t11 = H[21] * s[3];
+    const real t12 = t10 + t11;
+    const real t13 = H[22] * s[4];
+    const real t14 = t12 + t13;
+    const real t15 = H[23] * s[5];
+    const real t16 = t14 + t15;
+    const real t17 = c[3] + t16;
+    const real t18 = t5 - t17;
+    const real t19 = motion[3] + t18;
+    Q[3] = t19;
+    const real t20 = w[2] * t0;
+    const real t21 = w[0] * t2;
+    const real t22 = t20 - t21;
+    const real t23 = H[24] * s[0];
+    const real t24 = H[25] * s[1];
+    const real t25 = t23 + t24;
+    const real t26 = H[26] * s[2];
+    const real t27 = t25 + t26;
+    const real t28 = H[27] * s[3];
+    const real t29 = t27 + t28;
+    const real t30 = H[28] * s[4];
+    const real t31 = t29 + t30;
+    const real t32 = H[29] * s[5];
+    const real t33 = t31 + t32;
+    const real t34 = c[4] + t33;
+    const real t35 = t22 - t34;
+    const real t36 = motion[4] + t35;
+    Q[4] = t36;
+    const real t37 = w[0] * t1;
+    const real t38 = w[1] * t0;
+    const real t39 = t37 - t38;
+    const real t40 = H[30] * s[0];
+    const real t41 = H[31] * s[1];
+    const real t42 = t40 + t41;
+    const real t43 = H[32] * s[2];
+    const real t44 = t42 + t43;
+    const real t45 = H[33] * s[3];
+    const real t46 = t44 + t45;
+    const real t47 = H[34] * s[4];
+    const real t48 = t46 + t47;
+    const real t49 = H[35] * s[5];
+    const real t50 = t48 + t49;
+    const real t51 = c[5] + t50;
+    const real t52 = t39 - t51;
+    const real t53 = motion[5] + t52;
+    Q[5] = t53;
+    const real t54 = v[1] * t2;
+    const real t55 = t54 * 2.0;
+    const real t56 = v[2] * t1;
+    const real t57 = 2.0 * t56;
+    const real t58 = t55 - t57;
+    const real t59 = H[0] * s[0];
+    const real t60 = H[1] * s[1];
+    const real t61 = t59 + t60;
+    const real t62 = H[2] * s[2];
+    const real t63 = t61 + t62;
+    const real t64 = H[3] * s[3];
+    const real t65 = t63 + t64;
+    const real t66 = H[4] * s[4];
+    const real t67 = t65 + t66;
+    const real t68 = H[5] * s[5];
+    const real t69 = t67 + t68;
+    const real t70 = c[0] + t69;
+    const real t71 = t58 - t70;
+    const real t72 = motion[6] + t71;
+    Q[6] = t72;
+    const real t73 = v[2] * t0;
+    const real t74 = 2.0 * t73;
+    const real t75 = v[0] * t2;
+    const real t76 = 2.0 * t75;
+    const real t77 = t74 - t76;
+    const real t78 = H[6] * s[0];
+    const real t79 = H[7] * s[1];
+    const real t80 = t78 + t79;
+    const real t81 = H[8] * s[2];
+    const real t82 = t80 + t81;
+    const real t83 = H[9] * s[3];
+    const real t84 = t82 + t83;
+    const real t85 = H[10] * s[4];
+    const real t86 = t84 + t85;
+    const real t87 = H[11] * s[5];
+    const real t88 = t86 + t87;
+    const real t89 = c[1] + t88;
+    const real t90 = t77 - t89;
+    const real t91 = motion[7] + t90;
+    Q[7] = t91;
+    const real t92 = v[0] * t1;
+    const real t93 = 2.0 * t92;
+    const real t94 = v[1] * t0;
+    const real t95 = 2.0 * t94;
+    const real t96 = t93 - t95;
+    const real t97 = H[12] * s[0];
+    const real t98 = H[13] * s[1];
+    const real t99 = t97 + t98;
+    const real t100 = H[14] * s[2];
+    const real t101 = t99 + t100;
+    const real t102 = H[15] * s[3];
+    const real t103 = t101 + t102;
+    const real t104 = H[16] * s[4];
+    const real t105 = t103 + t104;
+    const real t106 = H[17] * s[5];
+    const real t107 = t105 + t106;
+    const real t108 = c[2] + t107;
+    const real t109 = t96 - t108;
+    const real t110 = motion[8] + t109;
+    Q[8] = t110;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_carrier_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_carrier_inputs[] = {
+    {"H", 36, "", 0, 0},
+    {"s", 6, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_carrier_outputs[] = {
+    {"Q", 9, "", 0, 0},
+};
+
+/* a direction of a hinge with 6 speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][6]
+ * in  s[6]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
  * in  d_H[6][6]
  * in  d_v[3]
  * in  d_w[3]
  * in  d_c[6]
  * in  d_s[6]
- * out B[9]
- * out G[6]
- * out d_tau[6]
+ * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[6] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[6] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic6_tangent_column(const real *restrict R, const real *restrict H,
-    const real *restrict s, const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, const real *restrict f, const real *restrict d_R,
-    const real *restrict d_d, const real *restrict d_H, const real *restrict d_v,
-    const real *restrict d_w, const real *restrict d_c, const real *restrict d_s, real *restrict B,
-    real *restrict G, real *restrict d_tau)
+int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
+    const real *restrict Q, const real *restrict f, const real *restrict d_H,
+    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
+    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
+    real *restrict G, real *restrict row)
 {
-    const real t0 = R[0] * d_R[0];
-    const real t1 = R[3] * d_R[3];
-    const real t2 = t0 + t1;
-    const real t3 = R[6] * d_R[6];
-    const real t4 = t2 + t3;
-    const real t5 = motion[0] - w[0];
-    const real t6 = t4 * t5;
-    const real t7 = R[0] * d_R[1];
-    const real t8 = R[3] * d_R[4];
-    const real t9 = t7 + t8;
-    const real t10 = R[6] * d_R[7];
-    const real t11 = t9 + t10;
-    const real t12 = motion[1] - w[1];
-    const real t13 = t11 * t12;
-    const real t14 = t6 + t13;
-    const real t15 = R[0] * d_R[2];
-    const real t16 = R[3] * d_R[5];
+    const real t0 = theta[2] * Q[1];
+    const real t1 = theta[1] * Q[2];
+    const real t2 = t0 - t1;
+    const real t3 = d_w[0] + t2;
+    B[0] = t3;
+    const real t4 = theta[0] * Q[2];
+    const real t5 = theta[2] * Q[0];
+    const real t6 = t4 - t5;
+    const real t7 = d_w[1] + t6;
+    B[1] = t7;
+    const real t8 = theta[1] * Q[0];
+    const real t9 = theta[0] * Q[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_w[2] + t10;
+    B[2] = t11;
+    const real t12 = w[2] * t6;
+    const real t13 = w[1] * t10;
+    const real t14 = t12 - t13;
+    const real t15 = H[18] * d_s[0];
+    const real t16 = H[19] * d_s[1];
     const real t17 = t15 + t16;
-    const real t18 = R[6] * d_R[8];
+    const real t18 = H[20] * d_s[2];
     const real t19 = t17 + t18;
-    const real t20 = motion[2] - w[2];
-    const real t21 = t19 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = d_w[0] - t22;
-    B[0] = t23;
-    const real t24 = R[1] * d_R[0];
-    const real t25 = R[4] * d_R[3];
-    const real t26 = t24 + t25;
-    const real t27 = R[7] * d_R[6];
+    const real t20 = H[21] * d_s[3];
+    const real t21 = t19 + t20;
+    const real t22 = H[22] * d_s[4];
+    const real t23 = t21 + t22;
+    const real t24 = H[23] * d_s[5];
+    const real t25 = t23 + t24;
+    const real t26 = s[0] * d_H[18];
+    const real t27 = s[1] * d_H[19];
     const real t28 = t26 + t27;
-    const real t29 = t28 * t5;
-    const real t30 = R[1] * d_R[1];
-    const real t31 = R[4] * d_R[4];
+    const real t29 = s[2] * d_H[20];
+    const real t30 = t28 + t29;
+    const real t31 = s[3] * d_H[21];
     const real t32 = t30 + t31;
-    const real t33 = R[7] * d_R[7];
+    const real t33 = s[4] * d_H[22];
     const real t34 = t32 + t33;
-    const real t35 = t34 * t12;
-    const real t36 = t29 + t35;
-    const real t37 = R[1] * d_R[2];
-    const real t38 = R[4] * d_R[5];
-    const real t39 = t37 + t38;
-    const real t40 = R[7] * d_R[8];
-    const real t41 = t39 + t40;
-    const real t42 = t41 * t20;
-    const real t43 = t36 + t42;
-    const real t44 = d_w[1] - t43;
-    B[1] = t44;
-    const real t45 = R[2] * d_R[0];
-    const real t46 = R[5] * d_R[3];
-    const real t47 = t45 + t46;
-    const real t48 = R[8] * d_R[6];
-    const real t49 = t47 + t48;
-    const real t50 = t49 * t5;
-    const real t51 = R[2] * d_R[1];
-    const real t52 = R[5] * d_R[4];
+    const real t35 = s[5] * d_H[23];
+    const real t36 = t34 + t35;
+    const real t37 = t25 + t36;
+    const real t38 = d_c[3] + t37;
+    const real t39 = theta[2] * Q[4];
+    const real t40 = Q[1] * d_w[2];
+    const real t41 = Q[2] * d_w[1];
+    const real t42 = t40 - t41;
+    const real t43 = t39 + t42;
+    const real t44 = theta[1] * Q[5];
+    const real t45 = t43 - t44;
+    const real t46 = t38 + t45;
+    const real t47 = t14 + t46;
+    B[3] = t47;
+    const real t48 = w[0] * t10;
+    const real t49 = w[2] * t2;
+    const real t50 = t48 - t49;
+    const real t51 = H[24] * d_s[0];
+    const real t52 = H[25] * d_s[1];
     const real t53 = t51 + t52;
-    const real t54 = R[8] * d_R[7];
+    const real t54 = H[26] * d_s[2];
     const real t55 = t53 + t54;
-    const real t56 = t55 * t12;
-    const real t57 = t50 + t56;
-    const real t58 = R[2] * d_R[2];
-    const real t59 = R[5] * d_R[5];
-    const real t60 = t58 + t59;
-    const real t61 = R[8] * d_R[8];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t20;
-    const real t64 = t57 + t63;
-    const real t65 = d_w[2] - t64;
-    B[2] = t65;
-    const real t66 = H[18] * d_s[0];
-    const real t67 = H[19] * d_s[1];
+    const real t56 = H[27] * d_s[3];
+    const real t57 = t55 + t56;
+    const real t58 = H[28] * d_s[4];
+    const real t59 = t57 + t58;
+    const real t60 = H[29] * d_s[5];
+    const real t61 = t59 + t60;
+    const real t62 = s[0] * d_H[24];
+    const real t63 = s[1] * d_H[25];
+    const real t64 = t62 + t63;
+    const real t65 = s[2] * d_H[26];
+    const real t66 = t64 + t65;
+    const real t67 = s[3] * d_H[27];
     const real t68 = t66 + t67;
-    const real t69 = H[20] * d_s[2];
+    const real t69 = s[4] * d_H[28];
     const real t70 = t68 + t69;
-    const real t71 = H[21] * d_s[3];
+    const real t71 = s[5] * d_H[29];
     const real t72 = t70 + t71;
-    const real t73 = H[22] * d_s[4];
-    const real t74 = t72 + t73;
-    const real t75 = H[23] * d_s[5];
-    const real t76 = t74 + t75;
-    const real t77 = s[0] * d_H[18];
-    const real t78 = s[1] * d_H[19];
-    const real t79 = t77 + t78;
-    const real t80 = s[2] * d_H[20];
-    const real t81 = t79 + t80;
-    const real t82 = s[3] * d_H[21];
-    const real t83 = t81 + t82;
-    const real t84 = s[4] * d_H[22];
-    const real t85 = t83 + t84;
-    const real t86 = s[5] * d_H[23];
-    const real t87 = t85 + t86;
-    const real t88 = t76 + t87;
-    const real t89 = d_c[3] + t88;
-    const real t90 = d_w[2] * t12;
-    const real t91 = d_w[1] * t20;
-    const real t92 = t90 - t91;
-    const real t93 = t89 + t92;
-    const real t94 = w[1] * t64;
-    const real t95 = w[2] * t43;
-    const real t96 = t94 - t95;
-    const real t97 = w[1] * t20;
-    const real t98 = w[2] * t12;
-    const real t99 = t97 - t98;
-    const real t100 = H[18] * s[0];
-    const real t101 = H[19] * s[1];
+    const real t73 = t61 + t72;
+    const real t74 = d_c[4] + t73;
+    const real t75 = theta[0] * Q[5];
+    const real t76 = Q[2] * d_w[0];
+    const real t77 = Q[0] * d_w[2];
+    const real t78 = t76 - t77;
+    const real t79 = theta[2] * Q[3];
+    const real t80 = t78 - t79;
+    const real t81 = t75 + t80;
+    const real t82 = t74 + t81;
+    const real t83 = t50 + t82;
+    B[4] = t83;
+    const real t84 = w[1] * t2;
+    const real t85 = w[0] * t6;
+    const real t86 = t84 - t85;
+    const real t87 = H[30] * d_s[0];
+    const real t88 = H[31] * d_s[1];
+    const real t89 = t87 + t88;
+    const real t90 = H[32] * d_s[2];
+    const real t91 = t89 + t90;
+    const real t92 = H[33] * d_s[3];
+    const real t93 = t91 + t92;
+    const real t94 = H[34] * d_s[4];
+    const real t95 = t93 + t94;
+    const real t96 = H[35] * d_s[5];
+    const real t97 = t95 + t96;
+    const real t98 = s[0] * d_H[30];
+    const real t99 = s[1] * d_H[31];
+    const real t100 = t98 + t99;
+    const real t101 = s[2] * d_H[32];
     const real t102 = t100 + t101;
-    const real t103 = H[20] * s[2];
+    const real t103 = s[3] * d_H[33];
     const real t104 = t102 + t103;
-    const real t105 = H[21] * s[3];
+    const real t105 = s[4] * d_H[34];
     const real t106 = t104 + t105;
-    const real t107 = H[22] * s[4];
+    const real t107 = s[5] * d_H[35];
     const real t108 = t106 + t107;
-    const real t109 = H[23] * s[5];
-    const real t110 = t108 + t109;
-    const real t111 = c[3] + t110;
-    const real t112 = t99 - t111;
-    const real t113 = motion[3] + t112;
-    const real t114 = t4 * t113;
-    const real t115 = w[2] * t5;
-    const real t116 = w[0] * t20;
+    const real t109 = t97 + t108;
+    const real t110 = d_c[5] + t109;
+    const real t111 = theta[1] * Q[3];
+    const real t112 = Q[0] * d_w[1];
+    const real t113 = Q[1] * d_w[0];
+    const real t114 = t112 - t113;
+    const real t115 = t111 + t114;
+    const real t116 = theta[0] * Q[4];
     const real t117 = t115 - t116;
-    const real t118 = H[24] * s[0];
-    const real t119 = H[25] * s[1];
-    const real t120 = t118 + t119;
-    const real t121 = H[26] * s[2];
-    const real t122 = t120 + t121;
-    const real t123 = H[27] * s[3];
-    const real t124 = t122 + t123;
-    const real t125 = H[28] * s[4];
-    const real t126 = t124 + t125;
-    const real t127 = H[29] * s[5];
-    const real t128 = t126 + t127;
-    const real t129 = c[4] + t128;
-    const real t130 = t117 - t129;
-    const real t131 = motion[4] + t130;
-    const real t132 = t11 * t131;
-    const real t133 = t114 + t132;
-    const real t134 = w[0] * t12;
-    const real t135 = w[1] * t5;
-    const real t136 = t134 - t135;
-    const real t137 = H[30] * s[0];
-    const real t138 = H[31] * s[1];
-    const real t139 = t137 + t138;
-    const real t140 = H[32] * s[2];
-    const real t141 = t139 + t140;
-    const real t142 = H[33] * s[3];
-    const real t143 = t141 + t142;
-    const real t144 = H[34] * s[4];
-    const real t145 = t143 + t144;
-    const real t146 = H[35] * s[5];
-    const real t147 = t145 + t146;
-    const real t148 = c[5] + t147;
-    const real t149 = t136 - t148;
-    const real t150 = motion[5] + t149;
-    const real t151 = t19 * t150;
-    const real t152 = t133 + t151;
-    const real t153 = t96 - t152;
-    const real t154 = t93 + t153;
-    B[3] = t154;
-    const real t155 = H[24] * d_s[0];
-    const real t156 = H[25] * d_s[1];
-    const real t157 = t155 + t156;
-    const real t158 = H[26] * d_s[2];
-    const real t159 = t157 + t158;
-    const real t160 = H[27] * d_s[3];
-    const real t161 = t159 + t160;
-    const real t162 = H[28] * d_s[4];
-    const real t163 = t161 + t162;
-    const real t164 = H[29] * d_s[5];
-    const real t165 = t163 + t164;
-    const real t166 = s[0] * d_H[24];
-    const real t167 = s[1] * d_H[25];
-    const real t168 = t166 + t167;
-    const real t169 = s[2] * d_H[26];
-    const real t170 = t168 + t169;
-    const real t171 = s[3] * d_H[27];
-    const real t172 = t170 + t171;
-    const real t173 = s[4] * d_H[28];
-    const real t174 = t172 + t173;
-    const real t175 = s[5] * d_H[29];
-    const real t176 = t174 + t175;
-    const real t177 = t165 + t176;
-    const real t178 = d_c[4] + t177;
-    const real t179 = d_w[0] * t20;
-    const real t180 = d_w[2] * t5;
-    const real t181 = t179 - t180;
-    const real t182 = t178 + t181;
-    const real t183 = w[2] * t22;
-    const real t184 = w[0] * t64;
-    const real t185 = t183 - t184;
-    const real t186 = t28 * t113;
-    const real t187 = t34 * t131;
+    const real t118 = t110 + t117;
+    const real t119 = t86 + t118;
+    B[5] = t119;
+    const real t120 = v[2] * 2.0;
+    const real t121 = t6 * t120;
+    const real t122 = v[1] * 2.0;
+    const real t123 = t10 * t122;
+    const real t124 = t121 - t123;
+    const real t125 = H[0] * d_s[0];
+    const real t126 = H[1] * d_s[1];
+    const real t127 = t125 + t126;
+    const real t128 = H[2] * d_s[2];
+    const real t129 = t127 + t128;
+    const real t130 = H[3] * d_s[3];
+    const real t131 = t129 + t130;
+    const real t132 = H[4] * d_s[4];
+    const real t133 = t131 + t132;
+    const real t134 = H[5] * d_s[5];
+    const real t135 = t133 + t134;
+    const real t136 = s[0] * d_H[0];
+    const real t137 = s[1] * d_H[1];
+    const real t138 = t136 + t137;
+    const real t139 = s[2] * d_H[2];
+    const real t140 = t138 + t139;
+    const real t141 = s[3] * d_H[3];
+    const real t142 = t140 + t141;
+    const real t143 = s[4] * d_H[4];
+    const real t144 = t142 + t143;
+    const real t145 = s[5] * d_H[5];
+    const real t146 = t144 + t145;
+    const real t147 = t135 + t146;
+    const real t148 = d_c[0] + t147;
+    const real t149 = theta[2] * Q[7];
+    const real t150 = x[2] * Q[4];
+    const real t151 = Q[1] * d_v[2];
+    const real t152 = 2.0 * t151;
+    const real t153 = x[1] * Q[0];
+    const real t154 = x[0] * Q[1];
+    const real t155 = t153 - t154;
+    const real t156 = Q[1] * t155;
+    const real t157 = x[0] * Q[2];
+    const real t158 = x[2] * Q[0];
+    const real t159 = t157 - t158;
+    const real t160 = Q[2] * t159;
+    const real t161 = t156 - t160;
+    const real t162 = t152 + t161;
+    const real t163 = Q[2] * d_v[1];
+    const real t164 = 2.0 * t163;
+    const real t165 = t162 - t164;
+    const real t166 = t150 + t165;
+    const real t167 = x[1] * Q[5];
+    const real t168 = t166 - t167;
+    const real t169 = t149 + t168;
+    const real t170 = theta[1] * Q[8];
+    const real t171 = t169 - t170;
+    const real t172 = t148 + t171;
+    const real t173 = t124 + t172;
+    B[6] = t173;
+    const real t174 = v[0] * 2.0;
+    const real t175 = t10 * t174;
+    const real t176 = t2 * t120;
+    const real t177 = t175 - t176;
+    const real t178 = H[6] * d_s[0];
+    const real t179 = H[7] * d_s[1];
+    const real t180 = t178 + t179;
+    const real t181 = H[8] * d_s[2];
+    const real t182 = t180 + t181;
+    const real t183 = H[9] * d_s[3];
+    const real t184 = t182 + t183;
+    const real t185 = H[10] * d_s[4];
+    const real t186 = t184 + t185;
+    const real t187 = H[11] * d_s[5];
     const real t188 = t186 + t187;
-    const real t189 = t41 * t150;
-    const real t190 = t188 + t189;
-    const real t191 = t185 - t190;
-    const real t192 = t182 + t191;
-    B[4] = t192;
-    const real t193 = H[30] * d_s[0];
-    const real t194 = H[31] * d_s[1];
+    const real t189 = s[0] * d_H[6];
+    const real t190 = s[1] * d_H[7];
+    const real t191 = t189 + t190;
+    const real t192 = s[2] * d_H[8];
+    const real t193 = t191 + t192;
+    const real t194 = s[3] * d_H[9];
     const real t195 = t193 + t194;
-    const real t196 = H[32] * d_s[2];
+    const real t196 = s[4] * d_H[10];
     const real t197 = t195 + t196;
-    const real t198 = H[33] * d_s[3];
+    const real t198 = s[5] * d_H[11];
     const real t199 = t197 + t198;
-    const real t200 = H[34] * d_s[4];
-    const real t201 = t199 + t200;
-    const real t202 = H[35] * d_s[5];
-    const real t203 = t201 + t202;
-    const real t204 = s[0] * d_H[30];
-    const real t205 = s[1] * d_H[31];
-    const real t206 = t204 + t205;
-    const real t207 = s[2] * d_H[32];
-    const real t208 = t206 + t207;
-    const real t209 = s[3] * d_H[33];
-    const real t210 = t208 + t209;
-    const real t211 = s[4] * d_H[34];
-    const real t212 = t210 + t211;
-    const real t213 = s[5] * d_H[35];
-    const real t214 = t212 + t213;
-    const real t215 = t203 + t214;
-    const real t216 = d_c[5] + t215;
-    const real t217 = d_w[1] * t5;
-    const real t218 = d_w[0] * t12;
-    const real t219 = t217 - t218;
-    const real t220 = t216 + t219;
-    const real t221 = w[0] * t43;
-    const real t222 = w[1] * t22;
-    const real t223 = t221 - t222;
-    const real t224 = t49 * t113;
-    const real t225 = t55 * t131;
-    const real t226 = t224 + t225;
-    const real t227 = t62 * t150;
-    const real t228 = t226 + t227;
-    const real t229 = t223 - t228;
-    const real t230 = t220 + t229;
-    B[5] = t230;
-    const real t231 = H[0] * d_s[0];
-    const real t232 = H[1] * d_s[1];
+    const real t200 = t188 + t199;
+    const real t201 = d_c[1] + t200;
+    const real t202 = theta[0] * Q[8];
+    const real t203 = x[0] * Q[5];
+    const real t204 = Q[2] * d_v[0];
+    const real t205 = 2.0 * t204;
+    const real t206 = x[2] * Q[1];
+    const real t207 = x[1] * Q[2];
+    const real t208 = t206 - t207;
+    const real t209 = Q[2] * t208;
+    const real t210 = Q[0] * t155;
+    const real t211 = t209 - t210;
+    const real t212 = Q[0] * d_v[2];
+    const real t213 = 2.0 * t212;
+    const real t214 = t211 - t213;
+    const real t215 = t205 + t214;
+    const real t216 = x[2] * Q[3];
+    const real t217 = t215 - t216;
+    const real t218 = t203 + t217;
+    const real t219 = theta[2] * Q[6];
+    const real t220 = t218 - t219;
+    const real t221 = t202 + t220;
+    const real t222 = t201 + t221;
+    const real t223 = t177 + t222;
+    B[7] = t223;
+    const real t224 = t2 * t122;
+    const real t225 = t6 * t174;
+    const real t226 = t224 - t225;
+    const real t227 = H[12] * d_s[0];
+    const real t228 = H[13] * d_s[1];
+    const real t229 = t227 + t228;
+    const real t230 = H[14] * d_s[2];
+    const real t231 = t229 + t230;
+    const real t232 = H[15] * d_s[3];
     const real t233 = t231 + t232;
-    const real t234 = H[2] * d_s[2];
+    const real t234 = H[16] * d_s[4];
     const real t235 = t233 + t234;
-    const real t236 = H[3] * d_s[3];
+    const real t236 = H[17] * d_s[5];
     const real t237 = t235 + t236;
-    const real t238 = H[4] * d_s[4];
-    const real t239 = t237 + t238;
-    const real t240 = H[5] * d_s[5];
-    const real t241 = t239 + t240;
-    const real t242 = s[0] * d_H[0];
-    const real t243 = s[1] * d_H[1];
+    const real t238 = s[0] * d_H[12];
+    const real t239 = s[1] * d_H[13];
+    const real t240 = t238 + t239;
+    const real t241 = s[2] * d_H[14];
+    const real t242 = t240 + t241;
+    const real t243 = s[3] * d_H[15];
     const real t244 = t242 + t243;
-    const real t245 = s[2] * d_H[2];
+    const real t245 = s[4] * d_H[16];
     const real t246 = t244 + t245;
-    const real t247 = s[3] * d_H[3];
+    const real t247 = s[5] * d_H[17];
     const real t248 = t246 + t247;
-    const real t249 = s[4] * d_H[4];
-    const real t250 = t248 + t249;
-    const real t251 = s[5] * d_H[5];
-    const real t252 = t250 + t251;
-    const real t253 = t241 + t252;
-    const real t254 = d_c[0] + t253;
-    const real t255 = d_v[2] * t12;
-    const real t256 = 2.0 * t255;
-    const real t257 = d_v[1] * t20;
-    const real t258 = 2.0 * t257;
-    const real t259 = t256 - t258;
-    const real t260 = t254 + t259;
-    const real t261 = R[1] * d_d[0];
-    const real t262 = R[4] * d_d[1];
-    const real t263 = t261 + t262;
-    const real t264 = R[7] * d_d[2];
-    const real t265 = t263 + t264;
-    const real t266 = t5 * t12;
-    const real t267 = t265 * t266;
-    const real t268 = R[0] * d_d[0];
-    const real t269 = R[3] * d_d[1];
-    const real t270 = t268 + t269;
-    const real t271 = R[6] * d_d[2];
-    const real t272 = t270 + t271;
-    const real t273 = t12 * t12;
-    const real t274 = t20 * t20;
-    const real t275 = t273 + t274;
-    const real t276 = t272 * t275;
-    const real t277 = t267 - t276;
-    const real t278 = R[2] * d_d[0];
-    const real t279 = R[5] * d_d[1];
-    const real t280 = t278 + t279;
-    const real t281 = R[8] * d_d[2];
-    const real t282 = t280 + t281;
-    const real t283 = t5 * t20;
-    const real t284 = t282 * t283;
-    const real t285 = t277 + t284;
-    const real t286 = v[1] * 2.0;
-    const real t287 = t64 * t286;
-    const real t288 = v[2] * 2.0;
-    const real t289 = t43 * t288;
-    const real t290 = t287 - t289;
-    const real t291 = t282 * t131;
-    const real t292 = t265 * t150;
-    const real t293 = t291 - t292;
-    const real t294 = t290 + t293;
-    const real t295 = t285 + t294;
-    const real t296 = v[1] * t20;
-    const real t297 = t296 * 2.0;
-    const real t298 = v[2] * t12;
-    const real t299 = 2.0 * t298;
-    const real t300 = t297 - t299;
-    const real t301 = H[0] * s[0];
-    const real t302 = H[1] * s[1];
+    const real t249 = t237 + t248;
+    const real t250 = d_c[2] + t249;
+    const real t251 = theta[1] * Q[6];
+    const real t252 = x[1] * Q[3];
+    const real t253 = Q[0] * d_v[1];
+    const real t254 = 2.0 * t253;
+    const real t255 = Q[0] * t159;
+    const real t256 = Q[1] * t208;
+    const real t257 = t255 - t256;
+    const real t258 = t254 + t257;
+    const real t259 = Q[1] * d_v[0];
+    const real t260 = 2.0 * t259;
+    const real t261 = t258 - t260;
+    const real t262 = t252 + t261;
+    const real t263 = x[0] * Q[4];
+    const real t264 = t262 - t263;
+    const real t265 = t251 + t264;
+    const real t266 = theta[0] * Q[7];
+    const real t267 = t265 - t266;
+    const real t268 = t250 + t267;
+    const real t269 = t226 + t268;
+    B[8] = t269;
+    const real t270 = theta[1] * f[2];
+    const real t271 = theta[2] * f[1];
+    const real t272 = t270 - t271;
+    G[0] = t272;
+    const real t273 = theta[2] * f[0];
+    const real t274 = theta[0] * f[2];
+    const real t275 = t273 - t274;
+    G[1] = t275;
+    const real t276 = theta[0] * f[1];
+    const real t277 = theta[1] * f[0];
+    const real t278 = t276 - t277;
+    G[2] = t278;
+    const real t279 = theta[1] * f[5];
+    const real t280 = x[1] * f[2];
+    const real t281 = x[2] * f[1];
+    const real t282 = t280 - t281;
+    const real t283 = theta[2] * f[4];
+    const real t284 = t282 - t283;
+    const real t285 = t279 + t284;
+    G[3] = t285;
+    const real t286 = theta[2] * f[3];
+    const real t287 = x[2] * f[0];
+    const real t288 = x[0] * f[2];
+    const real t289 = t287 - t288;
+    const real t290 = t286 + t289;
+    const real t291 = theta[0] * f[5];
+    const real t292 = t290 - t291;
+    G[4] = t292;
+    const real t293 = theta[0] * f[4];
+    const real t294 = x[0] * f[1];
+    const real t295 = x[1] * f[0];
+    const real t296 = t294 - t295;
+    const real t297 = theta[1] * f[3];
+    const real t298 = t296 - t297;
+    const real t299 = t293 + t298;
+    G[5] = t299;
+    const real t300 = d_s[0] * J[0];
+    const real t301 = f[0] * d_H[0];
+    const real t302 = f[1] * d_H[6];
     const real t303 = t301 + t302;
-    const real t304 = H[2] * s[2];
+    const real t304 = f[2] * d_H[12];
     const real t305 = t303 + t304;
-    const real t306 = H[3] * s[3];
+    const real t306 = f[3] * d_H[18];
     const real t307 = t305 + t306;
-    const real t308 = H[4] * s[4];
+    const real t308 = f[4] * d_H[24];
     const real t309 = t307 + t308;
-    const real t310 = H[5] * s[5];
+    const real t310 = f[5] * d_H[30];
     const real t311 = t309 + t310;
-    const real t312 = c[0] + t311;
-    const real t313 = t300 - t312;
-    const real t314 = motion[6] + t313;
-    const real t315 = t4 * t314;
-    const real t316 = v[2] * t5;
-    const real t317 = 2.0 * t316;
-    const real t318 = v[0] * t20;
-    const real t319 = 2.0 * t318;
-    const real t320 = t317 - t319;
-    const real t321 = H[6] * s[0];
-    const real t322 = H[7] * s[1];
+    const real t312 = t311 - laws[0];
+    const real t313 = t300 + t312;
+    row[0] = t313;
+    const real t314 = d_s[1] * J[1];
+    const real t315 = f[0] * d_H[1];
+    const real t316 = f[1] * d_H[7];
+    const real t317 = t315 + t316;
+    const real t318 = f[2] * d_H[13];
+    const real t319 = t317 + t318;
+    const real t320 = f[3] * d_H[19];
+    const real t321 = t319 + t320;
+    const real t322 = f[4] * d_H[25];
     const real t323 = t321 + t322;
-    const real t324 = H[8] * s[2];
+    const real t324 = f[5] * d_H[31];
     const real t325 = t323 + t324;
-    const real t326 = H[9] * s[3];
-    const real t327 = t325 + t326;
-    const real t328 = H[10] * s[4];
-    const real t329 = t327 + t328;
-    const real t330 = H[11] * s[5];
+    const real t326 = t325 - laws[1];
+    const real t327 = t314 + t326;
+    row[1] = t327;
+    const real t328 = d_s[2] * J[2];
+    const real t329 = f[0] * d_H[2];
+    const real t330 = f[1] * d_H[8];
     const real t331 = t329 + t330;
-    const real t332 = c[1] + t331;
-    const real t333 = t320 - t332;
-    const real t334 = motion[7] + t333;
-    const real t335 = t11 * t334;
-    const real t336 = t315 + t335;
-    const real t337 = v[0] * t12;
-    const real t338 = 2.0 * t337;
-    const real t339 = v[1] * t5;
-    const real t340 = 2.0 * t339;
-    const real t341 = t338 - t340;
-    const real t342 = H[12] * s[0];
-    const real t343 = H[13] * s[1];
-    const real t344 = t342 + t343;
-    const real t345 = H[14] * s[2];
-    const real t346 = t344 + t345;
-    const real t347 = H[15] * s[3];
-    const real t348 = t346 + t347;
-    const real t349 = H[16] * s[4];
-    const real t350 = t348 + t349;
-    const real t351 = H[17] * s[5];
-    const real t352 = t350 + t351;
-    const real t353 = c[2] + t352;
-    const real t354 = t341 - t353;
-    const real t355 = motion[8] + t354;
-    const real t356 = t19 * t355;
-    const real t357 = t336 + t356;
-    const real t358 = t295 - t357;
-    const real t359 = t260 + t358;
-    B[6] = t359;
-    const real t360 = H[6] * d_s[0];
-    const real t361 = H[7] * d_s[1];
-    const real t362 = t360 + t361;
-    const real t363 = H[8] * d_s[2];
-    const real t364 = t362 + t363;
-    const real t365 = H[9] * d_s[3];
-    const real t366 = t364 + t365;
-    const real t367 = H[10] * d_s[4];
-    const real t368 = t366 + t367;
-    const real t369 = H[11] * d_s[5];
-    const real t370 = t368 + t369;
-    const real t371 = s[0] * d_H[6];
-    const real t372 = s[1] * d_H[7];
+    const real t332 = f[2] * d_H[14];
+    const real t333 = t331 + t332;
+    const real t334 = f[3] * d_H[20];
+    const real t335 = t333 + t334;
+    const real t336 = f[4] * d_H[26];
+    const real t337 = t335 + t336;
+    const real t338 = f[5] * d_H[32];
+    const real t339 = t337 + t338;
+    const real t340 = t339 - laws[2];
+    const real t341 = t328 + t340;
+    row[2] = t341;
+    const real t342 = d_s[3] * J[3];
+    const real t343 = f[0] * d_H[3];
+    const real t344 = f[1] * d_H[9];
+    const real t345 = t343 + t344;
+    const real t346 = f[2] * d_H[15];
+    const real t347 = t345 + t346;
+    const real t348 = f[3] * d_H[21];
+    const real t349 = t347 + t348;
+    const real t350 = f[4] * d_H[27];
+    const real t351 = t349 + t350;
+    const real t352 = f[5] * d_H[33];
+    const real t353 = t351 + t352;
+    const real t354 = t353 - laws[3];
+    const real t355 = t342 + t354;
+    row[3] = t355;
+    const real t356 = d_s[4] * J[4];
+    const real t357 = f[0] * d_H[4];
+    const real t358 = f[1] * d_H[10];
+    const real t359 = t357 + t358;
+    const real t360 = f[2] * d_H[16];
+    const real t361 = t359 + t360;
+    const real t362 = f[3] * d_H[22];
+    const real t363 = t361 + t362;
+    const real t364 = f[4] * d_H[28];
+    const real t365 = t363 + t364;
+    const real t366 = f[5] * d_H[34];
+    const real t367 = t365 + t366;
+    const real t368 = t367 - laws[4];
+    const real t369 = t356 + t368;
+    row[4] = t369;
+    const real t370 = d_s[5] * J[5];
+    const real t371 = f[0] * d_H[5];
+    const real t372 = f[1] * d_H[11];
     const real t373 = t371 + t372;
-    const real t374 = s[2] * d_H[8];
+    const real t374 = f[2] * d_H[17];
     const real t375 = t373 + t374;
-    const real t376 = s[3] * d_H[9];
+    const real t376 = f[3] * d_H[23];
     const real t377 = t375 + t376;
-    const real t378 = s[4] * d_H[10];
+    const real t378 = f[4] * d_H[29];
     const real t379 = t377 + t378;
-    const real t380 = s[5] * d_H[11];
+    const real t380 = f[5] * d_H[35];
     const real t381 = t379 + t380;
-    const real t382 = t370 + t381;
-    const real t383 = d_c[1] + t382;
-    const real t384 = d_v[0] * t20;
-    const real t385 = 2.0 * t384;
-    const real t386 = d_v[2] * t5;
-    const real t387 = 2.0 * t386;
-    const real t388 = t385 - t387;
-    const real t389 = t383 + t388;
-    const real t390 = t272 * t266;
-    const real t391 = t5 * t5;
-    const real t392 = t274 + t391;
-    const real t393 = t265 * t392;
-    const real t394 = t390 - t393;
-    const real t395 = t12 * t20;
-    const real t396 = t282 * t395;
-    const real t397 = t394 + t396;
-    const real t398 = t22 * t288;
-    const real t399 = v[0] * 2.0;
-    const real t400 = t64 * t399;
-    const real t401 = t398 - t400;
-    const real t402 = t272 * t150;
-    const real t403 = t282 * t113;
-    const real t404 = t402 - t403;
-    const real t405 = t401 + t404;
-    const real t406 = t397 + t405;
-    const real t407 = t28 * t314;
-    const real t408 = t34 * t334;
-    const real t409 = t407 + t408;
-    const real t410 = t41 * t355;
-    const real t411 = t409 + t410;
-    const real t412 = t406 - t411;
-    const real t413 = t389 + t412;
-    B[7] = t413;
-    const real t414 = H[12] * d_s[0];
-    const real t415 = H[13] * d_s[1];
-    const real t416 = t414 + t415;
-    const real t417 = H[14] * d_s[2];
-    const real t418 = t416 + t417;
-    const real t419 = H[15] * d_s[3];
-    const real t420 = t418 + t419;
-    const real t421 = H[16] * d_s[4];
-    const real t422 = t420 + t421;
-    const real t423 = H[17] * d_s[5];
-    const real t424 = t422 + t423;
-    const real t425 = s[0] * d_H[12];
-    const real t426 = s[1] * d_H[13];
-    const real t427 = t425 + t426;
-    const real t428 = s[2] * d_H[14];
-    const real t429 = t427 + t428;
-    const real t430 = s[3] * d_H[15];
-    const real t431 = t429 + t430;
-    const real t432 = s[4] * d_H[16];
-    const real t433 = t431 + t432;
-    const real t434 = s[5] * d_H[17];
-    const real t435 = t433 + t434;
-    const real t436 = t424 + t435;
-    const real t437 = d_c[2] + t436;
-    const real t438 = d_v[1] * t5;
-    const real t439 = 2.0 * t438;
-    const real t440 = d_v[0] * t12;
-    const real t441 = 2.0 * t440;
-    const real t442 = t439 - t441;
-    const real t443 = t437 + t442;
-    const real t444 = t272 * t283;
-    const real t445 = t265 * t395;
-    const real t446 = t444 + t445;
-    const real t447 = t273 + t391;
-    const real t448 = t282 * t447;
-    const real t449 = t446 - t448;
-    const real t450 = t43 * t399;
-    const real t451 = t22 * t286;
-    const real t452 = t450 - t451;
-    const real t453 = t265 * t113;
-    const real t454 = t272 * t131;
-    const real t455 = t453 - t454;
-    const real t456 = t452 + t455;
-    const real t457 = t449 + t456;
-    const real t458 = t49 * t314;
-    const real t459 = t55 * t334;
-    const real t460 = t458 + t459;
-    const real t461 = t62 * t355;
-    const real t462 = t460 + t461;
-    const real t463 = t457 - t462;
-    const real t464 = t443 + t463;
-    B[8] = t464;
-    const real t465 = f[0] * t4;
-    const real t466 = f[1] * t11;
-    const real t467 = t465 + t466;
-    const real t468 = f[2] * t19;
-    const real t469 = t467 + t468;
-    G[0] = t469;
-    const real t470 = f[0] * t28;
-    const real t471 = f[1] * t34;
-    const real t472 = t470 + t471;
-    const real t473 = f[2] * t41;
-    const real t474 = t472 + t473;
-    G[1] = t474;
-    const real t475 = f[0] * t49;
-    const real t476 = f[1] * t55;
-    const real t477 = t475 + t476;
-    const real t478 = f[2] * t62;
-    const real t479 = t477 + t478;
-    G[2] = t479;
-    const real t480 = f[3] * t4;
-    const real t481 = f[4] * t11;
-    const real t482 = t480 + t481;
-    const real t483 = f[5] * t19;
-    const real t484 = t482 + t483;
-    const real t485 = f[2] * t265;
-    const real t486 = f[1] * t282;
-    const real t487 = t485 - t486;
-    const real t488 = t484 + t487;
-    G[3] = t488;
-    const real t489 = f[3] * t28;
-    const real t490 = f[4] * t34;
-    const real t491 = t489 + t490;
-    const real t492 = f[5] * t41;
-    const real t493 = t491 + t492;
-    const real t494 = f[0] * t282;
-    const real t495 = f[2] * t272;
-    const real t496 = t494 - t495;
-    const real t497 = t493 + t496;
-    G[4] = t497;
-    const real t498 = f[3] * t49;
-    const real t499 = f[4] * t55;
-    const real t500 = t498 + t499;
-    const real t501 = f[5] * t62;
-    const real t502 = t500 + t501;
-    const real t503 = f[1] * t272;
-    const real t504 = f[0] * t265;
-    const real t505 = t503 - t504;
-    const real t506 = t502 + t505;
-    G[5] = t506;
-    const real t507 = f[0] * d_H[0];
-    const real t508 = f[1] * d_H[6];
-    const real t509 = t507 + t508;
-    const real t510 = f[2] * d_H[12];
-    const real t511 = t509 + t510;
-    const real t512 = f[3] * d_H[18];
-    const real t513 = t511 + t512;
-    const real t514 = f[4] * d_H[24];
-    const real t515 = t513 + t514;
-    const real t516 = f[5] * d_H[30];
-    const real t517 = t515 + t516;
-    d_tau[0] = t517;
-    const real t518 = f[0] * d_H[1];
-    const real t519 = f[1] * d_H[7];
-    const real t520 = t518 + t519;
-    const real t521 = f[2] * d_H[13];
-    const real t522 = t520 + t521;
-    const real t523 = f[3] * d_H[19];
-    const real t524 = t522 + t523;
-    const real t525 = f[4] * d_H[25];
-    const real t526 = t524 + t525;
-    const real t527 = f[5] * d_H[31];
-    const real t528 = t526 + t527;
-    d_tau[1] = t528;
-    const real t529 = f[0] * d_H[2];
-    const real t530 = f[1] * d_H[8];
-    const real t531 = t529 + t530;
-    const real t532 = f[2] * d_H[14];
-    const real t533 = t531 + t532;
-    const real t534 = f[3] * d_H[20];
-    const real t535 = t533 + t534;
-    const real t536 = f[4] * d_H[26];
-    const real t537 = t535 + t536;
-    const real t538 = f[5] * d_H[32];
-    const real t539 = t537 + t538;
-    d_tau[2] = t539;
-    const real t540 = f[0] * d_H[3];
-    const real t541 = f[1] * d_H[9];
-    const real t542 = t540 + t541;
-    const real t543 = f[2] * d_H[15];
-    const real t544 = t542 + t543;
-    const real t545 = f[3] * d_H[21];
-    const real t546 = t544 + t545;
-    const real t547 = f[4] * d_H[27];
-    const real t548 = t546 + t547;
-    const real t549 = f[5] * d_H[33];
-    const real t550 = t548 + t549;
-    d_tau[3] = t550;
-    const real t551 = f[0] * d_H[4];
-    const real t552 = f[1] * d_H[10];
-    const real t553 = t551 + t552;
-    const real t554 = f[2] * d_H[16];
-    const real t555 = t553 + t554;
-    const real t556 = f[3] * d_H[22];
-    const real t557 = t555 + t556;
-    const real t558 = f[4] * d_H[28];
-    const real t559 = t557 + t558;
-    const real t560 = f[5] * d_H[34];
-    const real t561 = t559 + t560;
-    d_tau[4] = t561;
-    const real t562 = f[0] * d_H[5];
-    const real t563 = f[1] * d_H[11];
-    const real t564 = t562 + t563;
-    const real t565 = f[2] * d_H[17];
-    const real t566 = t564 + t565;
-    const real t567 = f[3] * d_H[23];
-    const real t568 = t566 + t567;
-    const real t569 = f[4] * d_H[29];
-    const real t570 = t568 + t569;
-    const real t571 = f[5] * d_H[35];
-    const real t572 = t570 + t571;
-    d_tau[5] = t572;
+    const real t382 = t381 - laws[5];
+    const real t383 = t370 + t382;
+    row[5] = t383;
     return 0;
 }
 
@@ -5567,27 +5545,527 @@ static int mstmm_sweep_generic6_tangent_column_call(int n, const real *const *in
 }
 
 static const mstmm_port mstmm_sweep_generic6_tangent_column_inputs[] = {
-    {"R", 9, "", 0, 0},
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
     {"H", 36, "", 0, 0},
     {"s", 6, "", 0, 0},
     {"v", 3, "", 0, 0},
     {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
     {"d_H", 36, "", 0, 0},
     {"d_v", 3, "", 0, 0},
     {"d_w", 3, "", 0, 0},
     {"d_c", 6, "", 0, 0},
     {"d_s", 6, "", 0, 0},
+    {"J", 6, "kg*m2 or kg", 0, 0},
+    {"laws", 6, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
-    {"d_tau", 6, "", 0, 0},
+    {"row", 6, "", 0, 0},
+};
+
+/* turn and change of place along coordinates of a hinge with 6 free speeds
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][6]
+ * in  d_q[6]
+ * out theta[3] turn of the body along the direction, body axes
+ * out x[3] change of place of P along the direction, body axes
+ */
+int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+    real *restrict theta, real *restrict x)
+{
+    const real t0 = H[18] * d_q[0];
+    const real t1 = H[19] * d_q[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[20] * d_q[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[21] * d_q[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[22] * d_q[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[23] * d_q[5];
+    const real t10 = t8 + t9;
+    theta[0] = t10;
+    const real t11 = H[24] * d_q[0];
+    const real t12 = H[25] * d_q[1];
+    const real t13 = t11 + t12;
+    const real t14 = H[26] * d_q[2];
+    const real t15 = t13 + t14;
+    const real t16 = H[27] * d_q[3];
+    const real t17 = t15 + t16;
+    const real t18 = H[28] * d_q[4];
+    const real t19 = t17 + t18;
+    const real t20 = H[29] * d_q[5];
+    const real t21 = t19 + t20;
+    theta[1] = t21;
+    const real t22 = H[30] * d_q[0];
+    const real t23 = H[31] * d_q[1];
+    const real t24 = t22 + t23;
+    const real t25 = H[32] * d_q[2];
+    const real t26 = t24 + t25;
+    const real t27 = H[33] * d_q[3];
+    const real t28 = t26 + t27;
+    const real t29 = H[34] * d_q[4];
+    const real t30 = t28 + t29;
+    const real t31 = H[35] * d_q[5];
+    const real t32 = t30 + t31;
+    theta[2] = t32;
+    const real t33 = H[0] * d_q[0];
+    const real t34 = H[1] * d_q[1];
+    const real t35 = t33 + t34;
+    const real t36 = H[2] * d_q[2];
+    const real t37 = t35 + t36;
+    const real t38 = H[3] * d_q[3];
+    const real t39 = t37 + t38;
+    const real t40 = H[4] * d_q[4];
+    const real t41 = t39 + t40;
+    const real t42 = H[5] * d_q[5];
+    const real t43 = t41 + t42;
+    x[0] = t43;
+    const real t44 = H[6] * d_q[0];
+    const real t45 = H[7] * d_q[1];
+    const real t46 = t44 + t45;
+    const real t47 = H[8] * d_q[2];
+    const real t48 = t46 + t47;
+    const real t49 = H[9] * d_q[3];
+    const real t50 = t48 + t49;
+    const real t51 = H[10] * d_q[4];
+    const real t52 = t50 + t51;
+    const real t53 = H[11] * d_q[5];
+    const real t54 = t52 + t53;
+    x[1] = t54;
+    const real t55 = H[12] * d_q[0];
+    const real t56 = H[13] * d_q[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[14] * d_q[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[15] * d_q[3];
+    const real t61 = t59 + t60;
+    const real t62 = H[16] * d_q[4];
+    const real t63 = t61 + t62;
+    const real t64 = H[17] * d_q[5];
+    const real t65 = t63 + t64;
+    x[2] = t65;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_along_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_along(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_along_inputs[] = {
+    {"H", 36, "", 0, 0},
+    {"d_q", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_along_outputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+};
+
+/* a direction of a hinge with 6 free speeds that are the same in every position
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  H[6][6]
+ * in  v[3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[6]
+ * in  d_s[6]
+ * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[6] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[6] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
+    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
+    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
+    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
+    real *restrict row)
+{
+    const real t0 = H[18] * d_u[0];
+    const real t1 = H[19] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[20] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[21] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[22] * d_u[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[23] * d_u[5];
+    const real t10 = t8 + t9;
+    const real t11 = theta[2] * Q[1];
+    const real t12 = theta[1] * Q[2];
+    const real t13 = t11 - t12;
+    const real t14 = t10 + t13;
+    B[0] = t14;
+    const real t15 = H[24] * d_u[0];
+    const real t16 = H[25] * d_u[1];
+    const real t17 = t15 + t16;
+    const real t18 = H[26] * d_u[2];
+    const real t19 = t17 + t18;
+    const real t20 = H[27] * d_u[3];
+    const real t21 = t19 + t20;
+    const real t22 = H[28] * d_u[4];
+    const real t23 = t21 + t22;
+    const real t24 = H[29] * d_u[5];
+    const real t25 = t23 + t24;
+    const real t26 = theta[0] * Q[2];
+    const real t27 = theta[2] * Q[0];
+    const real t28 = t26 - t27;
+    const real t29 = t25 + t28;
+    B[1] = t29;
+    const real t30 = H[30] * d_u[0];
+    const real t31 = H[31] * d_u[1];
+    const real t32 = t30 + t31;
+    const real t33 = H[32] * d_u[2];
+    const real t34 = t32 + t33;
+    const real t35 = H[33] * d_u[3];
+    const real t36 = t34 + t35;
+    const real t37 = H[34] * d_u[4];
+    const real t38 = t36 + t37;
+    const real t39 = H[35] * d_u[5];
+    const real t40 = t38 + t39;
+    const real t41 = theta[1] * Q[0];
+    const real t42 = theta[0] * Q[1];
+    const real t43 = t41 - t42;
+    const real t44 = t40 + t43;
+    B[2] = t44;
+    const real t45 = w[2] * t28;
+    const real t46 = w[1] * t43;
+    const real t47 = t45 - t46;
+    const real t48 = H[18] * d_s[0];
+    const real t49 = H[19] * d_s[1];
+    const real t50 = t48 + t49;
+    const real t51 = H[20] * d_s[2];
+    const real t52 = t50 + t51;
+    const real t53 = H[21] * d_s[3];
+    const real t54 = t52 + t53;
+    const real t55 = H[22] * d_s[4];
+    const real t56 = t54 + t55;
+    const real t57 = H[23] * d_s[5];
+    const real t58 = t56 + t57;
+    const real t59 = theta[2] * Q[4];
+    const real t60 = Q[1] * t40;
+    const real t61 = Q[2] * t25;
+    const real t62 = t60 - t61;
+    const real t63 = t59 + t62;
+    const real t64 = theta[1] * Q[5];
+    const real t65 = t63 - t64;
+    const real t66 = t58 + t65;
+    const real t67 = t47 + t66;
+    B[3] = t67;
+    const real t68 = w[0] * t43;
+    const real t69 = w[2] * t13;
+    const real t70 = t68 - t69;
+    const real t71 = H[24] * d_s[0];
+    const real t72 = H[25] * d_s[1];
+    const real t73 = t71 + t72;
+    const real t74 = H[26] * d_s[2];
+    const real t75 = t73 + t74;
+    const real t76 = H[27] * d_s[3];
+    const real t77 = t75 + t76;
+    const real t78 = H[28] * d_s[4];
+    const real t79 = t77 + t78;
+    const real t80 = H[29] * d_s[5];
+    const real t81 = t79 + t80;
+    const real t82 = theta[0] * Q[5];
+    const real t83 = Q[2] * t10;
+    const real t84 = Q[0] * t40;
+    const real t85 = t83 - t84;
+    const real t86 = theta[2] * Q[3];
+    const real t87 = t85 - t86;
+    const real t88 = t82 + t87;
+    const real t89 = t81 + t88;
+    const real t90 = t70 + t89;
+    B[4] = t90;
+    const real t91 = w[1] * t13;
+    const real t92 = w[0] * t28;
+    const real t93 = t91 - t92;
+    const real t94 = H[30] * d_s[0];
+    const real t95 = H[31] * d_s[1];
+    const real t96 = t94 + t95;
+    const real t97 = H[32] * d_s[2];
+    const real t98 = t96 + t97;
+    const real t99 = H[33] * d_s[3];
+    const real t100 = t98 + t99;
+    const real t101 = H[34] * d_s[4];
+    const real t102 = t100 + t101;
+    const real t103 = H[35] * d_s[5];
+    const real t104 = t102 + t103;
+    const real t105 = theta[1] * Q[3];
+    const real t106 = Q[0] * t25;
+    const real t107 = Q[1] * t10;
+    const real t108 = t106 - t107;
+    const real t109 = t105 + t108;
+    const real t110 = theta[0] * Q[4];
+    const real t111 = t109 - t110;
+    const real t112 = t104 + t111;
+    const real t113 = t93 + t112;
+    B[5] = t113;
+    const real t114 = v[2] * 2.0;
+    const real t115 = t28 * t114;
+    const real t116 = v[1] * 2.0;
+    const real t117 = t43 * t116;
+    const real t118 = t115 - t117;
+    const real t119 = v[2] * t25;
+    const real t120 = H[12] * d_u[0];
+    const real t121 = H[13] * d_u[1];
+    const real t122 = t120 + t121;
+    const real t123 = H[14] * d_u[2];
+    const real t124 = t122 + t123;
+    const real t125 = H[15] * d_u[3];
+    const real t126 = t124 + t125;
+    const real t127 = H[16] * d_u[4];
+    const real t128 = t126 + t127;
+    const real t129 = H[17] * d_u[5];
+    const real t130 = t128 + t129;
+    const real t131 = w[1] * t130;
+    const real t132 = H[6] * d_u[0];
+    const real t133 = H[7] * d_u[1];
+    const real t134 = t132 + t133;
+    const real t135 = H[8] * d_u[2];
+    const real t136 = t134 + t135;
+    const real t137 = H[9] * d_u[3];
+    const real t138 = t136 + t137;
+    const real t139 = H[10] * d_u[4];
+    const real t140 = t138 + t139;
+    const real t141 = H[11] * d_u[5];
+    const real t142 = t140 + t141;
+    const real t143 = w[2] * t142;
+    const real t144 = t131 - t143;
+    const real t145 = t119 + t144;
+    const real t146 = v[1] * t40;
+    const real t147 = t145 - t146;
+    const real t148 = H[0] * d_s[0];
+    const real t149 = H[1] * d_s[1];
+    const real t150 = t148 + t149;
+    const real t151 = H[2] * d_s[2];
+    const real t152 = t150 + t151;
+    const real t153 = H[3] * d_s[3];
+    const real t154 = t152 + t153;
+    const real t155 = H[4] * d_s[4];
+    const real t156 = t154 + t155;
+    const real t157 = H[5] * d_s[5];
+    const real t158 = t156 + t157;
+    const real t159 = t147 + t158;
+    const real t160 = theta[2] * Q[7];
+    const real t161 = x[2] * Q[4];
+    const real t162 = Q[1] * t130;
+    const real t163 = 2.0 * t162;
+    const real t164 = x[1] * Q[0];
+    const real t165 = x[0] * Q[1];
+    const real t166 = t164 - t165;
+    const real t167 = Q[1] * t166;
+    const real t168 = x[0] * Q[2];
+    const real t169 = x[2] * Q[0];
+    const real t170 = t168 - t169;
+    const real t171 = Q[2] * t170;
+    const real t172 = t167 - t171;
+    const real t173 = t163 + t172;
+    const real t174 = Q[2] * t142;
+    const real t175 = 2.0 * t174;
+    const real t176 = t173 - t175;
+    const real t177 = t161 + t176;
+    const real t178 = x[1] * Q[5];
+    const real t179 = t177 - t178;
+    const real t180 = t160 + t179;
+    const real t181 = theta[1] * Q[8];
+    const real t182 = t180 - t181;
+    const real t183 = t159 + t182;
+    const real t184 = t118 + t183;
+    B[6] = t184;
+    const real t185 = v[0] * 2.0;
+    const real t186 = t43 * t185;
+    const real t187 = t13 * t114;
+    const real t188 = t186 - t187;
+    const real t189 = v[0] * t40;
+    const real t190 = H[0] * d_u[0];
+    const real t191 = H[1] * d_u[1];
+    const real t192 = t190 + t191;
+    const real t193 = H[2] * d_u[2];
+    const real t194 = t192 + t193;
+    const real t195 = H[3] * d_u[3];
+    const real t196 = t194 + t195;
+    const real t197 = H[4] * d_u[4];
+    const real t198 = t196 + t197;
+    const real t199 = H[5] * d_u[5];
+    const real t200 = t198 + t199;
+    const real t201 = w[2] * t200;
+    const real t202 = w[0] * t130;
+    const real t203 = t201 - t202;
+    const real t204 = v[2] * t10;
+    const real t205 = t203 - t204;
+    const real t206 = t189 + t205;
+    const real t207 = H[6] * d_s[0];
+    const real t208 = H[7] * d_s[1];
+    const real t209 = t207 + t208;
+    const real t210 = H[8] * d_s[2];
+    const real t211 = t209 + t210;
+    const real t212 = H[9] * d_s[3];
+    const real t213 = t211 + t212;
+    const real t214 = H[10] * d_s[4];
+    const real t215 = t213 + t214;
+    const real t216 = H[11] * d_s[5];
+    const real t217 = t215 + t216;
+    const real t218 = t206 + t217;
+    const real t219 = theta[0] * Q[8];
+    const real t220 = x[0] * Q[5];
+    const real t221 = Q[2] * t200;
+    const real t222 = 2.0 * t221;
+    const real t223 = x[2] * Q[1];
+    const real t224 = x[1] * Q[2];
+    const real t225 = t223 - t224;
+    const real t226 = Q[2] * t225;
+    const real t227 = Q[0] * t166;
+    const real t228 = t226 - t227;
+    const real t229 = Q[0] * t130;
+    const real t230 = 2.0 * t229;
+    const real t231 = t228 - t230;
+    const real t232 = t222 + t231;
+    const real t233 = x[2] * Q[3];
+    const real t234 = t232 - t233;
+    const real t235 = t220 + t234;
+    const real t236 = theta[2] * Q[6];
+    const real t237 = t235 - t236;
+    const real t238 = t219 + t237;
+    const real t239 = t218 + t238;
+    const real t240 = t188 + t239;
+    B[7] = t240;
+    const real t241 = t13 * t116;
+    const real t242 = t28 * t185;
+    const real t243 = t241 - t242;
+    const real t244 = v[1] * t10;
+    const real t245 = w[0] * t142;
+    const real t246 = w[1] * t200;
+    const real t247 = t245 - t246;
+    const real t248 = t244 + t247;
+    const real t249 = v[0] * t25;
+    const real t250 = t248 - t249;
+    const real t251 = H[12] * d_s[0];
+    const real t252 = H[13] * d_s[1];
+    const real t253 = t251 + t252;
+    const real t254 = H[14] * d_s[2];
+    const real t255 = t253 + t254;
+    const real t256 = H[15] * d_s[3];
+    const real t257 = t255 + t256;
+    const real t258 = H[16] * d_s[4];
+    const real t259 = t257 + t258;
+    const real t260 = H[17] * d_s[5];
+    const real t261 = t259 + t260;
+    const real t262 = t250 + t261;
+    const real t263 = theta[1] * Q[6];
+    const real t264 = x[1] * Q[3];
+    const real t265 = Q[0] * t142;
+    const real t266 = 2.0 * t265;
+    const real t267 = Q[0] * t170;
+    const real t268 = Q[1] * t225;
+    const real t269 = t267 - t268;
+    const real t270 = t266 + t269;
+    const real t271 = Q[1] * t200;
+    const real t272 = 2.0 * t271;
+    const real t273 = t270 - t272;
+    const real t274 = t264 + t273;
+    const real t275 = x[0] * Q[4];
+    const real t276 = t274 - t275;
+    const real t277 = t263 + t276;
+    const real t278 = theta[0] * Q[7];
+    const real t279 = t277 - t278;
+    const real t280 = t262 + t279;
+    const real t281 = t243 + t280;
+    B[8] = t281;
+    const real t282 = theta[1] * f[2];
+    const real t283 = theta[2] * f[1];
+    const real t284 = t282 - t283;
+    G[0] = t284;
+    const real t285 = theta[2] * f[0];
+    const real t286 = theta[0] * f[2];
+    const real t287 = t285 - t286;
+    G[1] = t287;
+    const real t288 = theta[0] * f[1];
+    const real t289 = theta[1] * f[0];
+    const real t290 = t288 - t289;
+    G[2] = t290;
+    const real t291 = theta[1] * f[5];
+    const real t292 = x[1] * f[2];
+    const real t293 = x[2] * f[1];
+    const real t294 = t292 - t293;
+    const real t295 = theta[2] * f[4];
+    const real t296 = t294 - t295;
+    const real t297 = t291 + t296;
+    G[3] = t297;
+    const real t298 = theta[2] * f[3];
+    const real t299 = x[2] * f[0];
+    const real t300 = x[0] * f[2];
+    const real t301 = t299 - t300;
+    const real t302 = t298 + t301;
+    const real t303 = theta[0] * f[5];
+    const real t304 = t302 - t303;
+    G[4] = t304;
+    const real t305 = theta[0] * f[4];
+    const real t306 = x[0] * f[1];
+    const real t307 = x[1] * f[0];
+    const real t308 = t306 - t307;
+    const real t309 = theta[1] * f[3];
+    const real t310 = t308 - t309;
+    const real t311 = t305 + t310;
+    G[5] = t311;
+    const real t312 = d_s[0] * J[0];
+    const real t313 = t312 - laws[0];
+    row[0] = t313;
+    const real t314 = d_s[1] * J[1];
+    const real t315 = t314 - laws[1];
+    row[1] = t315;
+    const real t316 = d_s[2] * J[2];
+    const real t317 = t316 - laws[2];
+    row[2] = t317;
+    const real t318 = d_s[3] * J[3];
+    const real t319 = t318 - laws[3];
+    row[3] = t319;
+    const real t320 = d_s[4] * J[4];
+    const real t321 = t320 - laws[4];
+    row[4] = t321;
+    const real t322 = d_s[5] * J[5];
+    const real t323 = t322 - laws[5];
+    row[5] = t323;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_steady_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_steady_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"H", 36, "", 0, 0},
+    {"v", 3, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 6, "", 0, 0},
+    {"d_s", 6, "", 0, 0},
+    {"J", 6, "kg*m2 or kg", 0, 0},
+    {"laws", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 6, "", 0, 0},
 };
 
 /* rows of a hinge with 6 free speeds
@@ -8256,6 +8734,18 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_carrier",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_carrier,
+        .call = mstmm_sweep_generic6_tangent_carrier_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_tangent_carrier_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_carrier_outputs,
+        .ir_hash = "4b9c86107e94280715013e8b83a1ff450fbb2a5425d04972583260ce11bd68a3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_column",
         .function = (void (*)(void))mstmm_sweep_generic6_tangent_column,
         .call = mstmm_sweep_generic6_tangent_column_call,
@@ -8263,7 +8753,31 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_tangent_column_inputs,
         .outputs = mstmm_sweep_generic6_tangent_column_outputs,
-        .ir_hash = "f9340c7d2ab806098dc065fe5812d60f26128e74e7f5b83ce6e5973a7f1ad7fe",
+        .ir_hash = "d1fa610df5590e15f680c8d3afa6f628fcc92849da92a6323bfbc6096c2195f4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_along",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_along,
+        .call = mstmm_sweep_generic6_tangent_along_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic6_tangent_along_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_along_outputs,
+        .ir_hash = "4a7a4d1e4adbfc0d2647f8812e221b1035047f62f09fbc91f3fb106e319f1d31",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_steady",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_steady,
+        .call = mstmm_sweep_generic6_tangent_steady_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic6_tangent_steady_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_steady_outputs,
+        .ir_hash = "38f2c59f0fc1086a5053c3aa71c598dce038ce7dfeccc2ca6a90f529b7bdaaa5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8345,7 +8859,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "7f2e1332bb25faa3716f949d66742391990e65feeaf7fce8609f26f8b8ac9c03",
+    .hash = "83eaa5e2e2e4629cbb5c1e876340d1f05b919fc0ede42210a67afc0a22ec4d21",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -8355,6 +8869,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 15,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -108,6 +108,16 @@ mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[] = {
     mstmm_sweep_generic6_effort_slope,
 };
 
+mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[] = {
+    mstmm_sweep_generic0_tangent_carrier,
+    mstmm_sweep_generic1_tangent_carrier,
+    mstmm_sweep_generic2_tangent_carrier,
+    mstmm_sweep_generic3_tangent_carrier,
+    mstmm_sweep_generic4_tangent_carrier,
+    mstmm_sweep_generic5_tangent_carrier,
+    mstmm_sweep_generic6_tangent_carrier,
+};
+
 mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[] = {
     mstmm_sweep_generic0_tangent_column,
     mstmm_sweep_generic1_tangent_column,
@@ -116,6 +126,26 @@ mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[] 
     mstmm_sweep_generic4_tangent_column,
     mstmm_sweep_generic5_tangent_column,
     mstmm_sweep_generic6_tangent_column,
+};
+
+mstmm_generic_tangent_along_kernel *const mstmm_generic_tangent_along_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_along,
+    mstmm_sweep_generic2_tangent_along,
+    mstmm_sweep_generic3_tangent_along,
+    mstmm_sweep_generic4_tangent_along,
+    mstmm_sweep_generic5_tangent_along,
+    mstmm_sweep_generic6_tangent_along,
+};
+
+mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_steady,
+    mstmm_sweep_generic2_tangent_steady,
+    mstmm_sweep_generic3_tangent_steady,
+    mstmm_sweep_generic4_tangent_steady,
+    mstmm_sweep_generic5_tangent_steady,
+    mstmm_sweep_generic6_tangent_steady,
 };
 
 mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[] = {
@@ -1688,11 +1718,11 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
 /* Unknowns of a body eliminated, the rest carried to the parent. */
 static int mstmm_at_tangent_condense(mstmm_state *state, int index)
 {
-    real d_tau[6];
+    real carrier[9];
+    real turn[3];
+    real place[3];
+    real change[6];
     real S_c[54];
-    real tau[6];
-    real d_required[6];
-    real free[6];
     real K[36];
     real right[54];
     real D[36];
@@ -1718,22 +1748,27 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         for (int c = 0; c < n; c++) {
             mstmm_aim_mode(state, modal, c);
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
+            mstmm_frames_tangent_turned(
+                .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
             mstmm_generic_tangent_column(nu,
-                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                 .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
-                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
-                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
                 .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
-                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
-                .B = bend + MSTMM_BEND_B(n) + 9 * c, .G = bend + MSTMM_BEND_G(n) + 6 * c,
-                .d_tau = d_tau);
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                .J = body->rotor, .laws = mstmm_zeros, .B = bend + MSTMM_BEND_B(n) + 9 * c,
+                .G = bend + MSTMM_BEND_G(n) + 6 * c, .row = change);
             for (int j = 0; j < n; j++)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(
@@ -1774,36 +1809,57 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     if (!body->section && speeds) {
         const int nu = body->nu;
         real *d_block = state->slope->workspace + body->block;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         for (int c = 0; c < speeds; c++) {
             mstmm_aim_unknown(state, body, columns[c]);
-            for (int j = 0; j < nu; j++)
-                (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = (state->slope->given + body->u)[j];
-            code = mstmm_at_hinge_motion_slope(state, index);
-            if (code) return code;
-            memcpy(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c, (size_t)(nu) * sizeof(real));
-            mstmm_generic_tangent_column(nu,
-                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
-                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
-                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
-                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
-                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
-                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
-                .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
-                .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .d_tau = d_tau);
-            for (int k = 0; k < body->nu; k++) {
-                mstmm_frames_driven_effort_slope(
-                    .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
-                    .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .d_felt = d_tau + k,
-                    .d_udot = state->slope->given + body->u + k,
-                    .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
-                    .d_tau_d = d_required + k);
+            if (!body->steady) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
+            if (body->steady && !body->straight) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
+            if (body->straight) {
+                mstmm_generic_tangent_along(nu,
+                    .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .d_q = state->slope->q + body->q, .theta = turn, .x = place);
+            }
+            if (!body->straight) {
+                mstmm_frames_tangent_turned(
+                    .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                    .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+            }
+            if (body->steady) {
+                mstmm_generic_tangent_steady(nu,
+                    .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
+                    .Q = carrier, .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
+                    .d_s = state->slope->given + body->u, .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
+            }
+            if (!body->steady) {
+                mstmm_generic_tangent_column(nu,
+                    .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+                    .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
+                    .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                    .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                    .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                    .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                    .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
             }
             for (int k = 0; k < speeds; k++)
-                free[k] = d_required[columns[k]];
-            memcpy(tangent + MSTMM_TANGENT_W(body->nu, body->nq) + speeds * c, free, (size_t)(speeds) * sizeof(real));
+                (tangent + MSTMM_TANGENT_W(body->nu, body->nq) + speeds * c)[k] = change[columns[k]];
         }
         mstmm_aim_nowhere(state, body);
         for (int k = 0; k < speeds; k++)
@@ -1837,22 +1893,27 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         for (int c = 0; c < n; c++) {
             mstmm_aim_mode(state, modal, c);
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
+            mstmm_frames_tangent_turned(
+                .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
             mstmm_generic_tangent_column(nu,
-                .R = block + MSTMM_BLOCK_HINGE_R, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                 .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
-                .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
-                .motion = block + MSTMM_BLOCK_MOTION, .f = block + MSTMM_BLOCK_E,
-                .d_R = d_block + MSTMM_BLOCK_HINGE_R, .d_d = d_block + MSTMM_BLOCK_HINGE_D,
+                .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
                 .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
-                .d_c = d_block + MSTMM_BLOCK_HINGE_C,
-                .d_s = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
-                .B = port + MSTMM_PORT_B(n) + 9 * c, .G = port + MSTMM_PORT_G(n) + 6 * c,
-                .d_tau = d_tau);
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                .J = body->rotor, .laws = mstmm_zeros, .B = port + MSTMM_PORT_B(n) + 9 * c,
+                .G = port + MSTMM_PORT_G(n) + 6 * c, .row = change);
             for (int j = 0; j < n; j++)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(

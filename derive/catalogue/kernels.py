@@ -33,7 +33,14 @@ FRAME_DERIVATIONS = (
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.driven_effort, frames.speed_power, frames.length, frames.turned,
     frames.classical_body, frames.state_deviation,
-    tangent.tangent_carry, tangent.tangent_moved,
+    tangent.tangent_carry, tangent.tangent_moved, tangent.tangent_turned,
+)  # fmt: skip
+
+#: Steps of the tangent for hinges with any number of speeds, and for those that have some.
+_ALONG_HINGES = (tangent.tangent_carrier, tangent.tangent_column)
+_OF_SPEEDS = (
+    tangent.tangent_along, tangent.tangent_steady, tangent.tangent_rows, tangent.tangent_reduce,
+    tangent.tangent_push, tangent.tangent_answer,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.
@@ -114,17 +121,8 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("factor", columns.factor(nu)),
         Kernel("push", columns.push(nu)),
         Kernel("answer", columns.answer(nu)),
-        Kernel("tangent_column", tangent.tangent_column(nu)),
-        *(
-            Kernel(make.__name__, make(nu))
-            for make in (
-                tangent.tangent_rows,
-                tangent.tangent_reduce,
-                tangent.tangent_push,
-                tangent.tangent_answer,
-            )
-            if nu
-        ),
+        *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),
+        *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )

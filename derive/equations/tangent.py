@@ -115,75 +115,188 @@ def tangent_moved() -> Derivation:
     )
 
 
+# --- along one direction of a hinge -------------------------------------------------------------
+
+TURN = Quantity(vector("theta", 3), "", "turn of the body along the direction, body axes")
+PLACE = Quantity(vector("x", 3), "", "change of place of P along the direction, body axes")
+_OF_Q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w, wd, and a of its carrier at P")
+_LOAD = Quantity(vector("f", 6), "N, N*m", "load at P that is carried")
+_COLUMN = (
+    Quantity(vector("B", 9), "", "motion along the direction"),
+    Quantity(vector("G", 6), "", "change of the load that is carried"),
+)
+
+
+def tangent_turned() -> Derivation:
+    """theta and R^T dd, theta~ = R^T dR."""
+    r, d_r, d_d = symbol("R", 3, 3), symbol("d_R", 3, 3), symbol("d_d", 3)
+    turn = sp.ImmutableDenseMatrix(
+        [sum(r[k, i] * d_r[k, j] for k in range(3)) for i, j in ((2, 1), (0, 2), (1, 0))]
+    )
+    return Derivation(
+        "frames",
+        "turn and change of place along a direction",
+        tuple(map(Quantity, (r, d_r, d_d))),
+        (TURN, PLACE),
+        (
+            Equation("theta~ = R^T dR", TURN.symbol, turn),
+            Equation("R^T dd", PLACE.symbol, r.T * d_d),
+        ),
+        sources=SOURCES,
+    )
+
+
+def tangent_along(nu: int) -> Derivation:
+    """theta = H_w dq and R^T dd = H_v dq where the rates of the coordinates are the speeds."""
+    h, d_q = symbol("H", 6, nu), symbol("d_q", nu)
+    return Derivation(
+        f"generic{nu}",
+        f"turn and change of place along coordinates of a hinge with {free_speeds(nu)}",
+        (Quantity(h), Quantity(d_q)),
+        (TURN, PLACE),
+        (
+            Equation("theta = H_w dq", TURN.symbol, h[3:, :] * d_q),
+            Equation("R^T dd = H_v dq", PLACE.symbol, h[:3, :] * d_q),
+        ),
+        sources=SOURCES,
+    )
+
+
+def tangent_carrier(nu: int) -> Derivation:
+    """w_Q = w - w_rel and so on: what the body's own motion gives back of that of Q."""
+    h, s, v, w, c, motion = (symbol(name, *shape) for name, shape in (
+        ("H", (6, nu)), ("s", (nu,)), ("v", (3,)), ("w", (3,)), ("c", (6,)), ("motion", (9,))
+    ))  # fmt: skip
+    turning, rate, seen, bias = (symbol(name, rows) for name, rows in (
+        ("w_Q", 3), ("wd_Q", 3), ("a_Q", 3), ("c_s", 6)
+    ))  # fmt: skip
+    own = tilde(column(turning))
+    return Derivation(
+        f"generic{nu}",
+        f"motion of Q across a hinge with {nu} speeds",
+        tuple(map(Quantity, (h, s, v, w, c, motion))),
+        (_OF_Q,),
+        (
+            Equation("angular velocity of Q", turning, part(motion, 0) - column(w)),
+            Equation("own acceleration", bias, c + h * s if nu else c),
+            Equation(
+                "angular acceleration of Q", rate, part(motion, 3) - own * column(w) - part(bias, 3)
+            ),
+            Equation(
+                "acceleration of the point of Q's carrier at P",
+                seen,
+                part(motion, 6) - 2 * own * column(v) - part(bias, 0),
+            ),
+            Equation("all of it", _OF_Q.symbol, stack(turning, rate, seen)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def _along(
+    v: sp.MatrixSymbol, w: sp.MatrixSymbol, d_v: sp.Basic, d_w: sp.Basic, d_c: sp.MatrixSymbol
+) -> tuple[Equation, ...]:
+    """B and G by the changes of what is across the hinge."""
+    turn, place = tilde(column(TURN.symbol)), column(PLACE.symbol)
+    turning, rate, seen = (part(_OF_Q.symbol, 3 * k) for k in range(3))
+    d_turning = symbol("dw_Q", 3)
+    relative, own = tilde(column(w)), tilde(turning)
+    force, moment = part(_LOAD.symbol, 0), part(_LOAD.symbol, 3)
+    b, g = (quantity.symbol for quantity in _COLUMN)
+    return (
+        Equation("slope of w_Q", d_turning, -turn * turning),
+        Equation(
+            "B",
+            b,
+            stack(
+                d_w + d_turning,
+                part(d_c, 3) - turn * rate - relative * d_turning + own * d_w,
+                part(d_c, 0)
+                - turn * seen
+                + tilde(rate) * place
+                + own * (own * place)
+                + 2 * (own * d_v - tilde(column(v)) * d_turning),
+            ),
+        ),
+        Equation("G", g, stack(turn * force, turn * moment + tilde(place) * force)),
+    )
+
+
+def _row(nu: int, own: sp.Basic | None) -> tuple[tuple[Quantity, ...], Quantity, Equation]:
+    """Slopes of a hinge's rows by load, rotors and laws: further inputs, output, equation."""
+    rotor, d_s, laws, row = (symbol(name, nu) for name in ("J", "d_s", "laws", "row"))
+    rotors = sp.ImmutableDenseMatrix(nu, 1, lambda k, _: rotor[k, 0] * d_s[k, 0])
+    return (
+        (
+            Quantity(rotor, "kg*m2 or kg", "rotor inertia reflected to the speeds"),
+            Quantity(laws, "", "change of the laws' efforts"),
+        ),
+        Quantity(row, "", "change of the rows by load, rotors and laws"),
+        Equation("change of the rows", row, (rotors if own is None else own + rotors) - laws),
+    )
+
+
 def tangent_column(nu: int) -> Derivation:
     """B, G and the load's share of W along one direction of a hinge, seen in body axes.
 
-    With theta~ = R^T dR the turn of the body along the direction, d its place, and the motion of Q
-    in body axes w_Q = w - w_rel and so on, which the body's own motion gives back:
+    With theta the turn of the body along the direction, x its change of place R^T dd and the motion
+    of Q in body axes (`tangent_carrier`):
 
         B = [dw_rel - theta~ w_Q;
              dc_w - theta~ wd_Q - (theta~ w_Q) x w_rel + w_Q x dw_rel;
-             dc_v - theta~ a_Q + (wd_Q~ + w_Q~ w_Q~) R^T dd - 2 (theta~ w_Q) x v + 2 w_Q x dv]
-        G = [theta~ f; theta~ m + (R^T dd) x f],      dtau = dH^T [f; m]
+             dc_v - theta~ a_Q + (wd_Q~ + w_Q~ w_Q~) x - 2 (theta~ w_Q) x v + 2 w_Q x dv]
+        G = [theta~ f; theta~ m + x x f],      dH^T [f; m] + J ds - dtau in the rows
     """
-    r, h, s = symbol("R", 3, 3), symbol("H", 6, nu), symbol("s", nu)
-    v, w, c, motion, load = (symbol(n, k) for n, k in (
-        ("v", 3), ("w", 3), ("c", 6), ("motion", 9), ("f", 6)
+    h, s, d_h, d_s = (symbol(n, *shape) for n, shape in (
+        ("H", (6, nu)), ("s", (nu,)), ("d_H", (6, nu)), ("d_s", (nu,))
     ))  # fmt: skip
-    d_r, d_d, d_h = symbol("d_R", 3, 3), symbol("d_d", 3), symbol("d_H", 6, nu)
-    d_v, d_w, d_c, d_s = symbol("d_v", 3), symbol("d_w", 3), symbol("d_c", 6), symbol("d_s", nu)
-    turn, place = symbol("A", 3, 3), symbol("x", 3)
-    carrier, rate, seen, bias = (symbol(n, k) for n, k in (
-        ("w_Q", 3), ("wd_Q", 3), ("a_Q", 3), ("c_s", 6)
+    v, w, d_v, d_w, d_c = (symbol(n, rows) for n, rows in (
+        ("v", 3), ("w", 3), ("d_v", 3), ("d_w", 3), ("d_c", 6)
     ))  # fmt: skip
-    d_carrier, d_bias = symbol("dw_Q", 3), symbol("dc_s", 6)
-    relative, own = tilde(column(w)), tilde(column(carrier))
-    force, moment = part(load, 0), part(load, 3)
+    d_bias = symbol("dc_s", 6)
+    more, row, rows = _row(nu, d_h.T * _LOAD.symbol)
     equations = (
-        Equation("theta~ = R^T dR", turn, r.T * d_r),
-        Equation("R^T dd", place, r.T * d_d),
-        Equation("angular velocity of Q", carrier, part(motion, 0) - column(w)),
-        Equation("own acceleration", bias, c + h * s if nu else c),
-        Equation("its slope", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
-        Equation(
-            "angular acceleration of Q", rate, part(motion, 3) - own * column(w) - part(bias, 3)
-        ),
-        Equation(
-            "acceleration of the point of Q's carrier at P",
-            seen,
-            part(motion, 6) - 2 * own * column(v) - part(bias, 0),
-        ),
-        Equation("slope of w_Q", d_carrier, -turn * carrier),
-        Equation(
-            "B",
-            symbol("B", 9),
-            stack(
-                d_w + d_carrier,
-                part(d_bias, 3) - turn * rate - relative * d_carrier + own * column(d_w),
-                part(d_bias, 0)
-                - turn * seen
-                + tilde(column(rate)) * place
-                + own * (own * place)
-                - 2 * tilde(column(v)) * d_carrier
-                + 2 * own * column(d_v),
-            ),
-        ),
-        Equation(
-            "G",
-            symbol("G", 6),
-            stack(turn * force, turn * moment + tilde(column(place)) * force),
-        ),
-        Equation("dH^T f", symbol("d_tau", nu), d_h.T * load),
+        Equation("slope of the own acceleration", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
+        *_along(v, w, column(d_v), column(d_w), d_bias),
     )
-    given = (r, h, s, v, w, c, motion, load, d_r, d_d, d_h, d_v, d_w, d_c, d_s)
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {nu} speeds",
-        tuple(map(Quantity, given)),
-        (Quantity(symbol("B", 9)), Quantity(symbol("G", 6)), Quantity(symbol("d_tau", nu))),
-        equations if nu else equations[:-1],
+        (TURN, PLACE, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
+         *map(Quantity, (d_h, d_v, d_w, d_c, d_s)), *more),
+        (*_COLUMN, row),
+        (*equations, rows) if nu else equations,
         sources=SOURCES,
-    )
+    )  # fmt: skip
+
+
+def tangent_steady(nu: int) -> Derivation:
+    """`tangent_column` of a hinge whose H is the same in every position: c = [w x v; 0]."""
+    h, v, w = symbol("H", 6, nu), symbol("v", 3), symbol("w", 3)
+    d_u, d_s = symbol("d_u", nu), symbol("d_s", nu)
+    d_v, d_w, d_bias = symbol("d_v", 3), symbol("d_w", 3), symbol("dc_s", 6)
+    more, row, rows = _row(nu, None)
+    own = h * d_s
+    turned = tilde(column(d_w)) * column(v) + tilde(column(w)) * column(d_v)
+    return Derivation(
+        f"generic{nu}",
+        f"a direction of a hinge with {free_speeds(nu)} that are the same in every position",
+        (TURN, PLACE, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
+         *map(Quantity, (d_u, d_s)), *more),
+        (*_COLUMN, row),
+        (
+            Equation("slope of v", d_v, h[:3, :] * d_u),
+            Equation("slope of w", d_w, h[3:, :] * d_u),
+            Equation(
+                "slope of the own acceleration",
+                d_bias,
+                stack(own[:3, :] + turned, own[3:, :]),
+            ),
+            *_along(v, w, column(d_v), column(d_w), d_bias),
+            rows,
+        ),
+        sources=SOURCES,
+    )  # fmt: skip
 
 
 # --- the unknowns of a hinge --------------------------------------------------------------------

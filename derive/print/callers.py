@@ -70,8 +70,8 @@ POINTED = {
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
-    "forward_slope", "effort_slope", "tangent_column", "tangent_rows", "tangent_reduce",
-    "tangent_push", "tangent_answer",
+    "forward_slope", "effort_slope", "tangent_carrier", "tangent_column", "tangent_along",
+    "tangent_steady", "tangent_rows", "tangent_reduce", "tangent_push", "tangent_answer",
 )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ _TRAITS = {
     "valued": "model->n_values",
     "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
     "driving": "(!state->given || state->residual)", "curved": "!body->straight",
+    "steady": "body->steady",
     "moving": "!body->section && speeds", "product": "model->product",
     "coordinate": "law->kind == 0", "effort": "force->effort",
 }  # fmt: skip
@@ -27,7 +28,8 @@ def condition(when: str) -> str:
         text = _trait(word)
         simple = "&&" not in text and "==" not in text
         if word.startswith("!"):
-            text = f"!{text}" if simple and not text.startswith("!") else f"!({text})"
+            opposite = text[1:] if text.startswith("!") else f"!{text}"
+            text = opposite if simple else f"!({text})"
         words.append(text)
     return " && ".join(words)
 

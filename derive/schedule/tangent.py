@@ -22,7 +22,6 @@ from .steps import (
     Call,
     Copy,
     Do,
-    EachSpeed,
     Move,
     Pass,
     Pick,
@@ -108,17 +107,24 @@ def _still(step: Call, *ports: str) -> Sloped:
 
 
 #: What the derivatives of a hinge or of a section are made into, and the numbers that go with them.
-_DIRECTION = {
-    **{name: f"hinge.{name}" for name in ("R", "H", "v", "w", "c")},
-    **{f"d_{name}": f"{D}hinge.{name}" for name in ("R", "d", "H", "v", "w", "c")},
-    "s": "body.s", "d_s": D + "body.s", "motion": "body.motion", "f": "body.e",
-}  # fmt: skip
+_ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
+_CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
+                motion="body.motion", Q="local.carrier")  # fmt: skip
+_TURNED = {"theta": "local.turn", "x": "local.place"}
+_TURN = call("frames.tangent_turned", R="hinge.R", d_R=D + "hinge.R", d_d=D + "hinge.d",
+             **_TURNED)  # fmt: skip
 
 
-def _column(matrices: str) -> Call:
-    """A direction's row of B and of G, and what the hinge's efforts change by."""
-    return call("generic{nu}.tangent_column", **_DIRECTION, B=f"{matrices}.B[9 * c]",
-                G=f"{matrices}.G[6 * c]", d_tau=D + "local.tau")  # fmt: skip
+def _column(matrices: str, laws: str) -> dict[str, str]:
+    """A direction's row of B and of G, and what the hinge's rows change by."""
+    return {
+        **_TURNED, **_ACROSS_NOW, "Q": "local.carrier", "f": "body.e", "d_s": D + "body.given",
+        "J": "body.rotor", "laws": laws, "B": f"{matrices}.B[9 * c]", "G": f"{matrices}.G[6 * c]",
+        "row": "local.change",
+    }  # fmt: skip
+
+
+_CHANGES = {"s": "body.s"} | {f"d_{name}": f"{D}hinge.{name}" for name in ("H", "v", "w", "c")}
 
 
 def _section(matrices: str) -> tuple[Step, ...]:
@@ -126,11 +132,13 @@ def _section(matrices: str) -> tuple[Step, ...]:
     felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
                 tau="modes.felt")  # fmt: skip
     return (
+        _CARRIER,
         Along(
             of="modes",
             steps=(
                 Do(whole=sloped(SECTION_MOTION)),
-                _column(matrices),
+                _TURN,
+                call("generic{nu}.tangent_column", **_column(matrices, "none"), **_CHANGES),
                 Copy(to=D + "modes.e_f"),
                 _still(felt, "e"),
                 Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
@@ -139,22 +147,23 @@ def _section(matrices: str) -> tuple[Step, ...]:
     )
 
 
-_DRIVEN = call("frames.driven_effort", felt="local.tau[k]", J="body.rotor[k]",
-               udot="body.given[k]", tau="body.tau[k]", tau_d="local.required[k]")  # fmt: skip
+_OWN_COLUMN = _column("tangent", "tangent.laws[nu * c]")
 _HINGE = (
+    _CARRIER,
     Along(
         of="free",
         steps=(
-            Copy(to=D + "body.s", source=D + "body.given"),
-            Do(whole=sloped(_HINGE_MOTION)),
-            Move(to=D + "body.tau", source="tangent.laws[nu * c]", count="nu"),
-            _column("tangent"),
-            EachSpeed(steps=(Sloped("", _DRIVEN.kernel + SLOPE, _DRIVEN.ports),)),
-            Pick(to="local.free", source=D + "local.required"),
-            Move(to="tangent.W[speeds * c]", source="local.free", count="speeds"),
+            Do(whole=sloped(_HINGE_MOTION), when="!steady"),
+            Do(whole=sloped(_HINGE_MOTION), when="steady curved"),
+            call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
+                 **_TURNED),
+            replace(_TURN, when="curved"),
+            call("generic{nu}.tangent_steady", when="steady", **_OWN_COLUMN, d_u=D + "body.u"),
+            call("generic{nu}.tangent_column", when="!steady", **_OWN_COLUMN, **_CHANGES),
+            Pick(to="tangent.W[speeds * c]", source="local.change"),
         ),
     ),
-)
+)  # fmt: skip
 
 LAG = Pass(
     "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",

@@ -41,6 +41,7 @@ class HingeSlots:
     u_units: tuple[str, ...]
     quaternion: int | None  # first quaternion entry within the hinge
     straight: bool  # the speeds are the rates of the coordinates
+    steady: bool  # the motions are the same in every position, seen from the outboard body
 
     @property
     def nq(self) -> int:
@@ -145,7 +146,7 @@ class Layout:
         return HingeSlots(
             self._numbers.name(hinge), one.type, one.q + repeats * group.nq,
             one.u + repeats * group.nu, one.q_names, one.q_units, one.u_names, one.u_units,
-            one.quaternion, one.straight,
+            one.quaternion, one.straight, one.steady,
         )  # fmt: skip
 
     @cached_property

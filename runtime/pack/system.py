@@ -70,7 +70,8 @@ class SectionNumbers:
 class BodyNumbers:
     """A body with its inboard hinge, but for its place in the tree.
 
-    `straight` says that the rates of the hinge's coordinates are its speeds.
+    `straight` says that the rates of the hinge's coordinates are its speeds, `steady` that its
+    motions are the same in every position, seen from the outboard body.
     `connection` is Rt (9) and ro (3), `link` the same as screws about x and z where it can be one
     (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
     `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
@@ -83,6 +84,7 @@ class BodyNumbers:
     nq: int
     nu: int
     straight: bool
+    steady: bool
     connection: Numbers
     link: Numbers
     height: float

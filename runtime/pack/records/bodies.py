@@ -65,7 +65,7 @@ class BodyRecords:
     def _fill(self, record: Any, body: BodyNumbers, place: int) -> None:
         """Numbers, and the kernels that read them."""
         record.nq, record.nu, record.held[2] = body.nq, body.nu, -body.height
-        record.straight = int(body.straight)
+        record.straight, record.steady = int(body.straight), int(body.steady)
         record.release, record.idle = body.release, int(body.idle)
         record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
         self._numbers(record, body)
