@@ -28,6 +28,10 @@ int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1310,6 +1314,109 @@ static const mstmm_port mstmm_hinge_ball_hinge_slope_outputs[] = {
     {"d_qdot", 4, "", 0, 0},
 };
 
+/* hinge by q
+ * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
+ * out J[4][4] qdot by q, transposed
+ */
+int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    J[0] = 0.0;
+    const real t0 = u[0] * 0.5;
+    J[1] = t0;
+    const real t1 = u[1] * 0.5;
+    J[2] = t1;
+    const real t2 = u[2] * 0.5;
+    J[3] = t2;
+    const real t3 = -t0;
+    J[4] = t3;
+    J[5] = 0.0;
+    const real t4 = -t2;
+    J[6] = t4;
+    J[7] = t1;
+    const real t5 = -t1;
+    J[8] = t5;
+    J[9] = t2;
+    J[10] = 0.0;
+    J[11] = t3;
+    J[12] = t4;
+    J[13] = t5;
+    J[14] = t0;
+    J[15] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_ball_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_ball_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_rates_by_coordinates_outputs[] = {
+    {"J", 16, "", 0, 0},
+};
+
+/* hinge by u
+ * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
+ * out J[3][4] qdot by u, transposed
+ */
+int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)u;
+    const real t0 = q[1] * 0.5;
+    const real t1 = -t0;
+    J[0] = t1;
+    const real t2 = q[0] * 0.5;
+    J[1] = t2;
+    const real t3 = q[3] * 0.5;
+    J[2] = t3;
+    const real t4 = q[2] * 0.5;
+    const real t5 = -t4;
+    J[3] = t5;
+    J[4] = t5;
+    const real t6 = -t3;
+    J[5] = t6;
+    J[6] = t2;
+    J[7] = t0;
+    J[8] = t6;
+    J[9] = t4;
+    J[10] = t1;
+    J[11] = t2;
+    return 0;
+}
+
+static int mstmm_hinge_ball_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_ball_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
+    {"J", 12, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
 };
@@ -1387,13 +1494,37 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_ball_rates_by_coordinates,
+        .call = mstmm_hinge_ball_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_ball_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_ball_rates_by_coordinates_outputs,
+        .ir_hash = "c4d37145330d5962083fc978fff63ba347e0b61a1b1b25d702a73a20dbb29b75",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_ball_rates_by_speeds,
+        .call = mstmm_hinge_ball_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_ball_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_ball_rates_by_speeds_outputs,
+        .ir_hash = "d13221510d31e90b77cd6d8c14b106fe83d09a3f7ac5cabac13d1d6bee02dfc0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "30e693bb57627b47da7d634e9469b3823a380db15143378be2997e59f9887f5f",
+    .hash = "bd0ff4cab6106f57db8b7805df269159b886855320025bbf16258e43df1cb88d",
     .nq = 4,
     .nu = 3,
     .np = 0,
@@ -1403,6 +1534,6 @@ const mstmm_element mstmm_hinge_ball = {
     .u_units = mstmm_hinge_ball_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_ball_kernels,
 };

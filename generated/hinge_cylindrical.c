@@ -27,6 +27,10 @@ int mstmm_hinge_cylindrical_hinge_slope(const real *restrict p, const real *rest
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
@@ -1005,6 +1009,76 @@ static const mstmm_port mstmm_hinge_cylindrical_hinge_slope_outputs[] = {
     {"d_qdot", 2, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[0] parameters
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
+ * out J[2][2] qdot by q, transposed
+ */
+int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_cylindrical_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_cylindrical_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_cylindrical_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_cylindrical_rates_by_coordinates_outputs[] = {
+    {"J", 4, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[0] parameters
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
+ * out J[2][2] qdot by u, transposed
+ */
+int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_cylindrical_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_cylindrical_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
+    {"J", 4, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_cylindrical_q_names[] = {
     "displacement", "angle",
 };
@@ -1082,13 +1156,37 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_rates_by_coordinates,
+        .call = mstmm_hinge_cylindrical_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_cylindrical_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_cylindrical_rates_by_coordinates_outputs,
+        .ir_hash = "f0e0afdbfdfd566c854a9bccbae6f0e5e26bc1fe897eecfcf3e7f1014d106049",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_rates_by_speeds,
+        .call = mstmm_hinge_cylindrical_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_cylindrical_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_cylindrical_rates_by_speeds_outputs,
+        .ir_hash = "d579704cb3933e114f679917855ac7a65e3109b6ada3a6dab994ebfc795ed7bd",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "c0b70ea56440009a5fc35618ea418666c2db78786b78b0af8d5df0eb452264f4",
+    .hash = "2f89e8e30cbd27e71172ce4ad225a960af538ebc05e31157118703ebbd9ec412",
     .nq = 2,
     .nu = 2,
     .np = 0,
@@ -1098,6 +1196,6 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .u_units = mstmm_hinge_cylindrical_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_cylindrical_kernels,
 };

@@ -27,6 +27,10 @@ int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the free hinge
  * in  p[0] parameters
@@ -1825,6 +1829,380 @@ static const mstmm_port mstmm_hinge_free_hinge_slope_outputs[] = {
     {"d_qdot", 7, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[0] parameters
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
+ * out J[7][7] qdot by q, transposed
+ */
+int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    J[0] = 0.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    J[4] = 0.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    J[7] = 0.0;
+    J[8] = 0.0;
+    J[9] = 0.0;
+    J[10] = 0.0;
+    J[11] = 0.0;
+    J[12] = 0.0;
+    J[13] = 0.0;
+    J[14] = 0.0;
+    J[15] = 0.0;
+    J[16] = 0.0;
+    J[17] = 0.0;
+    J[18] = 0.0;
+    J[19] = 0.0;
+    J[20] = 0.0;
+    const real t0 = q[6] * q[6];
+    const real t1 = q[5] * q[5];
+    const real t2 = q[3] * q[3];
+    const real t3 = q[4] * q[4];
+    const real t4 = t2 + t3;
+    const real t5 = t1 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = 1.0 / t6;
+    const real t8 = t7 * 2.0;
+    const real t9 = q[5] * u[2];
+    const real t10 = t8 * t9;
+    const real t11 = q[5] * q[3];
+    const real t12 = q[6] * q[4];
+    const real t13 = t11 + t12;
+    const real t14 = t13 * u[2];
+    const real t15 = q[3] + q[3];
+    const real t16 = t7 * t15;
+    const real t17 = t16 / t6;
+    const real t18 = 2.0 * t17;
+    const real t19 = t14 * t18;
+    const real t20 = t10 - t19;
+    const real t21 = t1 + t0;
+    const real t22 = t21 * t18;
+    const real t23 = u[0] * t22;
+    const real t24 = t20 + t23;
+    const real t25 = q[5] * q[4];
+    const real t26 = q[6] * q[3];
+    const real t27 = t25 - t26;
+    const real t28 = t27 * u[1];
+    const real t29 = t28 * t18;
+    const real t30 = q[6] * u[1];
+    const real t31 = t8 * t30;
+    const real t32 = t29 + t31;
+    const real t33 = t24 - t32;
+    J[21] = t33;
+    const real t34 = t0 + t3;
+    const real t35 = t34 * t18;
+    const real t36 = u[1] * t35;
+    const real t37 = q[5] * q[6];
+    const real t38 = q[3] * q[4];
+    const real t39 = t37 - t38;
+    const real t40 = t39 * u[2];
+    const real t41 = t40 * t18;
+    const real t42 = q[4] * u[2];
+    const real t43 = t8 * t42;
+    const real t44 = t41 + t43;
+    const real t45 = t36 - t44;
+    const real t46 = q[6] * u[0];
+    const real t47 = t8 * t46;
+    const real t48 = t25 + t26;
+    const real t49 = t48 * u[0];
+    const real t50 = t49 * t18;
+    const real t51 = t47 - t50;
+    const real t52 = t45 + t51;
+    J[22] = t52;
+    const real t53 = q[4] * u[1];
+    const real t54 = t8 * t53;
+    const real t55 = t37 + t38;
+    const real t56 = t55 * u[1];
+    const real t57 = t56 * t18;
+    const real t58 = t54 - t57;
+    const real t59 = t1 + t3;
+    const real t60 = t59 * t18;
+    const real t61 = u[2] * t60;
+    const real t62 = t58 + t61;
+    const real t63 = t12 - t11;
+    const real t64 = t63 * u[0];
+    const real t65 = t64 * t18;
+    const real t66 = q[5] * u[0];
+    const real t67 = t8 * t66;
+    const real t68 = t65 + t67;
+    const real t69 = t62 - t68;
+    J[23] = t69;
+    J[24] = 0.0;
+    const real t70 = u[3] * 0.5;
+    J[25] = t70;
+    const real t71 = u[4] * 0.5;
+    J[26] = t71;
+    const real t72 = u[5] * 0.5;
+    J[27] = t72;
+    const real t73 = q[6] * u[2];
+    const real t74 = t8 * t73;
+    const real t75 = q[4] + q[4];
+    const real t76 = t7 * t75;
+    const real t77 = t76 / t6;
+    const real t78 = 2.0 * t77;
+    const real t79 = t14 * t78;
+    const real t80 = t74 - t79;
+    const real t81 = t21 * t78;
+    const real t82 = u[0] * t81;
+    const real t83 = t80 + t82;
+    const real t84 = q[5] * u[1];
+    const real t85 = t8 * t84;
+    const real t86 = t28 * t78;
+    const real t87 = t85 - t86;
+    const real t88 = t83 + t87;
+    J[28] = t88;
+    const real t89 = t34 * t78;
+    const real t90 = t8 * t75;
+    const real t91 = t89 - t90;
+    const real t92 = u[1] * t91;
+    const real t93 = t40 * t78;
+    const real t94 = q[3] * u[2];
+    const real t95 = t8 * t94;
+    const real t96 = t93 + t95;
+    const real t97 = t92 - t96;
+    const real t98 = t49 * t78;
+    const real t99 = t67 - t98;
+    const real t100 = t97 + t99;
+    J[29] = t100;
+    const real t101 = q[3] * u[1];
+    const real t102 = t8 * t101;
+    const real t103 = t56 * t78;
+    const real t104 = t102 - t103;
+    const real t105 = t59 * t78;
+    const real t106 = t105 - t90;
+    const real t107 = u[2] * t106;
+    const real t108 = t104 + t107;
+    const real t109 = t64 * t78;
+    const real t110 = t47 - t109;
+    const real t111 = t108 + t110;
+    J[30] = t111;
+    const real t112 = -t70;
+    J[31] = t112;
+    J[32] = 0.0;
+    const real t113 = -t72;
+    J[33] = t113;
+    J[34] = t71;
+    const real t114 = q[5] + q[5];
+    const real t115 = t7 * t114;
+    const real t116 = t115 / t6;
+    const real t117 = 2.0 * t116;
+    const real t118 = t14 * t117;
+    const real t119 = t95 - t118;
+    const real t120 = t21 * t117;
+    const real t121 = t8 * t114;
+    const real t122 = t120 - t121;
+    const real t123 = u[0] * t122;
+    const real t124 = t119 + t123;
+    const real t125 = t28 * t117;
+    const real t126 = t54 - t125;
+    const real t127 = t124 + t126;
+    J[35] = t127;
+    const real t128 = t40 * t117;
+    const real t129 = t74 - t128;
+    const real t130 = t34 * t117;
+    const real t131 = u[1] * t130;
+    const real t132 = t129 + t131;
+    const real t133 = q[4] * u[0];
+    const real t134 = t8 * t133;
+    const real t135 = t49 * t117;
+    const real t136 = t134 - t135;
+    const real t137 = t132 + t136;
+    J[36] = t137;
+    const real t138 = t56 * t117;
+    const real t139 = t31 - t138;
+    const real t140 = t59 * t117;
+    const real t141 = t140 - t121;
+    const real t142 = u[2] * t141;
+    const real t143 = t139 + t142;
+    const real t144 = t64 * t117;
+    const real t145 = q[3] * u[0];
+    const real t146 = t8 * t145;
+    const real t147 = t144 + t146;
+    const real t148 = t143 - t147;
+    J[37] = t148;
+    const real t149 = -t71;
+    J[38] = t149;
+    J[39] = t72;
+    J[40] = 0.0;
+    J[41] = t112;
+    const real t150 = q[6] + q[6];
+    const real t151 = t7 * t150;
+    const real t152 = t151 / t6;
+    const real t153 = 2.0 * t152;
+    const real t154 = t14 * t153;
+    const real t155 = t43 - t154;
+    const real t156 = t21 * t153;
+    const real t157 = t8 * t150;
+    const real t158 = t156 - t157;
+    const real t159 = u[0] * t158;
+    const real t160 = t155 + t159;
+    const real t161 = t28 * t153;
+    const real t162 = t102 + t161;
+    const real t163 = t160 - t162;
+    J[42] = t163;
+    const real t164 = t40 * t153;
+    const real t165 = t10 - t164;
+    const real t166 = t34 * t153;
+    const real t167 = t166 - t157;
+    const real t168 = u[1] * t167;
+    const real t169 = t165 + t168;
+    const real t170 = t49 * t153;
+    const real t171 = t146 - t170;
+    const real t172 = t169 + t171;
+    J[43] = t172;
+    const real t173 = t56 * t153;
+    const real t174 = t85 - t173;
+    const real t175 = t59 * t153;
+    const real t176 = u[2] * t175;
+    const real t177 = t174 + t176;
+    const real t178 = t64 * t153;
+    const real t179 = t134 - t178;
+    const real t180 = t177 + t179;
+    J[44] = t180;
+    J[45] = t113;
+    J[46] = t149;
+    J[47] = t70;
+    J[48] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_free_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_free_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_free_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 7, "", 0, 0},
+    {"u", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_free_rates_by_coordinates_outputs[] = {
+    {"J", 49, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[0] parameters
+ * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
+ * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
+ * out J[6][7] qdot by u, transposed
+ */
+int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)u;
+    const real t0 = q[5] * q[5];
+    const real t1 = q[6] * q[6];
+    const real t2 = t0 + t1;
+    const real t3 = q[3] * q[3];
+    const real t4 = q[4] * q[4];
+    const real t5 = t3 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = t1 + t6;
+    const real t8 = 1.0 / t7;
+    const real t9 = t8 * 2.0;
+    const real t10 = t2 * t9;
+    const real t11 = 1.0 - t10;
+    J[0] = t11;
+    const real t12 = q[5] * q[4];
+    const real t13 = q[6] * q[3];
+    const real t14 = t12 + t13;
+    const real t15 = t9 * t14;
+    J[1] = t15;
+    const real t16 = q[6] * q[4];
+    const real t17 = q[5] * q[3];
+    const real t18 = t16 - t17;
+    const real t19 = t9 * t18;
+    J[2] = t19;
+    J[3] = 0.0;
+    J[4] = 0.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    const real t20 = t12 - t13;
+    const real t21 = t9 * t20;
+    J[7] = t21;
+    const real t22 = t1 + t4;
+    const real t23 = t9 * t22;
+    const real t24 = 1.0 - t23;
+    J[8] = t24;
+    const real t25 = q[5] * q[6];
+    const real t26 = q[3] * q[4];
+    const real t27 = t25 + t26;
+    const real t28 = t9 * t27;
+    J[9] = t28;
+    J[10] = 0.0;
+    J[11] = 0.0;
+    J[12] = 0.0;
+    J[13] = 0.0;
+    const real t29 = t17 + t16;
+    const real t30 = t9 * t29;
+    J[14] = t30;
+    const real t31 = t25 - t26;
+    const real t32 = t9 * t31;
+    J[15] = t32;
+    const real t33 = t0 + t4;
+    const real t34 = t9 * t33;
+    const real t35 = 1.0 - t34;
+    J[16] = t35;
+    J[17] = 0.0;
+    J[18] = 0.0;
+    J[19] = 0.0;
+    J[20] = 0.0;
+    J[21] = 0.0;
+    J[22] = 0.0;
+    J[23] = 0.0;
+    const real t36 = q[4] * 0.5;
+    const real t37 = -t36;
+    J[24] = t37;
+    const real t38 = q[3] * 0.5;
+    J[25] = t38;
+    const real t39 = q[6] * 0.5;
+    J[26] = t39;
+    const real t40 = q[5] * 0.5;
+    const real t41 = -t40;
+    J[27] = t41;
+    J[28] = 0.0;
+    J[29] = 0.0;
+    J[30] = 0.0;
+    J[31] = t41;
+    const real t42 = -t39;
+    J[32] = t42;
+    J[33] = t38;
+    J[34] = t36;
+    J[35] = 0.0;
+    J[36] = 0.0;
+    J[37] = 0.0;
+    J[38] = t42;
+    J[39] = t40;
+    J[40] = t37;
+    J[41] = t38;
+    return 0;
+}
+
+static int mstmm_hinge_free_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_free_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_free_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 7, "", 0, 0},
+    {"u", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_free_rates_by_speeds_outputs[] = {
+    {"J", 42, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_free_q_names[] = {
     "x", "y", "z", "qw", "qx", "qy", "qz",
 };
@@ -1902,13 +2280,37 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_free_rates_by_coordinates,
+        .call = mstmm_hinge_free_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_free_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_free_rates_by_coordinates_outputs,
+        .ir_hash = "aad784b0adbce085e0d6b4fe44b264392bebcb9d1df6f550d17583290519ad60",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_free_rates_by_speeds,
+        .call = mstmm_hinge_free_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_free_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_free_rates_by_speeds_outputs,
+        .ir_hash = "b6714a2e6e0d166da24621885a5604769f3dcd6bdf169b527e811e31ee2ae126",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "7a587e4e9eb853f2498d91dc0a62d31bfee95592f3fa17084a83bd4493968ef5",
+    .hash = "17a4d237d892747ca97c29ea0c2439fc4f20d69d9de1ce4cd43483545117e043",
     .nq = 7,
     .nu = 6,
     .np = 0,
@@ -1918,6 +2320,6 @@ const mstmm_element mstmm_hinge_free = {
     .u_units = mstmm_hinge_free_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_free_kernels,
 };

@@ -29,6 +29,10 @@ int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict 
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the gimbal hinge (three angles)
  * in  p[0] parameters
@@ -1604,6 +1608,86 @@ static const mstmm_port mstmm_hinge_gimbal_hinge_slope_outputs[] = {
     {"d_qdot", 3, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
+ * out J[3][3] qdot by q, transposed
+ */
+int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    J[4] = 0.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    J[7] = 0.0;
+    J[8] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_rates_by_coordinates_outputs[] = {
+    {"J", 9, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
+ * out J[3][3] qdot by u, transposed
+ */
+int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    J[4] = 1.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    J[7] = 0.0;
+    J[8] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
+    {"J", 9, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_gimbal_q_names[] = {
     "angle1", "angle2", "angle3",
 };
@@ -1693,13 +1777,37 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_gimbal_rates_by_coordinates,
+        .call = mstmm_hinge_gimbal_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_gimbal_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_gimbal_rates_by_coordinates_outputs,
+        .ir_hash = "0e4b457fb4aa2743b62cfd97bd7dbed337a3b8e03cb04f9388d1b54b2fb9d8aa",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_gimbal_rates_by_speeds,
+        .call = mstmm_hinge_gimbal_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_gimbal_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_gimbal_rates_by_speeds_outputs,
+        .ir_hash = "f64f673cc8dd9c141d86e88f7334b2cb781161b4027452586c171b2a535106f5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "7dcf3b78321fb555d5665f5ff2596f41edf6adaf29dfe183e47b7735258cd91e",
+    .hash = "b87325fbfdd7fed96d6cd75b62874bf42e2a6cd46f130379126ae85912fb127f",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1709,6 +1817,6 @@ const mstmm_element mstmm_hinge_gimbal = {
     .u_units = mstmm_hinge_gimbal_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 6,
+    .n_kernels = 8,
     .kernels = mstmm_hinge_gimbal_kernels,
 };

@@ -28,6 +28,10 @@ int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
@@ -943,6 +947,72 @@ static const mstmm_port mstmm_hinge_pin_hinge_slope_outputs[] = {
     {"d_qdot", 1, "", 0, 0},
 };
 
+/* hinge by q
+ * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
+ * in  p[0] parameters
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * out J[1][1] qdot by q, transposed
+ */
+int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_pin_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_pin_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_pin_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_pin_rates_by_coordinates_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
+/* hinge by u
+ * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
+ * in  p[0] parameters
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * out J[1][1] qdot by u, transposed
+ */
+int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_pin_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_pin_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_pin_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_pin_q_names[] = {
     "angle",
 };
@@ -1020,13 +1090,37 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_pin_rates_by_coordinates,
+        .call = mstmm_hinge_pin_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_pin_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_pin_rates_by_coordinates_outputs,
+        .ir_hash = "57982938d8ebc8269f5a755a18064d53d0b790fcb2fdfd197221c0699ca05273",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_pin_rates_by_speeds,
+        .call = mstmm_hinge_pin_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_pin_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_pin_rates_by_speeds_outputs,
+        .ir_hash = "39d517b9dc18b22a376ae3ab27ab13f1ab01445ad9f2acb1392d9321e43c6084",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "75fd87dbc4078973ae6bc6ef9cd217b18807bbd586177bfa3b339b443a7697ca",
+    .hash = "d7ecfc3129c8e7d5368045142cbf1c238aaa9c2c8985e66c82d9a053b71a2c21",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -1036,6 +1130,6 @@ const mstmm_element mstmm_hinge_pin = {
     .u_units = mstmm_hinge_pin_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_pin_kernels,
 };

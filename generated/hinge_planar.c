@@ -27,6 +27,10 @@ int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict 
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the planar hinge
  * in  p[0] parameters
@@ -1338,6 +1342,86 @@ static const mstmm_port mstmm_hinge_planar_hinge_slope_outputs[] = {
     {"d_qdot", 3, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
+ * out J[3][3] qdot by q, transposed
+ */
+int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    J[4] = 0.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    J[7] = 0.0;
+    J[8] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_planar_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_planar_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_rates_by_coordinates_outputs[] = {
+    {"J", 9, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
+ * out J[3][3] qdot by u, transposed
+ */
+int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    J[4] = 1.0;
+    J[5] = 0.0;
+    J[6] = 0.0;
+    J[7] = 0.0;
+    J[8] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_planar_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_planar_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
+    {"J", 9, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_planar_q_names[] = {
     "x", "y", "angle",
 };
@@ -1415,13 +1499,37 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_planar_rates_by_coordinates,
+        .call = mstmm_hinge_planar_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_planar_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_planar_rates_by_coordinates_outputs,
+        .ir_hash = "7449a05bbd055a1239076cecba94b58384da63e18e53549d401801fffed54fe8",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_planar_rates_by_speeds,
+        .call = mstmm_hinge_planar_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_planar_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_planar_rates_by_speeds_outputs,
+        .ir_hash = "f4195009112ec65c89fb5f90d2df6c0b90e6cedb6c34f9029ebe0ff7a11eaec3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "2943b2afae7c6410fed5e5ea90c9f412d68d488ff2104dc7bfa1d372a54e255e",
+    .hash = "b4d434a2d6ed591d617f312780364bf6dac5b00b150a9b7eabc26e9d9507bfb5",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1431,6 +1539,6 @@ const mstmm_element mstmm_hinge_planar = {
     .u_units = mstmm_hinge_planar_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_planar_kernels,
 };

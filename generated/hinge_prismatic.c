@@ -27,6 +27,10 @@ int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restri
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
@@ -934,6 +938,70 @@ static const mstmm_port mstmm_hinge_prismatic_hinge_slope_outputs[] = {
     {"d_qdot", 1, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[0] parameters
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
+ * out J[1][1] qdot by q, transposed
+ */
+int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_prismatic_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_prismatic_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_prismatic_rates_by_coordinates_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_prismatic_rates_by_coordinates_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[0] parameters
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
+ * out J[1][1] qdot by u, transposed
+ */
+int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_prismatic_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_prismatic_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_prismatic_q_names[] = {
     "displacement",
 };
@@ -1011,13 +1079,37 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_prismatic_rates_by_coordinates,
+        .call = mstmm_hinge_prismatic_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_prismatic_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_prismatic_rates_by_coordinates_outputs,
+        .ir_hash = "ce18baa7937bf84f29664276c7793e94f63c52cddc7e5f3f99a6af35e87ca4a3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_prismatic_rates_by_speeds,
+        .call = mstmm_hinge_prismatic_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_prismatic_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_prismatic_rates_by_speeds_outputs,
+        .ir_hash = "b1b93a183d9410a2f4cecaa535355123e6a7eb2897dc0dc761db0df0384af495",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "720a0ac66f5ef5facf4dae4b31638879f46a4130554c261030b08afea313aa1a",
+    .hash = "561e444afa409f9f9b7dbcdda9458118c0b77cb3c1187a7105ded0798461f20b",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -1027,6 +1119,6 @@ const mstmm_element mstmm_hinge_prismatic = {
     .u_units = mstmm_hinge_prismatic_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_prismatic_kernels,
 };

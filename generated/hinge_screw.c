@@ -27,6 +27,10 @@ int mstmm_hinge_screw_hinge_slope(const real *restrict p, const real *restrict q
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the screw hinge
  * in  p[1] parameters: lead [m]
@@ -1091,6 +1095,70 @@ static const mstmm_port mstmm_hinge_screw_hinge_slope_outputs[] = {
     {"d_qdot", 1, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * out J[1][1] qdot by q, transposed
+ */
+int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_screw_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_screw_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_screw_rates_by_coordinates_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_screw_rates_by_coordinates_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * out J[1][1] qdot by u, transposed
+ */
+int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_screw_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_screw_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_screw_rates_by_speeds_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
+    {"J", 1, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_screw_q_names[] = {
     "angle",
 };
@@ -1176,13 +1244,37 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_screw_rates_by_coordinates,
+        .call = mstmm_hinge_screw_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_screw_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_screw_rates_by_coordinates_outputs,
+        .ir_hash = "8abfa9fc9f775c8491a2d7f69cc819ffee2cf11632cf4b605e40159bbf1fbe50",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_screw_rates_by_speeds,
+        .call = mstmm_hinge_screw_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_screw_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_screw_rates_by_speeds_outputs,
+        .ir_hash = "6edf6909c9f26d9525378b3b4b7590225c25d943365c312c613c83045b6d9fb4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "57210da9802453ef95961d70904dd6d88b4781aaaad83d8b9e57887910026b18",
+    .hash = "2345c01c6f5c0f81027bd51ae2f03a01b545d91a5cad8aa6f3790e0976550f4b",
     .nq = 1,
     .nu = 1,
     .np = 1,
@@ -1192,6 +1284,6 @@ const mstmm_element mstmm_hinge_screw = {
     .u_units = mstmm_hinge_screw_u_units,
     .p_names = mstmm_hinge_screw_p_names,
     .p_units = mstmm_hinge_screw_p_units,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_screw_kernels,
 };

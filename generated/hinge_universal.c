@@ -27,6 +27,10 @@ int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restri
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
+int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J);
 
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
@@ -1288,6 +1292,76 @@ static const mstmm_port mstmm_hinge_universal_hinge_slope_outputs[] = {
     {"d_qdot", 2, "", 0, 0},
 };
 
+/* hinge by q
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
+ * out J[2][2] qdot by q, transposed
+ */
+int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 0.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_universal_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_rates_by_coordinates(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_universal_rates_by_coordinates_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_rates_by_coordinates_outputs[] = {
+    {"J", 4, "", 0, 0},
+};
+
+/* hinge by u
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
+ * out J[2][2] qdot by u, transposed
+ */
+int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
+    const real *restrict u, real *restrict J)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    J[0] = 1.0;
+    J[1] = 0.0;
+    J[2] = 0.0;
+    J[3] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_universal_rates_by_speeds_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_rates_by_speeds(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_hinge_universal_rates_by_speeds_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
+    {"J", 4, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_universal_q_names[] = {
     "angle1", "angle2",
 };
@@ -1373,13 +1447,37 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "rates_by_coordinates",
+        .function = (void (*)(void))mstmm_hinge_universal_rates_by_coordinates,
+        .call = mstmm_hinge_universal_rates_by_coordinates_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_universal_rates_by_coordinates_inputs,
+        .outputs = mstmm_hinge_universal_rates_by_coordinates_outputs,
+        .ir_hash = "eeb8c7a53d7f428e37f818b856398636eb74c0ae310a35028b08564ccaa4d8a0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rates_by_speeds",
+        .function = (void (*)(void))mstmm_hinge_universal_rates_by_speeds,
+        .call = mstmm_hinge_universal_rates_by_speeds_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_hinge_universal_rates_by_speeds_inputs,
+        .outputs = mstmm_hinge_universal_rates_by_speeds_outputs,
+        .ir_hash = "39b7ac214404f98979f89e8df7abd3c82079045a73ecbb39e4f0745859fd901f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "a644652754f84178d9ae07bcb49e3f954f0ac0dc5408c6027145146de80d31b7",
+    .hash = "631daf0becf58e22ae79ed80e9d6b59c489715c918994d1a37d015d8743fca08",
     .nq = 2,
     .nu = 2,
     .np = 1,
@@ -1389,6 +1487,6 @@ const mstmm_element mstmm_hinge_universal = {
     .u_units = mstmm_hinge_universal_u_units,
     .p_names = mstmm_hinge_universal_p_names,
     .p_units = mstmm_hinge_universal_p_units,
-    .n_kernels = 5,
+    .n_kernels = 7,
     .kernels = mstmm_hinge_universal_kernels,
 };

@@ -2508,6 +2508,36 @@ static inline void mstmm_hinge_hinge_slope_arrays(struct mstmm_hinge_hinge_slope
     outputs[6] = to.d_qdot;
 }
 
+struct mstmm_hinge_rates_by_coordinates {
+    const real *p;
+    const real *q;
+    const real *u;
+    real *J;
+};
+typedef int mstmm_hinge_rates_by_coordinates_kernel(
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+static inline int mstmm_hinge_rates_by_coordinates_by(void (*kernel)(void), struct mstmm_hinge_rates_by_coordinates to)
+{
+    return ((mstmm_hinge_rates_by_coordinates_kernel *)kernel)(
+        to.p, to.q, to.u, to.J);
+}
+#define mstmm_hinge_rates_by_coordinates(kernel, ...) mstmm_hinge_rates_by_coordinates_by(kernel, (struct mstmm_hinge_rates_by_coordinates){__VA_ARGS__})
+
+struct mstmm_hinge_rates_by_speeds {
+    const real *p;
+    const real *q;
+    const real *u;
+    real *J;
+};
+typedef int mstmm_hinge_rates_by_speeds_kernel(
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+static inline int mstmm_hinge_rates_by_speeds_by(void (*kernel)(void), struct mstmm_hinge_rates_by_speeds to)
+{
+    return ((mstmm_hinge_rates_by_speeds_kernel *)kernel)(
+        to.p, to.q, to.u, to.J);
+}
+#define mstmm_hinge_rates_by_speeds(kernel, ...) mstmm_hinge_rates_by_speeds_by(kernel, (struct mstmm_hinge_rates_by_speeds){__VA_ARGS__})
+
 struct mstmm_body_inertia {
     const real *p;
     real *S;

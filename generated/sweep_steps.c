@@ -1592,12 +1592,14 @@ static int mstmm_at_lag(mstmm_state *state, int index)
     const int nu = body->nu;
     const int nq = body->nq;
     real *tangent = state->tangents->numbers + body->tangent;
-    int code;
+    mstmm_hinge_rates_by_coordinates_of(state, body,
+        .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+        .J = tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq));
+    mstmm_hinge_rates_by_speeds_of(state, body,
+        .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+        .J = tangent + MSTMM_TANGENT_WAYS(body->nu, body->nq));
     for (int c = 0; c < nq; c++) {
         mstmm_aim_coordinate(state, body, c);
-        code = mstmm_at_hinge_motion_slope(state, index);
-        if (code) return code;
-        memcpy(tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq) + nq * c, state->slope->qdot + body->q, (size_t)(nq) * sizeof(real));
         memcpy(tangent + MSTMM_TANGENT_UNIT(body->nu, body->nq) + nq * c, state->slope->q + body->q, (size_t)(nq) * sizeof(real));
     }
     mstmm_aim_nowhere(state, body);
@@ -1610,11 +1612,9 @@ static int mstmm_at_lag(mstmm_state *state, int index)
         .work = tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq));
     for (int c = 0; c < nu; c++) {
         mstmm_aim_rate(state, body, c);
-        code = mstmm_at_hinge_motion_slope(state, index);
-        if (code) return code;
         mstmm_tangent_lagged(
             .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
-            .rate = state->slope->qdot + body->q,
+            .rate = tangent + MSTMM_TANGENT_WAYS(body->nu, body->nq) + nq * c,
             .dq = tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * c);
     }
     mstmm_aim_nowhere(state, body);

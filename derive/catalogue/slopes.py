@@ -16,8 +16,15 @@ from mstmm.ir.tangent import jacobian, tangent
 
 #: Suffix of the name of a differentiated kernel.
 SLOPE = "_slope"
-#: Name of the kernel that gives a body's load by its motion, a row an entry of the motion.
-LOAD_BY_MOTION = "load_by_motion"
+#: Kernels that give all derivatives of an output by a port, a row an entry of the port: name ->
+#: (kernel, port, output), by kind of the element.
+_WHOLE = {
+    "body": {"load_by_motion": ("bias_load", "motion", "e")},
+    "hinge": {
+        "rates_by_coordinates": ("hinge", "q", "qdot"),
+        "rates_by_speeds": ("hinge", "u", "qdot"),
+    },
+}
 
 #: kernel -> (ports that move, outputs wanted; none named: all), by kind and name of the element.
 #: "generic" stands for the steps for any hinge, "hinge", "body" and "force" for every element.
@@ -66,9 +73,10 @@ def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]
     kernels = tuple(kernels)
     moving = _MOVING.get(group, {})
     slopes = [slope(k, *moving[k.name]) for k in kernels if k.name in moving]
-    if group == "body":
-        load = next(kernel for kernel in kernels if kernel.name == "bias_load")
-        slopes.append(replace(jacobian(load, "motion", "e"), name=LOAD_BY_MOTION))
+    known = {kernel.name: kernel for kernel in kernels}
+    for name, (kernel, port, output) in _WHOLE.get(group, {}).items():
+        if next(p for p in known[kernel].inputs if p.name == port).length():
+            slopes.append(replace(jacobian(known[kernel], port, output), name=name))
     return (*kernels, *slopes)
 
 

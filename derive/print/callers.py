@@ -44,7 +44,11 @@ DIRECT = {
 POINTED = {
     "hinge": (
         ("hinge", "pin"),
-        {k: k for k in ("hinge", "forward", "condense", "recover", "hinge_slope")},
+        {
+            k: k
+            for k in ("hinge", "forward", "condense", "recover", "hinge_slope",
+                      "rates_by_coordinates", "rates_by_speeds")
+        },
     ),
     "body": (
         ("body", "rigid"),
@@ -118,7 +122,8 @@ def _callees(specs: Specs) -> Iterator[tuple[str, Callee]]:
         for name, like in names.items():
             kernel = _kernel(specs[key], like)
             if short == "hinge":
-                _same_ports([_kernel(s, name) for s in specs.values() if s.kind == "hinge"])
+                hinges = (s for s in specs.values() if s.kind == "hinge")
+                _same_ports([k for s in hinges for k in s.kernels if k.name == name])
             yield f"{short}.{name}", Callee(f"{short}_{name}", kernel, "pointer")
 
 

@@ -57,6 +57,10 @@ _SIZES: dict[str, tuple[str, set[str]]] = {
 _INTERPRETED = {
     "mstmm_hinge_hinge(body->hinge,": "mstmm_hinge_of(state, body,",
     "mstmm_hinge_hinge_slope(body->hinge_slope,": "mstmm_hinge_slope_of(state, body,",
+    **{
+        f"mstmm_hinge_{name}(body->{name},": f"mstmm_hinge_{name}_of(state, body,"
+        for name in ("rates_by_coordinates", "rates_by_speeds")
+    },
 }
 _POINTERS = {"hinge": "body->{}", "body": "body->{}", "law": "law->evaluate{}",
              "force": "force->wrench{}", "link": "at.{}"}  # fmt: skip
@@ -204,8 +208,7 @@ class StepText:
             raise ValueError(f"{step.kernel} has no port {', '.join(sorted(unknown))}")
         first = self._first(step, callee)
         call = f"{first}{_filled(words, indent)}"
-        if element_of(step) == "hinge" and first.startswith("mstmm_hinge_hinge"):
-            call = call.replace(first, _INTERPRETED[first])
+        call = call.replace(first, _INTERPRETED.get(first, first))
         if not step.fails:
             return [f"{indent}{call};"]
         if step.fails == "tangent":
@@ -328,11 +331,6 @@ def word_of(slot: str) -> str:
         return f"d_{word_of(slot.removeprefix(D))}"
     owner, _, name = slot.partition(".")
     return name if owner == "local" else f"{owner}_{name}"
-
-
-def element_of(step: Call) -> str:
-    """Whose kernel a call is."""
-    return step.kernel.partition(".")[0]
 
 
 def _filled(words: list[str], indent: str) -> str:

@@ -168,21 +168,18 @@ _HINGE = (
 LAG = Pass(
     "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
     (
+        call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.turns"),
+        call("hinge.rates_by_speeds", **COORDINATES, J="tangent.ways"),
         Along(
             of="coordinates",
-            steps=(
-                Do(whole=sloped(_HINGE_MOTION)),
-                Move(to="tangent.turns[nq * c]", source=D + "body.qdot", count="nq"),
-                Move(to="tangent.unit[nq * c]", source=D + "body.q", count="nq"),
-            ),
+            steps=(Move(to="tangent.unit[nq * c]", source=D + "body.q", count="nq"),),
         ),
         call("tangent.lag", n="nq", sq="step.q", kappa="step.kappa", one="tangent.unit",
              g_q="tangent.turns", A="tangent.rates", Q="tangent.lag", work="tangent.lag_work"),
         Along(
             of="rates",
             steps=(
-                Do(whole=sloped(_HINGE_MOTION)),
-                call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot",
+                call("tangent.lagged", n="nq", Q="tangent.lag", rate="tangent.ways[nq * c]",
                      dq="tangent.along[nq * c]"),
             ),
         ),

@@ -181,6 +181,7 @@ tangent.inverse | nu nu | inverse of the rows by the unknowns
 tangent.y | nu | what is left of the rows, divided by those by the unknowns
 tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
 tangent.turns | nq nq | slopes of the rates by the coordinates, a row a coordinate
+tangent.ways | nq nu | slopes of the rates by the speeds, a row a speed
 tangent.unit | nq nq | unit matrix
 tangent.rates | nq nq | sq 1 - kappa times the slopes of the rates
 tangent.lag | nq nq | its inverse

@@ -61,6 +61,7 @@ typedef struct {
     int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
+    void (*rates_by_coordinates)(void), (*rates_by_speeds)(void);
     void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
     void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
 } mstmm_body;

@@ -208,6 +208,25 @@ int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const r
     return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);
 }
 
+int mstmm_hinge_rates_along(mstmm_state *state, const mstmm_body *body, int of_speeds, real *rows)
+{
+    const mstmm_state *slope = state->slope;
+    real R[9], d[3], H[36], v[3], w[3], c[6];
+    int code = 0;
+    for (int i = 0; !code && i < (of_speeds ? body->nu : body->nq); i++) {
+        if (of_speeds)
+            mstmm_aim_rate(state, body, i);
+        else
+            mstmm_aim_coordinate(state, body, i);
+        code = mstmm_hinge_slope_of(
+            state, body, .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+            .d_q = slope->q + body->q, .d_u = slope->u + body->u, .d_R = R, .d_d = d, .d_H = H,
+            .d_v = v, .d_w = w, .d_c = c, .d_qdot = rows + i * body->nq);
+    }
+    mstmm_aim_nowhere(state, body);
+    return code;
+}
+
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r)
 {

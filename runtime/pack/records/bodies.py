@@ -16,7 +16,10 @@ from ..system import BodyNumbers, Numbers, System
 from .memory import Memory
 from .modal import ModalRecords
 
-_HINGE = ("hinge", "forward", "condense", "recover", "hinge_slope")
+_HINGE = (
+    "hinge", "forward", "condense", "recover", "hinge_slope", "rates_by_coordinates",
+    "rates_by_speeds",
+)  # fmt: skip
 _BODY = ("inertia", "bias_load", "energy")
 #: Kernels that elements of earlier versions do not have.
 _BODY_SLOPES = ("bias_load_slope", "load_by_motion")
