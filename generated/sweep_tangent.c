@@ -33,7 +33,8 @@ int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restri
 
 #ifndef MSTMM_SOLVE_LU
 #define MSTMM_SOLVE_LU
-/* x = a^-1 b by LU with row exchange; a is n x n, b and x are n x m.  `work` (n x n) keeps the factors.
+/* x = a^-1 b by LU with row exchange; a is n x n, b and x are n x m.  `work` (n x n) keeps the factors,
+ * 1 / pivot on the diagonal.
  * Returns 1 if a pivot is not above relative_pivot times the magnitude of its column in a (NaN
  * included), 2 if the determinant is negative, else 0. */
 static inline __attribute__((always_inline))
@@ -67,8 +68,9 @@ int mstmm_solve_lu(
         const real pivot = work[i * n + i];
         if (!(fabs(pivot) > relative_pivot * size)) return 1;
         if (pivot < 0) negative = !negative;
+        const real scale = work[i * n + i] = 1 / pivot;
         for (int k = i + 1; k < n; ++k) {
-            const real factor = work[k * n + i] / pivot;
+            const real factor = work[k * n + i] * scale;
             for (int j = i + 1; j < n; ++j) work[k * n + j] -= factor * work[i * n + j];
             for (int j = 0; j < m; ++j) x[k * m + j] -= factor * x[i * m + j];
         }
@@ -77,7 +79,7 @@ int mstmm_solve_lu(
         for (int j = 0; j < m; ++j) {
             real rest = x[i * m + j];
             for (int k = i + 1; k < n; ++k) rest -= work[i * n + k] * x[k * m + j];
-            x[i * m + j] = rest / work[i * n + i];
+            x[i * m + j] = rest * work[i * n + i];
         }
     return negative ? 2 : 0;
 }
