@@ -183,6 +183,26 @@ def test_change_of_coordinates_follows_the_rates(rng: Generator) -> None:
     assert worst(60.0 * dq, by_q + rates(q, du) + rho) < 1e-8
 
 
+def test_hinges_without_kernels_for_their_rates(rng: Generator) -> None:
+    """Those compiled before there were such kernels, or interpreted: one direction at a time."""
+    scene = random_scenes.random_scene(5, most=4, types=("ball", "free", "universal"))
+    q, u = random_scenes.random_state(scene, 5)
+    model, tangent = compiled(scene)
+    right = rng.normal(size=model.nu)
+
+    def answers() -> tuple[Array, Array]:
+        tangent.residual(TIME, q, u, np.zeros(model.nu))
+        tangent.factor(50.0, 60.0, 1.0)
+        return tangent.solve(right), tangent.coordinates(right)
+
+    own, record = answers(), model.looped.packed.model
+    for i in range(record.n_bodies):
+        record.bodies[i].rates_by_coordinates = model.looped.ffi.NULL
+        record.bodies[i].rates_by_speeds = model.looped.ffi.NULL
+    for found, expected in zip(answers(), own, strict=True):
+        assert worst(found, expected) < 1e-13
+
+
 def test_undetermined_motion_is_named() -> None:
     """Three angles whose first and last axes are one line turn the body about it twice."""
     scene = {

@@ -1,0 +1,84 @@
+"""Entries printed as a loop over pairs: the numbers of the straight line, bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from numpy.random import Generator
+from support.c_library import build
+from support.random_kernels import element
+
+from mstmm.border.elements import c_kernels
+from mstmm.derive.print.alike import ALIKE
+from mstmm.derive.print.render import element_source
+from mstmm.ir import KernelIR, Port
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.spec import ElementSpec
+from mstmm.ir.stored import element_from_json
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+
+
+def turned(lanes: int) -> KernelIR:
+    """Rows of Y are R times those of X; Z gathers what is in Y, and takes off its squares."""
+    graph = Graph()
+    x, r = graph.matrix("X", 2, lanes), graph.matrix("R", 2, 2)
+    scale = r[0][0] / r[1][1]
+    y = [[scale * (row[0] * x[0][k] + x[1][k] * row[1]) for k in range(lanes)] for row in r]
+    z = [[y[0][k] + y[1][k], -(y[0][k] * y[0][k])] for k in range(lanes)]
+    total = sum((entry for entry in y[0]), graph.constant(0))
+    outputs = (Port("Y", (2, lanes)), Port("Z", (lanes, 2), accumulate=True), Port("total", ()))
+    return graph.kernel(
+        "k", (Port("X", (2, lanes)), Port("R", (2, 2))), outputs,
+        {"Y": y, "Z": z, "total": total},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("lanes", [2, 5, 6])
+def test_pairs_are_the_straight_line(
+    lanes: int, tmp_path: Path, rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of an odd number the last entry comes alone; what stands behind the loops reads them."""
+    spec = element("drawn", turned(lanes))
+    monkeypatch.setitem(ALIKE, ("drawn", "k"), (("Y", 1), ("Z", 0)))
+    assert element_source(spec).count("+= 2") == 2
+    library = build(tmp_path, spec)
+    inputs = {"X": rng.normal(size=2 * lanes).tolist(), "R": rng.normal(size=4).tolist()}
+    found = library.call("drawn", "k", inputs)
+    assert found.code == 0
+    assert found.outputs == evaluate_floats(spec.kernels[0], inputs)
+
+
+def of_entries(*entries: Node) -> ElementSpec:
+    graph = entries[0].graph
+    ports = (Port("x", (3,)),), (Port("y", (len(entries),)),)
+    return element("drawn", graph.kernel("k", *ports, {"y": list(entries)}))
+
+
+def test_what_is_not_alike_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another operation, another place, a number that all entries share, an operation with
+    branches, a guard."""
+    monkeypatch.setitem(ALIKE, ("drawn", "k"), (("y", 0),))
+
+    def refused(words: str, spec: ElementSpec) -> None:
+        with pytest.raises(ValueError, match=words):
+            element_source(spec)
+
+    graph = Graph()
+    x = graph.vector("x", 3)
+    refused("not computed alike", of_entries(x[0] + x[2], x[1] * x[2]))
+    refused("not computed alike", of_entries(2 * x[0], 2 * x[2]))
+    refused("the same in every lane", of_entries(x[0] * x[1], x[0] * x[1]))
+    refused("not computed alike", of_entries(graph.call("sin", x[0]), graph.call("sin", x[1])))
+    graph.guard(graph.call("lt", x[0], x[1]), 3, "in order")
+    refused("guard", of_entries(2 * x[0], 2 * x[1]))
+
+
+def test_kernels_that_are_printed_so_exist() -> None:
+    """Every entry of the table names a kernel that has C, and its outputs."""
+    for name, kernel in ALIKE:
+        spec = element_from_json((GENERATED / f"sweep_{name}.json").read_text())
+        found = next(k for k in c_kernels(spec) if k.name == kernel)
+        assert {port for port, _ in ALIKE[name, kernel]} <= {port.name for port in found.outputs}
