@@ -1690,6 +1690,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state, body, columns);
     for (int c = 0; c < speeds; c++) {
+        if (mstmm_unfelt(body, law, columns[c])) continue;
         mstmm_aim_unknown(state, body, columns[c]);
         if (law->kind == 0) {
             mstmm_law_coordinate_slope(law->evaluate_slope,

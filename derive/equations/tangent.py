@@ -61,8 +61,8 @@ def tangent_carry() -> Derivation:
     s = ROWS_S.symbol.T
     turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
     t_turn, t_rate, t_linear = (symbol(f"T_{name}", 6, 3) for name in ("w", "wd", "a"))
-    relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
-    lever = tilde(column(SHIFT.symbol))
+    velocity, turned = symbol("v_I", 3), symbol("T_turn", 3, 3)
+    relative, lever = tilde(column(W_REL.symbol)), tilde(column(SHIFT.symbol))
     whole, pushed = symbol("T_all", 6, 9), symbol("push", 3, 9)
     moment = R.symbol * whole[3:, :] + lever * pushed
     return Derivation(
@@ -71,13 +71,18 @@ def tangent_carry() -> Derivation:
         (R, SHIFT, TURN_PARENT, V_REL, W_REL, ROWS_S),
         (along, parent),
         (
+            Equation("relative velocity, parent axes", velocity, R.symbol * V_REL.symbol),
+            Equation(
+                "acceleration of P by the parent's change of angular velocity",
+                turned,
+                _spun() + 2 * tilde(column(velocity)),
+            ),
             Equation("by acceleration", t_linear, linear * R.symbol.T),
             Equation("by angular acceleration", t_rate, rate * R.symbol.T - t_linear * lever),
             Equation(
                 "by angular velocity",
                 t_turn,
-                (turn - rate * relative - 2 * (linear * velocity)) * R.symbol.T
-                - t_linear * _spun(),
+                (turn - rate * relative) * R.symbol.T - t_linear * turned,
             ),
             Equation("S Th", whole, sp.BlockMatrix([[t_turn, t_rate, t_linear]])),
             Equation("S Th, by rows", along.symbol, whole.T),

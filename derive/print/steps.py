@@ -35,6 +35,12 @@ NEVER = frozenset({"staged", "link", "turned"})
 #: Directions: how many, what points the derivatives along number c, variables that both read.
 _ALONG = {
     "free": ("speeds", "mstmm_aim_unknown(state, body, columns[c])", ("speeds", "columns", "body")),
+    "felt": (
+        "speeds",
+        "if (mstmm_unfelt(body, law, columns[c])) continue;\n"
+        "mstmm_aim_unknown(state, body, columns[c])",
+        ("speeds", "columns", "body", "law"),
+    ),
     "rates": ("nu", "mstmm_aim_rate(state, body, c)", ("nu", "body")),
     "coordinates": ("nq", "mstmm_aim_coordinate(state, body, c)", ("nq", "body")),
     "modes": ("n", "mstmm_aim_mode(state, modal, c)", ("n", "modal")),
@@ -44,7 +50,7 @@ _ALONG = {
 }  # fmt: skip
 #: What points them nowhere again.
 _RESTS = {
-    **dict.fromkeys(("free", "rates", "coordinates"), "mstmm_aim_nowhere(state, body)"),
+    **dict.fromkeys(("free", "felt", "rates", "coordinates"), "mstmm_aim_nowhere(state, body)"),
     "modes": "mstmm_aim_no_mode(state, modal)",
     "motion": "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)",
 }
@@ -282,7 +288,8 @@ class StepText:
 
     def _along(self, step: Along, indent: str) -> list[str]:
         count, aim, _ = _ALONG[step.of]
-        lines = [f"{indent}for (int c = 0; c < {count}; c++) {{", f"{indent}    {aim};"]
+        aims = f"{aim};".replace("\n", f"\n{indent}    ")
+        lines = [f"{indent}for (int c = 0; c < {count}; c++) {{", f"{indent}    {aims}"]
         for part in step.steps:
             if part.when:
                 inside = self.lines(part, indent + "        ")

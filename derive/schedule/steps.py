@@ -114,8 +114,9 @@ class Along(Step):
     """Steps for every direction of a body, or of the body that a law is about; the derivatives that
     they read have been pointed along it: direction number c of
 
-    `of`: "free", the unknowns of a hinge; "rates", its speeds alone; "coordinates", its coordinates
-    alone; "modes", the unknowns of a flexible body; "motion", the nine numbers of a motion.
+    `of`: "free", the unknowns of a hinge; "felt", those that a law feels; "rates", its speeds
+    alone; "coordinates", its coordinates alone; "modes", the unknowns of a flexible body; "motion",
+    the nine numbers of a motion.
     """
 
     of: str = ""

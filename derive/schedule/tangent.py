@@ -202,7 +202,7 @@ LAW_SLOPES = Pass(
     "law_slopes", "law", "Slopes of a law along the unknowns of its hinge.",
     (
         Along(
-            of="free",
+            of="felt",
             steps=(
                 *(
                     Sloped(step.when, step.kernel + SLOPE, step.ports, still=("effort",))

@@ -46,6 +46,12 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     }
 }
 
+/* Does a law feel nothing of an unknown, being one on the coordinate of another? */
+static inline int mstmm_unfelt(const mstmm_body *body, const mstmm_law *law, int j)
+{
+    return law->kind == 0 && body->straight && j != law->speed;
+}
+
 static inline void mstmm_aim_no_mode(mstmm_state *state, const mstmm_modal *modal)
 {
     for (int i = 0; i < modal->n; i++) {
