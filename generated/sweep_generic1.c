@@ -2065,7 +2065,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_along_outputs[] = {
     {"x", 3, "", 0, 0},
 };
 
-/* a direction of a hinge with 1 free speed that are the same in every position
+/* a direction of a hinge with 1 free speed, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  theta[3] turn of the body along the direction, body axes
@@ -2154,20 +2154,20 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real t56 = v[1] * 2.0;
     const real t57 = t13 * t56;
     const real t58 = t55 - t57;
-    const real t59 = v[2] * t5;
-    const real t60 = H[2] * d_u[0];
-    const real t61 = w[1] * t60;
-    const real t62 = H[1] * d_u[0];
-    const real t63 = w[2] * t62;
-    const real t64 = t61 - t63;
-    const real t65 = t59 + t64;
-    const real t66 = v[1] * t10;
-    const real t67 = t65 - t66;
-    const real t68 = H[0] * d_s[0];
-    const real t69 = t67 + t68;
+    const real t59 = H[0] * d_s[0];
+    const real t60 = v[2] * t5;
+    const real t61 = H[2] * d_u[0];
+    const real t62 = w[1] * t61;
+    const real t63 = H[1] * d_u[0];
+    const real t64 = w[2] * t63;
+    const real t65 = t62 - t64;
+    const real t66 = t60 + t65;
+    const real t67 = v[1] * t10;
+    const real t68 = t66 - t67;
+    const real t69 = t59 + t68;
     const real t70 = theta[2] * Q[7];
     const real t71 = x[2] * Q[4];
-    const real t72 = Q[1] * t60;
+    const real t72 = Q[1] * t61;
     const real t73 = 2.0 * t72;
     const real t74 = x[1] * Q[0];
     const real t75 = x[0] * Q[1];
@@ -2179,7 +2179,7 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real t81 = Q[2] * t80;
     const real t82 = t77 - t81;
     const real t83 = t73 + t82;
-    const real t84 = Q[2] * t62;
+    const real t84 = Q[2] * t63;
     const real t85 = 2.0 * t84;
     const real t86 = t83 - t85;
     const real t87 = t71 + t86;
@@ -2195,19 +2195,19 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real t96 = t13 * t95;
     const real t97 = t3 * t54;
     const real t98 = t96 - t97;
-    const real t99 = v[0] * t10;
-    const real t100 = H[0] * d_u[0];
-    const real t101 = w[2] * t100;
-    const real t102 = w[0] * t60;
-    const real t103 = t101 - t102;
-    const real t104 = v[2] * t0;
-    const real t105 = t103 - t104;
-    const real t106 = t99 + t105;
-    const real t107 = H[1] * d_s[0];
-    const real t108 = t106 + t107;
+    const real t99 = H[1] * d_s[0];
+    const real t100 = v[0] * t10;
+    const real t101 = H[0] * d_u[0];
+    const real t102 = w[2] * t101;
+    const real t103 = w[0] * t61;
+    const real t104 = t102 - t103;
+    const real t105 = v[2] * t0;
+    const real t106 = t104 - t105;
+    const real t107 = t100 + t106;
+    const real t108 = t99 + t107;
     const real t109 = theta[0] * Q[8];
     const real t110 = x[0] * Q[5];
-    const real t111 = Q[2] * t100;
+    const real t111 = Q[2] * t101;
     const real t112 = 2.0 * t111;
     const real t113 = x[2] * Q[1];
     const real t114 = x[1] * Q[2];
@@ -2215,7 +2215,7 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real t116 = Q[2] * t115;
     const real t117 = Q[0] * t76;
     const real t118 = t116 - t117;
-    const real t119 = Q[0] * t60;
+    const real t119 = Q[0] * t61;
     const real t120 = 2.0 * t119;
     const real t121 = t118 - t120;
     const real t122 = t112 + t121;
@@ -2231,24 +2231,24 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real t131 = t3 * t56;
     const real t132 = t8 * t95;
     const real t133 = t131 - t132;
-    const real t134 = v[1] * t0;
-    const real t135 = w[0] * t62;
-    const real t136 = w[1] * t100;
-    const real t137 = t135 - t136;
-    const real t138 = t134 + t137;
-    const real t139 = v[0] * t5;
-    const real t140 = t138 - t139;
-    const real t141 = H[2] * d_s[0];
-    const real t142 = t140 + t141;
+    const real t134 = H[2] * d_s[0];
+    const real t135 = v[1] * t0;
+    const real t136 = w[0] * t63;
+    const real t137 = w[1] * t101;
+    const real t138 = t136 - t137;
+    const real t139 = t135 + t138;
+    const real t140 = v[0] * t5;
+    const real t141 = t139 - t140;
+    const real t142 = t134 + t141;
     const real t143 = theta[1] * Q[6];
     const real t144 = x[1] * Q[3];
-    const real t145 = Q[0] * t62;
+    const real t145 = Q[0] * t63;
     const real t146 = 2.0 * t145;
     const real t147 = Q[0] * t80;
     const real t148 = Q[1] * t115;
     const real t149 = t147 - t148;
     const real t150 = t146 + t149;
-    const real t151 = Q[1] * t100;
+    const real t151 = Q[1] * t101;
     const real t152 = 2.0 * t151;
     const real t153 = t150 - t152;
     const real t154 = t144 + t153;
@@ -3577,7 +3577,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic1_tangent_steady_outputs,
-        .ir_hash = "d8597dab2cb6afb95925b65561de21cfdee86744a7a11506db39cf205225110c",
+        .ir_hash = "2dd883ff892ff5e015332ef839cb3a62111a45ea809464569d0fed2f74a95629",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -3659,7 +3659,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "f734c77ae0c66b6a47b167e585255bfc08ed604e121f5b840a678dcc728e0329",
+    .hash = "6e5ac06adad05a4de0c5659c660b2470c65e1e4bb7b2c3c8bb79bff9ac450cdd",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -281,21 +281,20 @@ def tangent_steady(nu: int) -> Derivation:
     d_u, d_s = symbol("d_u", nu), symbol("d_s", nu)
     d_v, d_w, d_bias = symbol("d_v", 3), symbol("d_w", 3), symbol("dc_s", 6)
     more, row, rows = _row(nu, None)
-    own = h * d_s
+    own = symbol("own", 6)
     turned = tilde(column(d_w)) * column(v) + tilde(column(w)) * column(d_v)
     return Derivation(
         f"generic{nu}",
-        f"a direction of a hinge with {free_speeds(nu)} that are the same in every position",
+        f"a direction of a hinge with {free_speeds(nu)}, whose subspace is constant",
         (TURN, PLACE, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
          *map(Quantity, (d_u, d_s)), *more),
         (*_COLUMN, row),
         (
             Equation("slope of v", d_v, h[:3, :] * d_u),
             Equation("slope of w", d_w, h[3:, :] * d_u),
+            Equation("H ds", own, h * d_s),
             Equation(
-                "slope of the own acceleration",
-                d_bias,
-                stack(own[:3, :] + turned, own[3:, :]),
+                "slope of the own acceleration", d_bias, stack(part(own, 0) + turned, part(own, 3))
             ),
             *_along(v, w, column(d_v), column(d_w), d_bias),
             rows,

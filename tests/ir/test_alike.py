@@ -51,8 +51,7 @@ def test_pairs_are_the_straight_line(
     assert found.outputs == evaluate_floats(spec.kernels[0], inputs)
 
 
-def of_entries(*entries: Node) -> ElementSpec:
-    graph = entries[0].graph
+def of_entries(graph: Graph, *entries: Node) -> ElementSpec:
     ports = (Port("x", (3,)),), (Port("y", (len(entries),)),)
     return element("drawn", graph.kernel("k", *ports, {"y": list(entries)}))
 
@@ -68,12 +67,14 @@ def test_what_is_not_alike_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
     graph = Graph()
     x = graph.vector("x", 3)
-    refused("not computed alike", of_entries(x[0] + x[2], x[1] * x[2]))
-    refused("not computed alike", of_entries(2 * x[0], 2 * x[2]))
-    refused("the same in every lane", of_entries(x[0] * x[1], x[0] * x[1]))
-    refused("not computed alike", of_entries(graph.call("sin", x[0]), graph.call("sin", x[1])))
+    refused("not computed alike", of_entries(graph, x[0] + x[2], x[1] * x[2]))
+    refused("not computed alike", of_entries(graph, 2 * x[0], 2 * x[2]))
+    refused("the same in every lane", of_entries(graph, x[0] * x[1], x[0] * x[1]))
+    refused(
+        "not computed alike", of_entries(graph, graph.call("sin", x[0]), graph.call("sin", x[1]))
+    )
     graph.guard(graph.call("lt", x[0], x[1]), 3, "in order")
-    refused("guard", of_entries(2 * x[0], 2 * x[1]))
+    refused("guard", of_entries(graph, 2 * x[0], 2 * x[1]))
 
 
 def test_kernels_that_are_printed_so_exist() -> None:
