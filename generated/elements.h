@@ -541,6 +541,8 @@ int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restri
     const real *restrict z_I, real *restrict z);
 int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x);
+int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+    const real *restrict g, real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -674,6 +676,14 @@ int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -737,6 +747,14 @@ int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -800,6 +818,14 @@ int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -863,6 +889,14 @@ int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -926,6 +960,14 @@ int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -989,6 +1031,14 @@ int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,

@@ -370,6 +370,20 @@ static inline int mstmm_frames_tangent_turned_by(struct mstmm_frames_tangent_tur
 }
 #define mstmm_frames_tangent_turned(...) mstmm_frames_tangent_turned_by((struct mstmm_frames_tangent_turned){__VA_ARGS__})
 
+struct mstmm_frames_tangent_known {
+    const real *S;
+    const real *b;
+    const real *g;
+    real *e_S;
+    real *e_b;
+};
+static inline int mstmm_frames_tangent_known_by(struct mstmm_frames_tangent_known to)
+{
+    return mstmm_sweep_frames_tangent_known(
+        to.S, to.b, to.g, to.e_S, to.e_b);
+}
+#define mstmm_frames_tangent_known(...) mstmm_frames_tangent_known_by((struct mstmm_frames_tangent_known){__VA_ARGS__})
+
 struct mstmm_frames_pose_slope {
     const real *A_I;
     const real *x_I;
@@ -2356,6 +2370,56 @@ static inline int mstmm_generic_tangent_answer_by(int speeds, struct mstmm_gener
         to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
 }
 #define mstmm_generic_tangent_answer(speeds, ...) mstmm_generic_tangent_answer_by(speeds, (struct mstmm_generic_tangent_answer){__VA_ARGS__})
+
+struct mstmm_generic_tangent_push_known {
+    const real *Rc;
+    const real *r;
+    const real *H;
+    const real *V;
+    const real *inverse;
+    const real *e;
+    const real *e_f;
+    const real *e_b;
+    real *y;
+    real *e_I;
+};
+typedef int mstmm_generic_tangent_push_known_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict, real *restrict);
+extern mstmm_generic_tangent_push_known_kernel *const mstmm_generic_tangent_push_known_table[];
+static inline int mstmm_generic_tangent_push_known_by(int speeds, struct mstmm_generic_tangent_push_known to)
+{
+    return mstmm_generic_tangent_push_known_table[speeds](
+        to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.e_b, to.y, to.e_I);
+}
+#define mstmm_generic_tangent_push_known(speeds, ...) mstmm_generic_tangent_push_known_by(speeds, (struct mstmm_generic_tangent_push_known){__VA_ARGS__})
+
+struct mstmm_generic_tangent_answer_known {
+    const real *Rc;
+    const real *r;
+    const real *w_I;
+    const real *v;
+    const real *w;
+    const real *z_I;
+    const real *B;
+    const real *gain;
+    const real *y;
+    const real *b;
+    real *x;
+    real *z;
+};
+typedef int mstmm_generic_tangent_answer_known_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_known_table[];
+static inline int mstmm_generic_tangent_answer_known_by(int speeds, struct mstmm_generic_tangent_answer_known to)
+{
+    return mstmm_generic_tangent_answer_known_table[speeds](
+        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.b, to.x, to.z);
+}
+#define mstmm_generic_tangent_answer_known(speeds, ...) mstmm_generic_tangent_answer_known_by(speeds, (struct mstmm_generic_tangent_answer_known){__VA_ARGS__})
 
 struct mstmm_hinge_hinge {
     const real *p;

@@ -64,6 +64,8 @@ int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restri
     const real *restrict z_I, real *restrict z);
 int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x);
+int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+    const real *restrict g, real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -2484,6 +2486,73 @@ static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
     {"x", 3, "", 0, 0},
 };
 
+/* load by a motion that is known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  S[9][6] change of the load by that of the motion, a row an entry
+ * in  b[9] change of motion that is known
+ * in  g[6] (N, N*m) change of the carried load by what is known
+ * out e_S[6] (N, N*m) load by the motion that is known
+ * out e_b[6] (N, N*m) load by what is known, without the unknowns
+ */
+int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+    const real *restrict g, real *restrict e_S, real *restrict e_b)
+{
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(S + 0 + k);
+        const two_t v1 = v0 * b[0];
+        const two_t v2 = mstmm_beside(S + 6 + k);
+        const two_t v3 = v2 * b[1];
+        const two_t v4 = v1 + v3;
+        const two_t v5 = mstmm_beside(S + 12 + k);
+        const two_t v6 = v5 * b[2];
+        const two_t v7 = v4 + v6;
+        const two_t v8 = mstmm_beside(S + 18 + k);
+        const two_t v9 = v8 * b[3];
+        const two_t v10 = v7 + v9;
+        const two_t v11 = mstmm_beside(S + 24 + k);
+        const two_t v12 = v11 * b[4];
+        const two_t v13 = v10 + v12;
+        const two_t v14 = mstmm_beside(S + 30 + k);
+        const two_t v15 = v14 * b[5];
+        const two_t v16 = v13 + v15;
+        const two_t v17 = mstmm_beside(S + 36 + k);
+        const two_t v18 = v17 * b[6];
+        const two_t v19 = v16 + v18;
+        const two_t v20 = mstmm_beside(S + 42 + k);
+        const two_t v21 = v20 * b[7];
+        const two_t v22 = v19 + v21;
+        const two_t v23 = mstmm_beside(S + 48 + k);
+        const two_t v24 = v23 * b[8];
+        const two_t v25 = v22 + v24;
+        *(two_free_t *)(e_S + 0 + k) = v25;
+    }
+    for (int k = 0; k < 6; k += 2) {
+        const two_t v0 = mstmm_beside(g + 0 + k);
+        const two_t v1 = mstmm_beside(e_S + 0 + k);
+        const two_t v2 = v0 + v1;
+        *(two_free_t *)(e_b + 0 + k) = v2;
+    }
+    return 0;
+}
+
+static int mstmm_sweep_frames_tangent_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_tangent_known(in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_tangent_known_inputs[] = {
+    {"S", 54, "", 0, 0},
+    {"b", 9, "", 0, 0},
+    {"g", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_tangent_known_outputs[] = {
+    {"e_S", 6, "N, N*m", 0, 0},
+    {"e_b", 6, "N, N*m", 0, 0},
+};
+
 /* pose and its derivative along a direction
  * in  A_I[3][3] rotation, parent axes to inertial axes
  * in  x_I[3] (m) P of the parent, inertial axes
@@ -4020,6 +4089,18 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_known",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_known,
+        .call = mstmm_sweep_frames_tangent_known_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_tangent_known_inputs,
+        .outputs = mstmm_sweep_frames_tangent_known_outputs,
+        .ir_hash = "c19009117b80deaa95afd241255e9baa5398ce492aa633d53af87546c4278b6c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "pose_slope",
         .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
         .call = mstmm_sweep_frames_pose_slope_call,
@@ -4145,7 +4226,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "12a3d9d266ca0fafe45dbcb6a385b924ec0015847b910cabfc894d0932a14513",
+    .hash = "bb36c1e9cf6c323bc61b2e439fdc423ae3197dbeb427ede5367540272a6e0e4d",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4155,6 +4236,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 35,
+    .n_kernels = 36,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -63,6 +63,14 @@ int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -2874,6 +2882,393 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* a right-hand side carried across a hinge with 1 free speed and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6] motion subspace of the unknowns
+ * in  V[1][6] K + G, a row a direction
+ * in  inverse[1] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[1] load of the rows
+ * in  e_b[6] (N, N*m) load by what is known, without the unknowns
+ * out y[1] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[1] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = -t12;
+    y[0] = t13;
+    const real t14 = V[0] * t12;
+    const real t15 = e[0] - t14;
+    const real t16 = e_b[0] + t15;
+    const real t17 = Rc[0] * t16;
+    const real t18 = V[1] * t12;
+    const real t19 = e[1] - t18;
+    const real t20 = e_b[1] + t19;
+    const real t21 = Rc[1] * t20;
+    const real t22 = t17 + t21;
+    const real t23 = V[2] * t12;
+    const real t24 = e[2] - t23;
+    const real t25 = e_b[2] + t24;
+    const real t26 = Rc[2] * t25;
+    const real t27 = t22 + t26;
+    e_I[0] += t27;
+    const real t28 = Rc[3] * t16;
+    const real t29 = Rc[4] * t20;
+    const real t30 = t28 + t29;
+    const real t31 = Rc[5] * t25;
+    const real t32 = t30 + t31;
+    e_I[1] += t32;
+    const real t33 = Rc[6] * t16;
+    const real t34 = Rc[7] * t20;
+    const real t35 = t33 + t34;
+    const real t36 = Rc[8] * t25;
+    const real t37 = t35 + t36;
+    e_I[2] += t37;
+    const real t38 = V[3] * t12;
+    const real t39 = e[3] - t38;
+    const real t40 = e_b[3] + t39;
+    const real t41 = Rc[0] * t40;
+    const real t42 = V[4] * t12;
+    const real t43 = e[4] - t42;
+    const real t44 = e_b[4] + t43;
+    const real t45 = Rc[1] * t44;
+    const real t46 = t41 + t45;
+    const real t47 = V[5] * t12;
+    const real t48 = e[5] - t47;
+    const real t49 = e_b[5] + t48;
+    const real t50 = Rc[2] * t49;
+    const real t51 = t46 + t50;
+    const real t52 = Rc[6] * r[1];
+    const real t53 = Rc[3] * r[2];
+    const real t54 = t52 - t53;
+    const real t55 = t16 * t54;
+    const real t56 = Rc[7] * r[1];
+    const real t57 = Rc[4] * r[2];
+    const real t58 = t56 - t57;
+    const real t59 = t20 * t58;
+    const real t60 = t55 + t59;
+    const real t61 = Rc[8] * r[1];
+    const real t62 = Rc[5] * r[2];
+    const real t63 = t61 - t62;
+    const real t64 = t25 * t63;
+    const real t65 = t60 + t64;
+    const real t66 = t51 + t65;
+    e_I[3] += t66;
+    const real t67 = Rc[3] * t40;
+    const real t68 = Rc[4] * t44;
+    const real t69 = t67 + t68;
+    const real t70 = Rc[5] * t49;
+    const real t71 = t69 + t70;
+    const real t72 = Rc[0] * r[2];
+    const real t73 = Rc[6] * r[0];
+    const real t74 = t72 - t73;
+    const real t75 = t16 * t74;
+    const real t76 = Rc[1] * r[2];
+    const real t77 = Rc[7] * r[0];
+    const real t78 = t76 - t77;
+    const real t79 = t20 * t78;
+    const real t80 = t75 + t79;
+    const real t81 = Rc[2] * r[2];
+    const real t82 = Rc[8] * r[0];
+    const real t83 = t81 - t82;
+    const real t84 = t25 * t83;
+    const real t85 = t80 + t84;
+    const real t86 = t71 + t85;
+    e_I[4] += t86;
+    const real t87 = Rc[6] * t40;
+    const real t88 = Rc[7] * t44;
+    const real t89 = t87 + t88;
+    const real t90 = Rc[8] * t49;
+    const real t91 = t89 + t90;
+    const real t92 = Rc[3] * r[0];
+    const real t93 = Rc[0] * r[1];
+    const real t94 = t92 - t93;
+    const real t95 = t16 * t94;
+    const real t96 = Rc[4] * r[0];
+    const real t97 = Rc[1] * r[1];
+    const real t98 = t96 - t97;
+    const real t99 = t20 * t98;
+    const real t100 = t95 + t99;
+    const real t101 = Rc[5] * r[0];
+    const real t102 = Rc[2] * r[1];
+    const real t103 = t101 - t102;
+    const real t104 = t25 * t103;
+    const real t105 = t100 + t104;
+    const real t106 = t91 + t105;
+    e_I[5] += t106;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_push_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_push_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"V", 6, "", 0, 0},
+    {"inverse", 1, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 1, "", 0, 0},
+    {"e_b", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_push_known_outputs[] = {
+    {"y", 1, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 1 free speed that answer a right-hand side and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[1][9] motion along the unknowns
+ * in  gain[1][9] D^-1 times the rows by the motion
+ * in  y[1] D^-1 times what is left of the rows
+ * in  b[9] change of motion that is known
+ * out x[1] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = b[0] + t4;
+    const real t6 = gain[0] * t5;
+    const real t7 = Rc[1] * z_I[0];
+    const real t8 = Rc[4] * z_I[1];
+    const real t9 = t7 + t8;
+    const real t10 = Rc[7] * z_I[2];
+    const real t11 = t9 + t10;
+    const real t12 = b[1] + t11;
+    const real t13 = gain[1] * t12;
+    const real t14 = t6 + t13;
+    const real t15 = Rc[2] * z_I[0];
+    const real t16 = Rc[5] * z_I[1];
+    const real t17 = t15 + t16;
+    const real t18 = Rc[8] * z_I[2];
+    const real t19 = t17 + t18;
+    const real t20 = b[2] + t19;
+    const real t21 = gain[2] * t20;
+    const real t22 = t14 + t21;
+    const real t23 = w[2] * t11;
+    const real t24 = w[1] * t19;
+    const real t25 = t23 - t24;
+    const real t26 = Rc[0] * z_I[3];
+    const real t27 = Rc[3] * z_I[4];
+    const real t28 = t26 + t27;
+    const real t29 = Rc[6] * z_I[5];
+    const real t30 = t28 + t29;
+    const real t31 = t25 + t30;
+    const real t32 = b[3] + t31;
+    const real t33 = gain[3] * t32;
+    const real t34 = t22 + t33;
+    const real t35 = w[0] * t19;
+    const real t36 = w[2] * t4;
+    const real t37 = t35 - t36;
+    const real t38 = Rc[1] * z_I[3];
+    const real t39 = Rc[4] * z_I[4];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[7] * z_I[5];
+    const real t42 = t40 + t41;
+    const real t43 = t37 + t42;
+    const real t44 = b[4] + t43;
+    const real t45 = gain[4] * t44;
+    const real t46 = t34 + t45;
+    const real t47 = w[1] * t4;
+    const real t48 = w[0] * t11;
+    const real t49 = t47 - t48;
+    const real t50 = Rc[2] * z_I[3];
+    const real t51 = Rc[5] * z_I[4];
+    const real t52 = t50 + t51;
+    const real t53 = Rc[8] * z_I[5];
+    const real t54 = t52 + t53;
+    const real t55 = t49 + t54;
+    const real t56 = b[5] + t55;
+    const real t57 = gain[5] * t56;
+    const real t58 = t46 + t57;
+    const real t59 = v[2] * 2.0;
+    const real t60 = t11 * t59;
+    const real t61 = v[1] * 2.0;
+    const real t62 = t19 * t61;
+    const real t63 = t60 - t62;
+    const real t64 = r[2] * z_I[4];
+    const real t65 = r[1] * w_I[1];
+    const real t66 = r[2] * w_I[2];
+    const real t67 = t65 + t66;
+    const real t68 = z_I[0] * t67;
+    const real t69 = r[0] * w_I[1];
+    const real t70 = 2.0 * t69;
+    const real t71 = r[1] * w_I[0];
+    const real t72 = t70 - t71;
+    const real t73 = z_I[1] * t72;
+    const real t74 = r[0] * w_I[2];
+    const real t75 = 2.0 * t74;
+    const real t76 = r[2] * w_I[0];
+    const real t77 = t75 - t76;
+    const real t78 = z_I[2] * t77;
+    const real t79 = t73 + t78;
+    const real t80 = t68 - t79;
+    const real t81 = r[1] * z_I[5];
+    const real t82 = t80 - t81;
+    const real t83 = t64 + t82;
+    const real t84 = z_I[6] + t83;
+    const real t85 = Rc[0] * t84;
+    const real t86 = r[0] * z_I[5];
+    const real t87 = r[0] * w_I[0];
+    const real t88 = t66 + t87;
+    const real t89 = z_I[1] * t88;
+    const real t90 = 2.0 * t71;
+    const real t91 = t90 - t69;
+    const real t92 = z_I[0] * t91;
+    const real t93 = t89 - t92;
+    const real t94 = r[1] * w_I[2];
+    const real t95 = 2.0 * t94;
+    const real t96 = r[2] * w_I[1];
+    const real t97 = t95 - t96;
+    const real t98 = z_I[2] * t97;
+    const real t99 = t93 - t98;
+    const real t100 = t86 + t99;
+    const real t101 = r[2] * z_I[3];
+    const real t102 = t100 - t101;
+    const real t103 = z_I[7] + t102;
+    const real t104 = Rc[3] * t103;
+    const real t105 = t85 + t104;
+    const real t106 = r[1] * z_I[3];
+    const real t107 = t65 + t87;
+    const real t108 = z_I[2] * t107;
+    const real t109 = 2.0 * t76;
+    const real t110 = t109 - t74;
+    const real t111 = z_I[0] * t110;
+    const real t112 = t108 - t111;
+    const real t113 = 2.0 * t96;
+    const real t114 = t113 - t94;
+    const real t115 = z_I[1] * t114;
+    const real t116 = t112 - t115;
+    const real t117 = r[0] * z_I[4];
+    const real t118 = t116 - t117;
+    const real t119 = t106 + t118;
+    const real t120 = z_I[8] + t119;
+    const real t121 = Rc[6] * t120;
+    const real t122 = t105 + t121;
+    const real t123 = t63 + t122;
+    const real t124 = b[6] + t123;
+    const real t125 = gain[6] * t124;
+    const real t126 = t58 + t125;
+    const real t127 = v[0] * 2.0;
+    const real t128 = t19 * t127;
+    const real t129 = t4 * t59;
+    const real t130 = t128 - t129;
+    const real t131 = Rc[1] * t84;
+    const real t132 = Rc[4] * t103;
+    const real t133 = t131 + t132;
+    const real t134 = Rc[7] * t120;
+    const real t135 = t133 + t134;
+    const real t136 = t130 + t135;
+    const real t137 = b[7] + t136;
+    const real t138 = gain[7] * t137;
+    const real t139 = t126 + t138;
+    const real t140 = t4 * t61;
+    const real t141 = t11 * t127;
+    const real t142 = t140 - t141;
+    const real t143 = Rc[2] * t84;
+    const real t144 = Rc[5] * t103;
+    const real t145 = t143 + t144;
+    const real t146 = Rc[8] * t120;
+    const real t147 = t145 + t146;
+    const real t148 = t142 + t147;
+    const real t149 = b[8] + t148;
+    const real t150 = gain[8] * t149;
+    const real t151 = t139 + t150;
+    const real t152 = y[0] - t151;
+    x[0] = t152;
+    const real t153 = B[0] * t152;
+    const real t154 = t5 + t153;
+    z[0] = t154;
+    const real t155 = B[1] * t152;
+    const real t156 = t12 + t155;
+    z[1] = t156;
+    const real t157 = B[2] * t152;
+    const real t158 = t20 + t157;
+    z[2] = t158;
+    const real t159 = B[3] * t152;
+    const real t160 = t32 + t159;
+    z[3] = t160;
+    const real t161 = B[4] * t152;
+    const real t162 = t44 + t161;
+    z[4] = t162;
+    const real t163 = B[5] * t152;
+    const real t164 = t56 + t163;
+    z[5] = t164;
+    const real t165 = B[6] * t152;
+    const real t166 = t124 + t165;
+    z[6] = t166;
+    const real t167 = B[7] * t152;
+    const real t168 = t137 + t167;
+    z[7] = t168;
+    const real t169 = B[8] * t152;
+    const real t170 = t149 + t169;
+    z[8] = t170;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 9, "", 0, 0},
+    {"gain", 9, "", 0, 0},
+    {"y", 1, "", 0, 0},
+    {"b", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_outputs[] = {
+    {"x", 1, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -3630,6 +4025,30 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_push_known",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_push_known,
+        .call = mstmm_sweep_generic1_tangent_push_known_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_tangent_push_known_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_push_known_outputs,
+        .ir_hash = "8011a3be5258bfbfbea35873d961e14128d9b46784ed213bc3f01bd425157e4f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer_known",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_answer_known,
+        .call = mstmm_sweep_generic1_tangent_answer_known_call,
+        .n_inputs = 10,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic1_tangent_answer_known_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_answer_known_outputs,
+        .ir_hash = "0437498f9b0bcf10cc2918f799dde341be1c0b2ccfc2903afbd38bccdddf2530",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
         .call = mstmm_sweep_generic1_forward_slope_call,
@@ -3659,7 +4078,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "6e5ac06adad05a4de0c5659c660b2470c65e1e4bb7b2c3c8bb79bff9ac450cdd",
+    .hash = "ccaf558664cf4bcde6e60478fde2d665bf99fa9caca23eeac5f547da039dc426",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -3669,6 +4088,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 18,
+    .n_kernels = 20,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -63,6 +63,14 @@ int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -4468,6 +4476,533 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* a right-hand side carried across a hinge with 3 free speeds and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][3] motion subspace of the unknowns
+ * in  V[3][6] K + G, a row a direction
+ * in  inverse[3][3] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[3] load of the rows
+ * in  e_b[6] (N, N*m) load by what is known, without the unknowns
+ * out y[3] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[3] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[4] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[7] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[10] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[13] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[16] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[5] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[8] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[11] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[14] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[17] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = -t40;
+    y[0] = t41;
+    const real t42 = inverse[3] * t11;
+    const real t43 = inverse[4] * t24;
+    const real t44 = t42 + t43;
+    const real t45 = inverse[5] * t38;
+    const real t46 = t44 + t45;
+    const real t47 = -t46;
+    y[1] = t47;
+    const real t48 = inverse[6] * t11;
+    const real t49 = inverse[7] * t24;
+    const real t50 = t48 + t49;
+    const real t51 = inverse[8] * t38;
+    const real t52 = t50 + t51;
+    const real t53 = -t52;
+    y[2] = t53;
+    const real t54 = V[0] * t40;
+    const real t55 = V[6] * t46;
+    const real t56 = t54 + t55;
+    const real t57 = V[12] * t52;
+    const real t58 = t56 + t57;
+    const real t59 = e[0] - t58;
+    const real t60 = e_b[0] + t59;
+    const real t61 = Rc[0] * t60;
+    const real t62 = V[1] * t40;
+    const real t63 = V[7] * t46;
+    const real t64 = t62 + t63;
+    const real t65 = V[13] * t52;
+    const real t66 = t64 + t65;
+    const real t67 = e[1] - t66;
+    const real t68 = e_b[1] + t67;
+    const real t69 = Rc[1] * t68;
+    const real t70 = t61 + t69;
+    const real t71 = V[2] * t40;
+    const real t72 = V[8] * t46;
+    const real t73 = t71 + t72;
+    const real t74 = V[14] * t52;
+    const real t75 = t73 + t74;
+    const real t76 = e[2] - t75;
+    const real t77 = e_b[2] + t76;
+    const real t78 = Rc[2] * t77;
+    const real t79 = t70 + t78;
+    e_I[0] += t79;
+    const real t80 = Rc[3] * t60;
+    const real t81 = Rc[4] * t68;
+    const real t82 = t80 + t81;
+    const real t83 = Rc[5] * t77;
+    const real t84 = t82 + t83;
+    e_I[1] += t84;
+    const real t85 = Rc[6] * t60;
+    const real t86 = Rc[7] * t68;
+    const real t87 = t85 + t86;
+    const real t88 = Rc[8] * t77;
+    const real t89 = t87 + t88;
+    e_I[2] += t89;
+    const real t90 = V[3] * t40;
+    const real t91 = V[9] * t46;
+    const real t92 = t90 + t91;
+    const real t93 = V[15] * t52;
+    const real t94 = t92 + t93;
+    const real t95 = e[3] - t94;
+    const real t96 = e_b[3] + t95;
+    const real t97 = Rc[0] * t96;
+    const real t98 = V[4] * t40;
+    const real t99 = V[10] * t46;
+    const real t100 = t98 + t99;
+    const real t101 = V[16] * t52;
+    const real t102 = t100 + t101;
+    const real t103 = e[4] - t102;
+    const real t104 = e_b[4] + t103;
+    const real t105 = Rc[1] * t104;
+    const real t106 = t97 + t105;
+    const real t107 = V[5] * t40;
+    const real t108 = V[11] * t46;
+    const real t109 = t107 + t108;
+    const real t110 = V[17] * t52;
+    const real t111 = t109 + t110;
+    const real t112 = e[5] - t111;
+    const real t113 = e_b[5] + t112;
+    const real t114 = Rc[2] * t113;
+    const real t115 = t106 + t114;
+    const real t116 = Rc[6] * r[1];
+    const real t117 = Rc[3] * r[2];
+    const real t118 = t116 - t117;
+    const real t119 = t60 * t118;
+    const real t120 = Rc[7] * r[1];
+    const real t121 = Rc[4] * r[2];
+    const real t122 = t120 - t121;
+    const real t123 = t68 * t122;
+    const real t124 = t119 + t123;
+    const real t125 = Rc[8] * r[1];
+    const real t126 = Rc[5] * r[2];
+    const real t127 = t125 - t126;
+    const real t128 = t77 * t127;
+    const real t129 = t124 + t128;
+    const real t130 = t115 + t129;
+    e_I[3] += t130;
+    const real t131 = Rc[3] * t96;
+    const real t132 = Rc[4] * t104;
+    const real t133 = t131 + t132;
+    const real t134 = Rc[5] * t113;
+    const real t135 = t133 + t134;
+    const real t136 = Rc[0] * r[2];
+    const real t137 = Rc[6] * r[0];
+    const real t138 = t136 - t137;
+    const real t139 = t60 * t138;
+    const real t140 = Rc[1] * r[2];
+    const real t141 = Rc[7] * r[0];
+    const real t142 = t140 - t141;
+    const real t143 = t68 * t142;
+    const real t144 = t139 + t143;
+    const real t145 = Rc[2] * r[2];
+    const real t146 = Rc[8] * r[0];
+    const real t147 = t145 - t146;
+    const real t148 = t77 * t147;
+    const real t149 = t144 + t148;
+    const real t150 = t135 + t149;
+    e_I[4] += t150;
+    const real t151 = Rc[6] * t96;
+    const real t152 = Rc[7] * t104;
+    const real t153 = t151 + t152;
+    const real t154 = Rc[8] * t113;
+    const real t155 = t153 + t154;
+    const real t156 = Rc[3] * r[0];
+    const real t157 = Rc[0] * r[1];
+    const real t158 = t156 - t157;
+    const real t159 = t60 * t158;
+    const real t160 = Rc[4] * r[0];
+    const real t161 = Rc[1] * r[1];
+    const real t162 = t160 - t161;
+    const real t163 = t68 * t162;
+    const real t164 = t159 + t163;
+    const real t165 = Rc[5] * r[0];
+    const real t166 = Rc[2] * r[1];
+    const real t167 = t165 - t166;
+    const real t168 = t77 * t167;
+    const real t169 = t164 + t168;
+    const real t170 = t155 + t169;
+    e_I[5] += t170;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_push_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_push_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"V", 18, "", 0, 0},
+    {"inverse", 9, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 3, "", 0, 0},
+    {"e_b", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_push_known_outputs[] = {
+    {"y", 3, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 3 free speeds that answer a right-hand side and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[3][9] motion along the unknowns
+ * in  gain[3][9] D^-1 times the rows by the motion
+ * in  y[3] D^-1 times what is left of the rows
+ * in  b[9] change of motion that is known
+ * out x[3] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = b[0] + t4;
+    const real t6 = gain[0] * t5;
+    const real t7 = Rc[1] * z_I[0];
+    const real t8 = Rc[4] * z_I[1];
+    const real t9 = t7 + t8;
+    const real t10 = Rc[7] * z_I[2];
+    const real t11 = t9 + t10;
+    const real t12 = b[1] + t11;
+    const real t13 = gain[1] * t12;
+    const real t14 = t6 + t13;
+    const real t15 = Rc[2] * z_I[0];
+    const real t16 = Rc[5] * z_I[1];
+    const real t17 = t15 + t16;
+    const real t18 = Rc[8] * z_I[2];
+    const real t19 = t17 + t18;
+    const real t20 = b[2] + t19;
+    const real t21 = gain[2] * t20;
+    const real t22 = t14 + t21;
+    const real t23 = w[2] * t11;
+    const real t24 = w[1] * t19;
+    const real t25 = t23 - t24;
+    const real t26 = Rc[0] * z_I[3];
+    const real t27 = Rc[3] * z_I[4];
+    const real t28 = t26 + t27;
+    const real t29 = Rc[6] * z_I[5];
+    const real t30 = t28 + t29;
+    const real t31 = t25 + t30;
+    const real t32 = b[3] + t31;
+    const real t33 = gain[3] * t32;
+    const real t34 = t22 + t33;
+    const real t35 = w[0] * t19;
+    const real t36 = w[2] * t4;
+    const real t37 = t35 - t36;
+    const real t38 = Rc[1] * z_I[3];
+    const real t39 = Rc[4] * z_I[4];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[7] * z_I[5];
+    const real t42 = t40 + t41;
+    const real t43 = t37 + t42;
+    const real t44 = b[4] + t43;
+    const real t45 = gain[4] * t44;
+    const real t46 = t34 + t45;
+    const real t47 = w[1] * t4;
+    const real t48 = w[0] * t11;
+    const real t49 = t47 - t48;
+    const real t50 = Rc[2] * z_I[3];
+    const real t51 = Rc[5] * z_I[4];
+    const real t52 = t50 + t51;
+    const real t53 = Rc[8] * z_I[5];
+    const real t54 = t52 + t53;
+    const real t55 = t49 + t54;
+    const real t56 = b[5] + t55;
+    const real t57 = gain[5] * t56;
+    const real t58 = t46 + t57;
+    const real t59 = v[2] * 2.0;
+    const real t60 = t11 * t59;
+    const real t61 = v[1] * 2.0;
+    const real t62 = t19 * t61;
+    const real t63 = t60 - t62;
+    const real t64 = r[2] * z_I[4];
+    const real t65 = r[1] * w_I[1];
+    const real t66 = r[2] * w_I[2];
+    const real t67 = t65 + t66;
+    const real t68 = z_I[0] * t67;
+    const real t69 = r[0] * w_I[1];
+    const real t70 = 2.0 * t69;
+    const real t71 = r[1] * w_I[0];
+    const real t72 = t70 - t71;
+    const real t73 = z_I[1] * t72;
+    const real t74 = r[0] * w_I[2];
+    const real t75 = 2.0 * t74;
+    const real t76 = r[2] * w_I[0];
+    const real t77 = t75 - t76;
+    const real t78 = z_I[2] * t77;
+    const real t79 = t73 + t78;
+    const real t80 = t68 - t79;
+    const real t81 = r[1] * z_I[5];
+    const real t82 = t80 - t81;
+    const real t83 = t64 + t82;
+    const real t84 = z_I[6] + t83;
+    const real t85 = Rc[0] * t84;
+    const real t86 = r[0] * z_I[5];
+    const real t87 = r[0] * w_I[0];
+    const real t88 = t66 + t87;
+    const real t89 = z_I[1] * t88;
+    const real t90 = 2.0 * t71;
+    const real t91 = t90 - t69;
+    const real t92 = z_I[0] * t91;
+    const real t93 = t89 - t92;
+    const real t94 = r[1] * w_I[2];
+    const real t95 = 2.0 * t94;
+    const real t96 = r[2] * w_I[1];
+    const real t97 = t95 - t96;
+    const real t98 = z_I[2] * t97;
+    const real t99 = t93 - t98;
+    const real t100 = t86 + t99;
+    const real t101 = r[2] * z_I[3];
+    const real t102 = t100 - t101;
+    const real t103 = z_I[7] + t102;
+    const real t104 = Rc[3] * t103;
+    const real t105 = t85 + t104;
+    const real t106 = r[1] * z_I[3];
+    const real t107 = t65 + t87;
+    const real t108 = z_I[2] * t107;
+    const real t109 = 2.0 * t76;
+    const real t110 = t109 - t74;
+    const real t111 = z_I[0] * t110;
+    const real t112 = t108 - t111;
+    const real t113 = 2.0 * t96;
+    const real t114 = t113 - t94;
+    const real t115 = z_I[1] * t114;
+    const real t116 = t112 - t115;
+    const real t117 = r[0] * z_I[4];
+    const real t118 = t116 - t117;
+    const real t119 = t106 + t118;
+    const real t120 = z_I[8] + t119;
+    const real t121 = Rc[6] * t120;
+    const real t122 = t105 + t121;
+    const real t123 = t63 + t122;
+    const real t124 = b[6] + t123;
+    const real t125 = gain[6] * t124;
+    const real t126 = t58 + t125;
+    const real t127 = v[0] * 2.0;
+    const real t128 = t19 * t127;
+    const real t129 = t4 * t59;
+    const real t130 = t128 - t129;
+    const real t131 = Rc[1] * t84;
+    const real t132 = Rc[4] * t103;
+    const real t133 = t131 + t132;
+    const real t134 = Rc[7] * t120;
+    const real t135 = t133 + t134;
+    const real t136 = t130 + t135;
+    const real t137 = b[7] + t136;
+    const real t138 = gain[7] * t137;
+    const real t139 = t126 + t138;
+    const real t140 = t4 * t61;
+    const real t141 = t11 * t127;
+    const real t142 = t140 - t141;
+    const real t143 = Rc[2] * t84;
+    const real t144 = Rc[5] * t103;
+    const real t145 = t143 + t144;
+    const real t146 = Rc[8] * t120;
+    const real t147 = t145 + t146;
+    const real t148 = t142 + t147;
+    const real t149 = b[8] + t148;
+    const real t150 = gain[8] * t149;
+    const real t151 = t139 + t150;
+    const real t152 = y[0] - t151;
+    x[0] = t152;
+    const real t153 = gain[9] * t5;
+    const real t154 = gain[10] * t12;
+    const real t155 = t153 + t154;
+    const real t156 = gain[11] * t20;
+    const real t157 = t155 + t156;
+    const real t158 = gain[12] * t32;
+    const real t159 = t157 + t158;
+    const real t160 = gain[13] * t44;
+    const real t161 = t159 + t160;
+    const real t162 = gain[14] * t56;
+    const real t163 = t161 + t162;
+    const real t164 = gain[15] * t124;
+    const real t165 = t163 + t164;
+    const real t166 = gain[16] * t137;
+    const real t167 = t165 + t166;
+    const real t168 = gain[17] * t149;
+    const real t169 = t167 + t168;
+    const real t170 = y[1] - t169;
+    x[1] = t170;
+    const real t171 = gain[18] * t5;
+    const real t172 = gain[19] * t12;
+    const real t173 = t171 + t172;
+    const real t174 = gain[20] * t20;
+    const real t175 = t173 + t174;
+    const real t176 = gain[21] * t32;
+    const real t177 = t175 + t176;
+    const real t178 = gain[22] * t44;
+    const real t179 = t177 + t178;
+    const real t180 = gain[23] * t56;
+    const real t181 = t179 + t180;
+    const real t182 = gain[24] * t124;
+    const real t183 = t181 + t182;
+    const real t184 = gain[25] * t137;
+    const real t185 = t183 + t184;
+    const real t186 = gain[26] * t149;
+    const real t187 = t185 + t186;
+    const real t188 = y[2] - t187;
+    x[2] = t188;
+    const real t189 = B[0] * t152;
+    const real t190 = B[9] * t170;
+    const real t191 = t189 + t190;
+    const real t192 = B[18] * t188;
+    const real t193 = t191 + t192;
+    const real t194 = t5 + t193;
+    z[0] = t194;
+    const real t195 = B[1] * t152;
+    const real t196 = B[10] * t170;
+    const real t197 = t195 + t196;
+    const real t198 = B[19] * t188;
+    const real t199 = t197 + t198;
+    const real t200 = t12 + t199;
+    z[1] = t200;
+    const real t201 = B[2] * t152;
+    const real t202 = B[11] * t170;
+    const real t203 = t201 + t202;
+    const real t204 = B[20] * t188;
+    const real t205 = t203 + t204;
+    const real t206 = t20 + t205;
+    z[2] = t206;
+    const real t207 = B[3] * t152;
+    const real t208 = B[12] * t170;
+    const real t209 = t207 + t208;
+    const real t210 = B[21] * t188;
+    const real t211 = t209 + t210;
+    const real t212 = t32 + t211;
+    z[3] = t212;
+    const real t213 = B[4] * t152;
+    const real t214 = B[13] * t170;
+    const real t215 = t213 + t214;
+    const real t216 = B[22] * t188;
+    const real t217 = t215 + t216;
+    const real t218 = t44 + t217;
+    z[4] = t218;
+    const real t219 = B[5] * t152;
+    const real t220 = B[14] * t170;
+    const real t221 = t219 + t220;
+    const real t222 = B[23] * t188;
+    const real t223 = t221 + t222;
+    const real t224 = t56 + t223;
+    z[5] = t224;
+    const real t225 = B[6] * t152;
+    const real t226 = B[15] * t170;
+    const real t227 = t225 + t226;
+    const real t228 = B[24] * t188;
+    const real t229 = t227 + t228;
+    const real t230 = t124 + t229;
+    z[6] = t230;
+    const real t231 = B[7] * t152;
+    const real t232 = B[16] * t170;
+    const real t233 = t231 + t232;
+    const real t234 = B[25] * t188;
+    const real t235 = t233 + t234;
+    const real t236 = t137 + t235;
+    z[7] = t236;
+    const real t237 = B[8] * t152;
+    const real t238 = B[17] * t170;
+    const real t239 = t237 + t238;
+    const real t240 = B[26] * t188;
+    const real t241 = t239 + t240;
+    const real t242 = t149 + t241;
+    z[8] = t242;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 27, "", 0, 0},
+    {"gain", 27, "", 0, 0},
+    {"y", 3, "", 0, 0},
+    {"b", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_outputs[] = {
+    {"x", 3, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -5320,6 +5855,30 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_push_known",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_push_known,
+        .call = mstmm_sweep_generic3_tangent_push_known_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_tangent_push_known_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_push_known_outputs,
+        .ir_hash = "a4ee9b216e54c72d359d2c280d60a1b8fd5b9679976db3c99d9af2c416d3ab2c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer_known",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_answer_known,
+        .call = mstmm_sweep_generic3_tangent_answer_known_call,
+        .n_inputs = 10,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic3_tangent_answer_known_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_answer_known_outputs,
+        .ir_hash = "b0d54c31b26ea4be0cd6f9eddcdb5c39aa5880e07efdaa38030981410b0958a7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
         .call = mstmm_sweep_generic3_forward_slope_call,
@@ -5349,7 +5908,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "5b728ceca134cc3de051bb766727f1d7c3c5b63ec2e95ad818caa404e11b78dd",
+    .hash = "5e50abb9c4f8e46f266e3d83ff3cf2bd03334d57d35332d8ae2f2ec44c7686d8",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5359,6 +5918,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 18,
+    .n_kernels = 20,
     .kernels = mstmm_sweep_generic3_kernels,
 };

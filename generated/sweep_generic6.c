@@ -63,6 +63,14 @@ int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *res
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -7834,6 +7842,773 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* a right-hand side carried across a hinge with 6 free speeds and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][6] motion subspace of the unknowns
+ * in  V[6][6] K + G, a row a direction
+ * in  inverse[6][6] D^-1
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[6] load of the rows
+ * in  e_b[6] (N, N*m) load by what is known, without the unknowns
+ * out y[6] D^-1 times what is left of the rows
+ * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ */
+int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict V, const real *restrict inverse,
+    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
+    real *restrict e_I)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[6] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[12] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[18] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[24] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[30] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = e_f[0] + t10;
+    const real t12 = inverse[0] * t11;
+    const real t13 = H[1] * e[0];
+    const real t14 = H[7] * e[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[13] * e[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[19] * e[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[25] * e[4];
+    const real t21 = t19 + t20;
+    const real t22 = H[31] * e[5];
+    const real t23 = t21 + t22;
+    const real t24 = e_f[1] + t23;
+    const real t25 = inverse[1] * t24;
+    const real t26 = t12 + t25;
+    const real t27 = H[2] * e[0];
+    const real t28 = H[8] * e[1];
+    const real t29 = t27 + t28;
+    const real t30 = H[14] * e[2];
+    const real t31 = t29 + t30;
+    const real t32 = H[20] * e[3];
+    const real t33 = t31 + t32;
+    const real t34 = H[26] * e[4];
+    const real t35 = t33 + t34;
+    const real t36 = H[32] * e[5];
+    const real t37 = t35 + t36;
+    const real t38 = e_f[2] + t37;
+    const real t39 = inverse[2] * t38;
+    const real t40 = t26 + t39;
+    const real t41 = H[3] * e[0];
+    const real t42 = H[9] * e[1];
+    const real t43 = t41 + t42;
+    const real t44 = H[15] * e[2];
+    const real t45 = t43 + t44;
+    const real t46 = H[21] * e[3];
+    const real t47 = t45 + t46;
+    const real t48 = H[27] * e[4];
+    const real t49 = t47 + t48;
+    const real t50 = H[33] * e[5];
+    const real t51 = t49 + t50;
+    const real t52 = e_f[3] + t51;
+    const real t53 = inverse[3] * t52;
+    const real t54 = t40 + t53;
+    const real t55 = H[4] * e[0];
+    const real t56 = H[10] * e[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[16] * e[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[22] * e[3];
+    const real t61 = t59 + t60;
+    const real t62 = H[28] * e[4];
+    const real t63 = t61 + t62;
+    const real t64 = H[34] * e[5];
+    const real t65 = t63 + t64;
+    const real t66 = e_f[4] + t65;
+    const real t67 = inverse[4] * t66;
+    const real t68 = t54 + t67;
+    const real t69 = H[5] * e[0];
+    const real t70 = H[11] * e[1];
+    const real t71 = t69 + t70;
+    const real t72 = H[17] * e[2];
+    const real t73 = t71 + t72;
+    const real t74 = H[23] * e[3];
+    const real t75 = t73 + t74;
+    const real t76 = H[29] * e[4];
+    const real t77 = t75 + t76;
+    const real t78 = H[35] * e[5];
+    const real t79 = t77 + t78;
+    const real t80 = e_f[5] + t79;
+    const real t81 = inverse[5] * t80;
+    const real t82 = t68 + t81;
+    const real t83 = -t82;
+    y[0] = t83;
+    const real t84 = inverse[6] * t11;
+    const real t85 = inverse[7] * t24;
+    const real t86 = t84 + t85;
+    const real t87 = inverse[8] * t38;
+    const real t88 = t86 + t87;
+    const real t89 = inverse[9] * t52;
+    const real t90 = t88 + t89;
+    const real t91 = inverse[10] * t66;
+    const real t92 = t90 + t91;
+    const real t93 = inverse[11] * t80;
+    const real t94 = t92 + t93;
+    const real t95 = -t94;
+    y[1] = t95;
+    const real t96 = inverse[12] * t11;
+    const real t97 = inverse[13] * t24;
+    const real t98 = t96 + t97;
+    const real t99 = inverse[14] * t38;
+    const real t100 = t98 + t99;
+    const real t101 = inverse[15] * t52;
+    const real t102 = t100 + t101;
+    const real t103 = inverse[16] * t66;
+    const real t104 = t102 + t103;
+    const real t105 = inverse[17] * t80;
+    const real t106 = t104 + t105;
+    const real t107 = -t106;
+    y[2] = t107;
+    const real t108 = inverse[18] * t11;
+    const real t109 = inverse[19] * t24;
+    const real t110 = t108 + t109;
+    const real t111 = inverse[20] * t38;
+    const real t112 = t110 + t111;
+    const real t113 = inverse[21] * t52;
+    const real t114 = t112 + t113;
+    const real t115 = inverse[22] * t66;
+    const real t116 = t114 + t115;
+    const real t117 = inverse[23] * t80;
+    const real t118 = t116 + t117;
+    const real t119 = -t118;
+    y[3] = t119;
+    const real t120 = inverse[24] * t11;
+    const real t121 = inverse[25] * t24;
+    const real t122 = t120 + t121;
+    const real t123 = inverse[26] * t38;
+    const real t124 = t122 + t123;
+    const real t125 = inverse[27] * t52;
+    const real t126 = t124 + t125;
+    const real t127 = inverse[28] * t66;
+    const real t128 = t126 + t127;
+    const real t129 = inverse[29] * t80;
+    const real t130 = t128 + t129;
+    const real t131 = -t130;
+    y[4] = t131;
+    const real t132 = inverse[30] * t11;
+    const real t133 = inverse[31] * t24;
+    const real t134 = t132 + t133;
+    const real t135 = inverse[32] * t38;
+    const real t136 = t134 + t135;
+    const real t137 = inverse[33] * t52;
+    const real t138 = t136 + t137;
+    const real t139 = inverse[34] * t66;
+    const real t140 = t138 + t139;
+    const real t141 = inverse[35] * t80;
+    const real t142 = t140 + t141;
+    const real t143 = -t142;
+    y[5] = t143;
+    const real t144 = V[0] * t82;
+    const real t145 = V[6] * t94;
+    const real t146 = t144 + t145;
+    const real t147 = V[12] * t106;
+    const real t148 = t146 + t147;
+    const real t149 = V[18] * t118;
+    const real t150 = t148 + t149;
+    const real t151 = V[24] * t130;
+    const real t152 = t150 + t151;
+    const real t153 = V[30] * t142;
+    const real t154 = t152 + t153;
+    const real t155 = e[0] - t154;
+    const real t156 = e_b[0] + t155;
+    const real t157 = Rc[0] * t156;
+    const real t158 = V[1] * t82;
+    const real t159 = V[7] * t94;
+    const real t160 = t158 + t159;
+    const real t161 = V[13] * t106;
+    const real t162 = t160 + t161;
+    const real t163 = V[19] * t118;
+    const real t164 = t162 + t163;
+    const real t165 = V[25] * t130;
+    const real t166 = t164 + t165;
+    const real t167 = V[31] * t142;
+    const real t168 = t166 + t167;
+    const real t169 = e[1] - t168;
+    const real t170 = e_b[1] + t169;
+    const real t171 = Rc[1] * t170;
+    const real t172 = t157 + t171;
+    const real t173 = V[2] * t82;
+    const real t174 = V[8] * t94;
+    const real t175 = t173 + t174;
+    const real t176 = V[14] * t106;
+    const real t177 = t175 + t176;
+    const real t178 = V[20] * t118;
+    const real t179 = t177 + t178;
+    const real t180 = V[26] * t130;
+    const real t181 = t179 + t180;
+    const real t182 = V[32] * t142;
+    const real t183 = t181 + t182;
+    const real t184 = e[2] - t183;
+    const real t185 = e_b[2] + t184;
+    const real t186 = Rc[2] * t185;
+    const real t187 = t172 + t186;
+    e_I[0] += t187;
+    const real t188 = Rc[3] * t156;
+    const real t189 = Rc[4] * t170;
+    const real t190 = t188 + t189;
+    const real t191 = Rc[5] * t185;
+    const real t192 = t190 + t191;
+    e_I[1] += t192;
+    const real t193 = Rc[6] * t156;
+    const real t194 = Rc[7] * t170;
+    const real t195 = t193 + t194;
+    const real t196 = Rc[8] * t185;
+    const real t197 = t195 + t196;
+    e_I[2] += t197;
+    const real t198 = V[3] * t82;
+    const real t199 = V[9] * t94;
+    const real t200 = t198 + t199;
+    const real t201 = V[15] * t106;
+    const real t202 = t200 + t201;
+    const real t203 = V[21] * t118;
+    const real t204 = t202 + t203;
+    const real t205 = V[27] * t130;
+    const real t206 = t204 + t205;
+    const real t207 = V[33] * t142;
+    const real t208 = t206 + t207;
+    const real t209 = e[3] - t208;
+    const real t210 = e_b[3] + t209;
+    const real t211 = Rc[0] * t210;
+    const real t212 = V[4] * t82;
+    const real t213 = V[10] * t94;
+    const real t214 = t212 + t213;
+    const real t215 = V[16] * t106;
+    const real t216 = t214 + t215;
+    const real t217 = V[22] * t118;
+    const real t218 = t216 + t217;
+    const real t219 = V[28] * t130;
+    const real t220 = t218 + t219;
+    const real t221 = V[34] * t142;
+    const real t222 = t220 + t221;
+    const real t223 = e[4] - t222;
+    const real t224 = e_b[4] + t223;
+    const real t225 = Rc[1] * t224;
+    const real t226 = t211 + t225;
+    const real t227 = V[5] * t82;
+    const real t228 = V[11] * t94;
+    const real t229 = t227 + t228;
+    const real t230 = V[17] * t106;
+    const real t231 = t229 + t230;
+    const real t232 = V[23] * t118;
+    const real t233 = t231 + t232;
+    const real t234 = V[29] * t130;
+    const real t235 = t233 + t234;
+    const real t236 = V[35] * t142;
+    const real t237 = t235 + t236;
+    const real t238 = e[5] - t237;
+    const real t239 = e_b[5] + t238;
+    const real t240 = Rc[2] * t239;
+    const real t241 = t226 + t240;
+    const real t242 = Rc[6] * r[1];
+    const real t243 = Rc[3] * r[2];
+    const real t244 = t242 - t243;
+    const real t245 = t156 * t244;
+    const real t246 = Rc[7] * r[1];
+    const real t247 = Rc[4] * r[2];
+    const real t248 = t246 - t247;
+    const real t249 = t170 * t248;
+    const real t250 = t245 + t249;
+    const real t251 = Rc[8] * r[1];
+    const real t252 = Rc[5] * r[2];
+    const real t253 = t251 - t252;
+    const real t254 = t185 * t253;
+    const real t255 = t250 + t254;
+    const real t256 = t241 + t255;
+    e_I[3] += t256;
+    const real t257 = Rc[3] * t210;
+    const real t258 = Rc[4] * t224;
+    const real t259 = t257 + t258;
+    const real t260 = Rc[5] * t239;
+    const real t261 = t259 + t260;
+    const real t262 = Rc[0] * r[2];
+    const real t263 = Rc[6] * r[0];
+    const real t264 = t262 - t263;
+    const real t265 = t156 * t264;
+    const real t266 = Rc[1] * r[2];
+    const real t267 = Rc[7] * r[0];
+    const real t268 = t266 - t267;
+    const real t269 = t170 * t268;
+    const real t270 = t265 + t269;
+    const real t271 = Rc[2] * r[2];
+    const real t272 = Rc[8] * r[0];
+    const real t273 = t271 - t272;
+    const real t274 = t185 * t273;
+    const real t275 = t270 + t274;
+    const real t276 = t261 + t275;
+    e_I[4] += t276;
+    const real t277 = Rc[6] * t210;
+    const real t278 = Rc[7] * t224;
+    const real t279 = t277 + t278;
+    const real t280 = Rc[8] * t239;
+    const real t281 = t279 + t280;
+    const real t282 = Rc[3] * r[0];
+    const real t283 = Rc[0] * r[1];
+    const real t284 = t282 - t283;
+    const real t285 = t156 * t284;
+    const real t286 = Rc[4] * r[0];
+    const real t287 = Rc[1] * r[1];
+    const real t288 = t286 - t287;
+    const real t289 = t170 * t288;
+    const real t290 = t285 + t289;
+    const real t291 = Rc[5] * r[0];
+    const real t292 = Rc[2] * r[1];
+    const real t293 = t291 - t292;
+    const real t294 = t185 * t293;
+    const real t295 = t290 + t294;
+    const real t296 = t281 + t295;
+    e_I[5] += t296;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_push_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_push_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 36, "", 0, 0},
+    {"V", 36, "", 0, 0},
+    {"inverse", 36, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"e_f", 6, "", 0, 0},
+    {"e_b", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_push_known_outputs[] = {
+    {"y", 6, "", 0, 0},
+    {"e_I", 6, "N, N*m", 1, 0},
+};
+
+/* unknowns of a hinge with 6 free speeds that answer a right-hand side and increments that are known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[6][9] motion along the unknowns
+ * in  gain[6][9] D^-1 times the rows by the motion
+ * in  y[6] D^-1 times what is left of the rows
+ * in  b[9] change of motion that is known
+ * out x[6] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
+    const real *restrict w_I, const real *restrict v, const real *restrict w,
+    const real *restrict z_I, const real *restrict B, const real *restrict gain,
+    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+{
+    const real t0 = Rc[0] * z_I[0];
+    const real t1 = Rc[3] * z_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * z_I[2];
+    const real t4 = t2 + t3;
+    const real t5 = b[0] + t4;
+    const real t6 = gain[0] * t5;
+    const real t7 = Rc[1] * z_I[0];
+    const real t8 = Rc[4] * z_I[1];
+    const real t9 = t7 + t8;
+    const real t10 = Rc[7] * z_I[2];
+    const real t11 = t9 + t10;
+    const real t12 = b[1] + t11;
+    const real t13 = gain[1] * t12;
+    const real t14 = t6 + t13;
+    const real t15 = Rc[2] * z_I[0];
+    const real t16 = Rc[5] * z_I[1];
+    const real t17 = t15 + t16;
+    const real t18 = Rc[8] * z_I[2];
+    const real t19 = t17 + t18;
+    const real t20 = b[2] + t19;
+    const real t21 = gain[2] * t20;
+    const real t22 = t14 + t21;
+    const real t23 = w[2] * t11;
+    const real t24 = w[1] * t19;
+    const real t25 = t23 - t24;
+    const real t26 = Rc[0] * z_I[3];
+    const real t27 = Rc[3] * z_I[4];
+    const real t28 = t26 + t27;
+    const real t29 = Rc[6] * z_I[5];
+    const real t30 = t28 + t29;
+    const real t31 = t25 + t30;
+    const real t32 = b[3] + t31;
+    const real t33 = gain[3] * t32;
+    const real t34 = t22 + t33;
+    const real t35 = w[0] * t19;
+    const real t36 = w[2] * t4;
+    const real t37 = t35 - t36;
+    const real t38 = Rc[1] * z_I[3];
+    const real t39 = Rc[4] * z_I[4];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[7] * z_I[5];
+    const real t42 = t40 + t41;
+    const real t43 = t37 + t42;
+    const real t44 = b[4] + t43;
+    const real t45 = gain[4] * t44;
+    const real t46 = t34 + t45;
+    const real t47 = w[1] * t4;
+    const real t48 = w[0] * t11;
+    const real t49 = t47 - t48;
+    const real t50 = Rc[2] * z_I[3];
+    const real t51 = Rc[5] * z_I[4];
+    const real t52 = t50 + t51;
+    const real t53 = Rc[8] * z_I[5];
+    const real t54 = t52 + t53;
+    const real t55 = t49 + t54;
+    const real t56 = b[5] + t55;
+    const real t57 = gain[5] * t56;
+    const real t58 = t46 + t57;
+    const real t59 = v[2] * 2.0;
+    const real t60 = t11 * t59;
+    const real t61 = v[1] * 2.0;
+    const real t62 = t19 * t61;
+    const real t63 = t60 - t62;
+    const real t64 = r[2] * z_I[4];
+    const real t65 = r[1] * w_I[1];
+    const real t66 = r[2] * w_I[2];
+    const real t67 = t65 + t66;
+    const real t68 = z_I[0] * t67;
+    const real t69 = r[0] * w_I[1];
+    const real t70 = 2.0 * t69;
+    const real t71 = r[1] * w_I[0];
+    const real t72 = t70 - t71;
+    const real t73 = z_I[1] * t72;
+    const real t74 = r[0] * w_I[2];
+    const real t75 = 2.0 * t74;
+    const real t76 = r[2] * w_I[0];
+    const real t77 = t75 - t76;
+    const real t78 = z_I[2] * t77;
+    const real t79 = t73 + t78;
+    const real t80 = t68 - t79;
+    const real t81 = r[1] * z_I[5];
+    const real t82 = t80 - t81;
+    const real t83 = t64 + t82;
+    const real t84 = z_I[6] + t83;
+    const real t85 = Rc[0] * t84;
+    const real t86 = r[0] * z_I[5];
+    const real t87 = r[0] * w_I[0];
+    const real t88 = t66 + t87;
+    const real t89 = z_I[1] * t88;
+    const real t90 = 2.0 * t71;
+    const real t91 = t90 - t69;
+    const real t92 = z_I[0] * t91;
+    const real t93 = t89 - t92;
+    const real t94 = r[1] * w_I[2];
+    const real t95 = 2.0 * t94;
+    const real t96 = r[2] * w_I[1];
+    const real t97 = t95 - t96;
+    const real t98 = z_I[2] * t97;
+    const real t99 = t93 - t98;
+    const real t100 = t86 + t99;
+    const real t101 = r[2] * z_I[3];
+    const real t102 = t100 - t101;
+    const real t103 = z_I[7] + t102;
+    const real t104 = Rc[3] * t103;
+    const real t105 = t85 + t104;
+    const real t106 = r[1] * z_I[3];
+    const real t107 = t65 + t87;
+    const real t108 = z_I[2] * t107;
+    const real t109 = 2.0 * t76;
+    const real t110 = t109 - t74;
+    const real t111 = z_I[0] * t110;
+    const real t112 = t108 - t111;
+    const real t113 = 2.0 * t96;
+    const real t114 = t113 - t94;
+    const real t115 = z_I[1] * t114;
+    const real t116 = t112 - t115;
+    const real t117 = r[0] * z_I[4];
+    const real t118 = t116 - t117;
+    const real t119 = t106 + t118;
+    const real t120 = z_I[8] + t119;
+    const real t121 = Rc[6] * t120;
+    const real t122 = t105 + t121;
+    const real t123 = t63 + t122;
+    const real t124 = b[6] + t123;
+    const real t125 = gain[6] * t124;
+    const real t126 = t58 + t125;
+    const real t127 = v[0] * 2.0;
+    const real t128 = t19 * t127;
+    const real t129 = t4 * t59;
+    const real t130 = t128 - t129;
+    const real t131 = Rc[1] * t84;
+    const real t132 = Rc[4] * t103;
+    const real t133 = t131 + t132;
+    const real t134 = Rc[7] * t120;
+    const real t135 = t133 + t134;
+    const real t136 = t130 + t135;
+    const real t137 = b[7] + t136;
+    const real t138 = gain[7] * t137;
+    const real t139 = t126 + t138;
+    const real t140 = t4 * t61;
+    const real t141 = t11 * t127;
+    const real t142 = t140 - t141;
+    const real t143 = Rc[2] * t84;
+    const real t144 = Rc[5] * t103;
+    const real t145 = t143 + t144;
+    const real t146 = Rc[8] * t120;
+    const real t147 = t145 + t146;
+    const real t148 = t142 + t147;
+    const real t149 = b[8] + t148;
+    const real t150 = gain[8] * t149;
+    const real t151 = t139 + t150;
+    const real t152 = y[0] - t151;
+    x[0] = t152;
+    const real t153 = gain[9] * t5;
+    const real t154 = gain[10] * t12;
+    const real t155 = t153 + t154;
+    const real t156 = gain[11] * t20;
+    const real t157 = t155 + t156;
+    const real t158 = gain[12] * t32;
+    const real t159 = t157 + t158;
+    const real t160 = gain[13] * t44;
+    const real t161 = t159 + t160;
+    const real t162 = gain[14] * t56;
+    const real t163 = t161 + t162;
+    const real t164 = gain[15] * t124;
+    const real t165 = t163 + t164;
+    const real t166 = gain[16] * t137;
+    const real t167 = t165 + t166;
+    const real t168 = gain[17] * t149;
+    const real t169 = t167 + t168;
+    const real t170 = y[1] - t169;
+    x[1] = t170;
+    const real t171 = gain[18] * t5;
+    const real t172 = gain[19] * t12;
+    const real t173 = t171 + t172;
+    const real t174 = gain[20] * t20;
+    const real t175 = t173 + t174;
+    const real t176 = gain[21] * t32;
+    const real t177 = t175 + t176;
+    const real t178 = gain[22] * t44;
+    const real t179 = t177 + t178;
+    const real t180 = gain[23] * t56;
+    const real t181 = t179 + t180;
+    const real t182 = gain[24] * t124;
+    const real t183 = t181 + t182;
+    const real t184 = gain[25] * t137;
+    const real t185 = t183 + t184;
+    const real t186 = gain[26] * t149;
+    const real t187 = t185 + t186;
+    const real t188 = y[2] - t187;
+    x[2] = t188;
+    const real t189 = gain[27] * t5;
+    const real t190 = gain[28] * t12;
+    const real t191 = t189 + t190;
+    const real t192 = gain[29] * t20;
+    const real t193 = t191 + t192;
+    const real t194 = gain[30] * t32;
+    const real t195 = t193 + t194;
+    const real t196 = gain[31] * t44;
+    const real t197 = t195 + t196;
+    const real t198 = gain[32] * t56;
+    const real t199 = t197 + t198;
+    const real t200 = gain[33] * t124;
+    const real t201 = t199 + t200;
+    const real t202 = gain[34] * t137;
+    const real t203 = t201 + t202;
+    const real t204 = gain[35] * t149;
+    const real t205 = t203 + t204;
+    const real t206 = y[3] - t205;
+    x[3] = t206;
+    const real t207 = gain[36] * t5;
+    const real t208 = gain[37] * t12;
+    const real t209 = t207 + t208;
+    const real t210 = gain[38] * t20;
+    const real t211 = t209 + t210;
+    const real t212 = gain[39] * t32;
+    const real t213 = t211 + t212;
+    const real t214 = gain[40] * t44;
+    const real t215 = t213 + t214;
+    const real t216 = gain[41] * t56;
+    const real t217 = t215 + t216;
+    const real t218 = gain[42] * t124;
+    const real t219 = t217 + t218;
+    const real t220 = gain[43] * t137;
+    const real t221 = t219 + t220;
+    const real t222 = gain[44] * t149;
+    const real t223 = t221 + t222;
+    const real t224 = y[4] - t223;
+    x[4] = t224;
+    const real t225 = gain[45] * t5;
+    const real t226 = gain[46] * t12;
+    const real t227 = t225 + t226;
+    const real t228 = gain[47] * t20;
+    const real t229 = t227 + t228;
+    const real t230 = gain[48] * t32;
+    const real t231 = t229 + t230;
+    const real t232 = gain[49] * t44;
+    const real t233 = t231 + t232;
+    const real t234 = gain[50] * t56;
+    const real t235 = t233 + t234;
+    const real t236 = gain[51] * t124;
+    const real t237 = t235 + t236;
+    const real t238 = gain[52] * t137;
+    const real t239 = t237 + t238;
+    const real t240 = gain[53] * t149;
+    const real t241 = t239 + t240;
+    const real t242 = y[5] - t241;
+    x[5] = t242;
+    const real t243 = B[0] * t152;
+    const real t244 = B[9] * t170;
+    const real t245 = t243 + t244;
+    const real t246 = B[18] * t188;
+    const real t247 = t245 + t246;
+    const real t248 = B[27] * t206;
+    const real t249 = t247 + t248;
+    const real t250 = B[36] * t224;
+    const real t251 = t249 + t250;
+    const real t252 = B[45] * t242;
+    const real t253 = t251 + t252;
+    const real t254 = t5 + t253;
+    z[0] = t254;
+    const real t255 = B[1] * t152;
+    const real t256 = B[10] * t170;
+    const real t257 = t255 + t256;
+    const real t258 = B[19] * t188;
+    const real t259 = t257 + t258;
+    const real t260 = B[28] * t206;
+    const real t261 = t259 + t260;
+    const real t262 = B[37] * t224;
+    const real t263 = t261 + t262;
+    const real t264 = B[46] * t242;
+    const real t265 = t263 + t264;
+    const real t266 = t12 + t265;
+    z[1] = t266;
+    const real t267 = B[2] * t152;
+    const real t268 = B[11] * t170;
+    const real t269 = t267 + t268;
+    const real t270 = B[20] * t188;
+    const real t271 = t269 + t270;
+    const real t272 = B[29] * t206;
+    const real t273 = t271 + t272;
+    const real t274 = B[38] * t224;
+    const real t275 = t273 + t274;
+    const real t276 = B[47] * t242;
+    const real t277 = t275 + t276;
+    const real t278 = t20 + t277;
+    z[2] = t278;
+    const real t279 = B[3] * t152;
+    const real t280 = B[12] * t170;
+    const real t281 = t279 + t280;
+    const real t282 = B[21] * t188;
+    const real t283 = t281 + t282;
+    const real t284 = B[30] * t206;
+    const real t285 = t283 + t284;
+    const real t286 = B[39] * t224;
+    const real t287 = t285 + t286;
+    const real t288 = B[48] * t242;
+    const real t289 = t287 + t288;
+    const real t290 = t32 + t289;
+    z[3] = t290;
+    const real t291 = B[4] * t152;
+    const real t292 = B[13] * t170;
+    const real t293 = t291 + t292;
+    const real t294 = B[22] * t188;
+    const real t295 = t293 + t294;
+    const real t296 = B[31] * t206;
+    const real t297 = t295 + t296;
+    const real t298 = B[40] * t224;
+    const real t299 = t297 + t298;
+    const real t300 = B[49] * t242;
+    const real t301 = t299 + t300;
+    const real t302 = t44 + t301;
+    z[4] = t302;
+    const real t303 = B[5] * t152;
+    const real t304 = B[14] * t170;
+    const real t305 = t303 + t304;
+    const real t306 = B[23] * t188;
+    const real t307 = t305 + t306;
+    const real t308 = B[32] * t206;
+    const real t309 = t307 + t308;
+    const real t310 = B[41] * t224;
+    const real t311 = t309 + t310;
+    const real t312 = B[50] * t242;
+    const real t313 = t311 + t312;
+    const real t314 = t56 + t313;
+    z[5] = t314;
+    const real t315 = B[6] * t152;
+    const real t316 = B[15] * t170;
+    const real t317 = t315 + t316;
+    const real t318 = B[24] * t188;
+    const real t319 = t317 + t318;
+    const real t320 = B[33] * t206;
+    const real t321 = t319 + t320;
+    const real t322 = B[42] * t224;
+    const real t323 = t321 + t322;
+    const real t324 = B[51] * t242;
+    const real t325 = t323 + t324;
+    const real t326 = t124 + t325;
+    z[6] = t326;
+    const real t327 = B[7] * t152;
+    const real t328 = B[16] * t170;
+    const real t329 = t327 + t328;
+    const real t330 = B[25] * t188;
+    const real t331 = t329 + t330;
+    const real t332 = B[34] * t206;
+    const real t333 = t331 + t332;
+    const real t334 = B[43] * t224;
+    const real t335 = t333 + t334;
+    const real t336 = B[52] * t242;
+    const real t337 = t335 + t336;
+    const real t338 = t137 + t337;
+    z[7] = t338;
+    const real t339 = B[8] * t152;
+    const real t340 = B[17] * t170;
+    const real t341 = t339 + t340;
+    const real t342 = B[26] * t188;
+    const real t343 = t341 + t342;
+    const real t344 = B[35] * t206;
+    const real t345 = t343 + t344;
+    const real t346 = B[44] * t224;
+    const real t347 = t345 + t346;
+    const real t348 = B[53] * t242;
+    const real t349 = t347 + t348;
+    const real t350 = t149 + t349;
+    z[8] = t350;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"w_I", 3, "rad/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"B", 54, "", 0, 0},
+    {"gain", 54, "", 0, 0},
+    {"y", 6, "", 0, 0},
+    {"b", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_outputs[] = {
+    {"x", 6, "", 0, 0},
+    {"z", 9, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -8830,6 +9605,30 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_push_known",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_push_known,
+        .call = mstmm_sweep_generic6_tangent_push_known_call,
+        .n_inputs = 8,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic6_tangent_push_known_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_push_known_outputs,
+        .ir_hash = "7971eb7c9948d1dd32b68ea940aa56e9fd7aadf94fd50222279abe2eb493b4e0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "tangent_answer_known",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_answer_known,
+        .call = mstmm_sweep_generic6_tangent_answer_known_call,
+        .n_inputs = 10,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_generic6_tangent_answer_known_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_answer_known_outputs,
+        .ir_hash = "50ee9e9611cb5b01fc05ab0816a9693a0d937a246acd42c87ddfaa700e55aa7d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic6_forward_slope,
         .call = mstmm_sweep_generic6_forward_slope_call,
@@ -8859,7 +9658,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "4507ca09558a845ba96154048163ca7cc613860b402d3be90d1d071f7528a761",
+    .hash = "32647c5e43c4a9d8c89ba54c21adfd7ef5ebaf6e40ebae473719a96b504dafd2",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -8869,6 +9668,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 18,
+    .n_kernels = 20,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -188,6 +188,26 @@ mstmm_generic_tangent_answer_kernel *const mstmm_generic_tangent_answer_table[] 
     mstmm_sweep_generic6_tangent_answer,
 };
 
+mstmm_generic_tangent_push_known_kernel *const mstmm_generic_tangent_push_known_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_push_known,
+    mstmm_sweep_generic2_tangent_push_known,
+    mstmm_sweep_generic3_tangent_push_known,
+    mstmm_sweep_generic4_tangent_push_known,
+    mstmm_sweep_generic5_tangent_push_known,
+    mstmm_sweep_generic6_tangent_push_known,
+};
+
+mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_known_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_answer_known,
+    mstmm_sweep_generic2_tangent_answer_known,
+    mstmm_sweep_generic3_tangent_answer_known,
+    mstmm_sweep_generic4_tangent_answer_known,
+    mstmm_sweep_generic5_tangent_answer_known,
+    mstmm_sweep_generic6_tangent_answer_known,
+};
+
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)62 * n + 4 * (int64_t)n * n; }
@@ -1756,6 +1776,8 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         for (int c = 0; c < n; c++) {
             mstmm_aim_mode(state, modal, c);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
             mstmm_frames_tangent_turned(
@@ -1770,8 +1792,6 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
                 .J = body->rotor, .laws = mstmm_zeros, .B = bend + MSTMM_BEND_B(n) + 9 * c,
                 .G = bend + MSTMM_BEND_G(n) + 6 * c, .row = change);
-            for (int j = 0; j < n; j++)
-                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -1901,6 +1921,8 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         for (int c = 0; c < n; c++) {
             mstmm_aim_mode(state, modal, c);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
             mstmm_frames_tangent_turned(
@@ -1915,8 +1937,6 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
                 .J = body->rotor, .laws = mstmm_zeros, .B = port + MSTMM_PORT_B(n) + 9 * c,
                 .G = port + MSTMM_PORT_G(n) + 6 * c, .row = change);
-            for (int j = 0; j < n; j++)
-                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -2087,6 +2107,331 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
             .z = d_block + MSTMM_BLOCK_MOTION);
+    }
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
+            .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
+        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_tangent_answer(
+            .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
+            .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
+            .x = state->answer + modal->u, .z = z);
+        memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    return 0;
+}
+
+/* A right-hand side, and own loads by what is known of modes. */
+static int mstmm_at_known_column(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    int code;
+    memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+    for (int j = 0; j < nu; j++)
+        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        memset(d_block + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
+        code = mstmm_at_modal_own_slope(state, index);
+        if (code) return code;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] -= (state->column + modal->u)[j];
+    }
+    return 0;
+}
+
+/* Change of a law's efforts by what is known of its hinge. */
+static int mstmm_at_known_laws(mstmm_state *state, int index)
+{
+    real effort[6];
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *d_block = state->slope->workspace + body->block;
+    if (law->kind == 0) {
+        mstmm_law_coordinate_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+            .d_tau = d_tau);
+    } else {
+        mstmm_law_quaternion_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .twist_ref = state->memory + law->twist,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+            .d_tau = d_tau);
+    }
+    for (int j = 0; j < law->n; j++)
+        (d_block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += d_tau[j];
+    return 0;
+}
+
+/* The same loads carried to the parent, with what is known. */
+static int mstmm_at_known_carried(mstmm_state *state, int index)
+{
+    real carrier[9];
+    real turn[3];
+    real place[3];
+    real turned[6];
+    real change[6];
+    real e_c[6];
+    real seen[6];
+    real known[6];
+    real rows[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (body->section) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
+        code = mstmm_at_section_motion_slope(state, index);
+        if (code) return code;
+        mstmm_frames_tangent_turned(
+            .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+        mstmm_generic_tangent_column(nu,
+            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+            .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+            .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+            .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+            .J = body->rotor, .laws = mstmm_zeros,
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+        mstmm_modal_modal_effort_slope(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+            .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+            .d_e = mstmm_zeros, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+            .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    }
+    if (body->modal && body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_tangent_push(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
+            .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (body->modal && !body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_tangent_push(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
+            .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (body->section) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        mstmm_frames_tangent_known(
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
+            .e_b = known);
+    }
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < 6; j++)
+            (d_block + MSTMM_BLOCK_E)[j] += seen[j];
+        mstmm_modal_modal_effort(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+        for (int j = 0; j < 6; j++)
+            (d_block + MSTMM_BLOCK_E)[j] += turned[j];
+    }
+    if (body->modal && body->section) {
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < 6; j++)
+            (d_block + MSTMM_BLOCK_E)[j] += known[j];
+    }
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
+    }
+    if (!body->section && speeds && !body->steady) {
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+    }
+    if (!body->section && speeds && body->steady && !body->straight) {
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+    }
+    if (!body->section && speeds && body->straight) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        mstmm_generic_tangent_along(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .d_q = state->slope->q + body->q,
+            .theta = turn, .x = place);
+    }
+    if (!body->section && speeds && !body->straight) {
+        real *block = state->workspace + body->block;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_frames_tangent_turned(
+            .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+    }
+    if (!body->section && speeds && body->steady) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_generic_tangent_steady(nu,
+            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier,
+            .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
+            .d_s = state->slope->given + body->u, .J = body->rotor,
+            .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+    }
+    if (!body->section && speeds && !body->steady) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_generic_tangent_column(nu,
+            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+            .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+            .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+            .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+            .J = body->rotor, .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+    }
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        for (int k = 0; k < speeds; k++)
+            rows[k] = change[columns[k]];
+        mstmm_frames_tangent_known(
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
+            .e_b = known);
+        mstmm_generic_tangent_push_known(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
+            .e = d_block + MSTMM_BLOCK_E, .e_f = rows, .e_b = known,
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq), .e_I = d_parent + MSTMM_BLOCK_E);
+    } else {
+        real *block = state->workspace + body->block;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_transport(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .e = d_block + MSTMM_BLOCK_E, .e_I = d_parent + MSTMM_BLOCK_E);
+    }
+    return 0;
+}
+
+/* Unknowns that answer a right-hand side, beside what is known. */
+static int mstmm_at_known_answered(mstmm_state *state, int index)
+{
+    real x[6];
+    real z[9];
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    if (mstmm_idle(state, body)) return 0;
+    for (int j = 0; j < nu; j++)
+        (state->answer + body->u)[j] = 0;
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_generic_tangent_answer_known(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq),
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .x = x,
+            .z = d_block + MSTMM_BLOCK_MOTION);
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
+                         : 0;
+    } else {
+        real *block = state->workspace + body->block;
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_tangent_moved(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .z = d_block + MSTMM_BLOCK_MOTION);
+    }
+    if (body->section) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        for (int j = 0; j < 9; j++)
+            (d_block + MSTMM_BLOCK_MOTION)[j] += (tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq))[j];
     }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -2527,6 +2872,46 @@ static int mstmm_pass_tangent_answered(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_known_column(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_known_column(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_known_laws(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_known_laws(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_known_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_known_carried(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_known_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_known_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 /* Driven coordinates, and the values of the scene's expressions. */
 int mstmm_run_given(mstmm_state *state)
 {
@@ -2864,6 +3249,21 @@ int mstmm_run_tangent_solution(mstmm_state *state)
     code = mstmm_pass_tangent_carried(state);
     if (code) return code;
     code = mstmm_pass_tangent_answered(state);
+    if (code) return code;
+    return 0;
+}
+
+/* One right-hand side through the factored tangent, parts of the increments being known. */
+int mstmm_run_tangent_beyond(mstmm_state *state)
+{
+    int code;
+    code = mstmm_pass_known_column(state);
+    if (code) return code;
+    code = mstmm_pass_known_laws(state);
+    if (code) return code;
+    code = mstmm_pass_known_carried(state);
+    if (code) return code;
+    code = mstmm_pass_known_answered(state);
     if (code) return code;
     return 0;
 }

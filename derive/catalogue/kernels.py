@@ -34,13 +34,15 @@ FRAME_DERIVATIONS = (
     frames.driven_effort, frames.speed_power, frames.length, frames.turned,
     frames.classical_body, frames.state_deviation,
     tangent.tangent_carry, tangent.tangent_moved, tangent.tangent_turned,
+    tangent.tangent_known,
 )  # fmt: skip
 
 #: Steps of the tangent for hinges with any number of speeds, and for those that have some.
 _ALONG_HINGES = (tangent.tangent_carrier, tangent.tangent_column)
 _OF_SPEEDS = (
     tangent.tangent_along, tangent.tangent_steady, tangent.tangent_rows, tangent.tangent_reduce,
-    tangent.tangent_push, tangent.tangent_answer,
+    tangent.tangent_push, tangent.tangent_answer, tangent.tangent_push_known,
+    tangent.tangent_answer_known,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.

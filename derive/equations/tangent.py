@@ -19,6 +19,12 @@ from the hinge's own kernel differentiated), so that with K = S B
     D = H^T K + W,      S_I += X^T (S - (K + G) D^-1 H^T S) Th,
                         e_I += X^T (e + (K + G) D^-1 (r - H^T e))
 
+Where parts of the increments are known beforehand (stages of a method), b is the motion and g the
+load that they make of one hinge, z = Th z_I + b + B x, and w what they make of its rows; with S_c
+what is carried on in place of S,
+
+    y = D^-1 (r - w - H^T e),   e_I += X^T (e + V y + S_c b + g),   x = y - D^-1 H^T S (Th z_I + b)
+
 Modal coordinates are unknowns of the same kind, whose body adds a load K x of its own and rows of
 its own.  Arrays with a column per unknown or per entry of z are kept with a row for each, as they
 are made one direction at a time.
@@ -116,6 +122,32 @@ def tangent_moved() -> Derivation:
         (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
         (Z,),
         (first, Equation("Th z_I", Z.symbol, moved)),
+        sources=SOURCES,
+    )
+
+
+# --- increments that are known ------------------------------------------------------------------
+
+KNOWN = Quantity(symbol("b", 9), "", "change of motion that is known")
+KNOWN_LOAD = Quantity(symbol("e_b", 6), "N, N*m", "load by what is known, without the unknowns")
+_TURNED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
+
+
+def tangent_known() -> Derivation:
+    """S b, as rows of unknowns see it, and S b + g, as it is carried on.
+
+    With S as it is without the unknowns, the rows of the unknowns themselves need no more than
+    z + b in place of z (see `tangent_answer`)."""
+    felt = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
+    return Derivation(
+        "frames",
+        "load by a motion that is known",
+        (ROWS_S, KNOWN, _TURNED_LOAD),
+        (felt, KNOWN_LOAD),
+        (
+            Equation("S b", felt.symbol, ROWS_S.symbol.T * KNOWN.symbol),
+            Equation("S b + g", KNOWN_LOAD.symbol, felt.symbol + _TURNED_LOAD.symbol),
+        ),
         sources=SOURCES,
     )
 
@@ -369,16 +401,18 @@ def tangent_reduce(nu: int) -> Derivation:
     )
 
 
-def tangent_push(nu: int) -> Derivation:
-    """y = D^-1 (-e_f - H^T e), and the load e + V y carried to the parent."""
+def tangent_push(nu: int, known: bool = False) -> Derivation:
+    """y = D^-1 (-e_f - H^T e), and the load e + V y (+ what is `known`) carried to the parent."""
     at = _hinge(nu)
     h, v, inverse, y = (at[name] for name in ("H", "V", "inverse", "y"))
     own = Quantity(symbol("e_f", nu), "", "load of the rows")
     onward = symbol("e_c", 6)
+    carried = E.symbol + v.symbol.T * y.symbol
     return Derivation(
         f"generic{nu}",
-        f"a right-hand side carried across a hinge with {free_speeds(nu)}",
-        (R, SHIFT, h, v, inverse, E, own),
+        f"a right-hand side carried across a hinge with {free_speeds(nu)}"
+        + (" and increments that are known" if known else ""),
+        (R, SHIFT, h, v, inverse, E, own, *((KNOWN_LOAD,) if known else ())),
         (y, PARENT_E),
         (
             Equation(
@@ -386,15 +420,20 @@ def tangent_push(nu: int) -> Derivation:
                 y.symbol,
                 inverse.symbol * (-own.symbol - h.symbol.T * E.symbol),
             ),
-            Equation("e + V y", onward, E.symbol + v.symbol.T * y.symbol),
+            Equation("e + V y", onward, carried + KNOWN_LOAD.symbol if known else carried),
             Equation("X^T (e + V y)", PARENT_E.symbol, transport(onward)),
         ),
         sources=SOURCES,
     )
 
 
-def tangent_answer(nu: int) -> Derivation:
-    """x = y - D^-1 H^T S z of a hinge and z = Th z_I + B x behind it."""
+def tangent_push_known(nu: int) -> Derivation:
+    """`tangent_push` where increments of the hinge are known."""
+    return tangent_push(nu, known=True)
+
+
+def tangent_answer(nu: int, known: bool = False) -> Derivation:
+    """x = y - D^-1 H^T S z of a hinge, z = Th z_I (+ what is `known`), and z + B x behind it."""
     at = _hinge(nu)
     b, gain, y = (at[name] for name in ("B", "gain", "y"))
     unknowns = Quantity(symbol("x", nu), "", "unknowns")
@@ -402,17 +441,23 @@ def tangent_answer(nu: int) -> Derivation:
     first, behind = _behind()
     return Derivation(
         f"generic{nu}",
-        f"unknowns of a hinge with {free_speeds(nu)} that answer a right-hand side",
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT, b, gain, y),
+        f"unknowns of a hinge with {free_speeds(nu)} that answer a right-hand side"
+        + (" and increments that are known" if known else ""),
+        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT, b, gain, y, *((KNOWN,) if known else ())),
         (unknowns, Z),
         (
             first,
-            Equation("Th z_I", moved, behind),
+            Equation("Th z_I", moved, behind + KNOWN.symbol if known else behind),
             Equation("x", unknowns.symbol, y.symbol - gain.symbol * moved),
             Equation("z", Z.symbol, moved + b.symbol.T * unknowns.symbol),
         ),
         sources=SOURCES,
     )
+
+
+def tangent_answer_known(nu: int) -> Derivation:
+    """`tangent_answer` where increments of the hinge are known."""
+    return tangent_answer(nu, known=True)
 
 
 # --- any number of unknowns ---------------------------------------------------------------------

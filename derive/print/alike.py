@@ -27,6 +27,7 @@ from mstmm.ir import (
 #: are computed; what an output holds is read from there by those behind it.
 ALIKE: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     ("frames", "tangent_carry"): (("T", 1), ("S_I", 0)),
+    ("frames", "tangent_known"): (("e_S", 0), ("e_b", 0)),
     **{(f"generic{n}", "tangent_rows"): (("K", 1), ("right", 1)) for n in range(1, 7)},
     **{(f"generic{n}", "tangent_reduce"): (("gain", 1), ("V", 1), ("S", 1)) for n in range(1, 7)},
 }

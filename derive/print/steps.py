@@ -138,7 +138,8 @@ class StepText:
             parts = [self.needs(part) | condition_needs(part.when) for part in step.steps]
             return set(_ALONG[step.of][2]).union(*parts)
         elif isinstance(step, Pick):
-            slots, more = [step.to, step.source], {"nu", "speeds", "columns"}
+            slots, more = [step.to, step.source], {"speeds", "columns"}
+            more |= {"nu"} if step.rows > 1 else set()
         elif isinstance(step, Spread):
             slots = [step.to, step.free, *([step.imposed] if step.imposed else [])]
             more = {"nu", "speeds", "columns"}

@@ -39,6 +39,7 @@ TANGENT = {
     "tangent.W": (0, 0, 1, 0, 0), "tangent.laws": (0, 0, 1, 0, 0), "tangent.H": (0, 6, 0, 0, 0),
     "tangent.V": (0, 6, 0, 0, 0), "tangent.gain": (0, 9, 0, 0, 0),
     "tangent.inverse": (0, 0, 1, 0, 0), "tangent.y": (0, 1, 0, 0, 0),
+    "tangent.known": (9, 0, 0, 0, 0),
     "tangent.along": (0, 0, 0, 0, 1), "tangent.ways": (0, 0, 0, 0, 1),
     "tangent.turns": (0, 0, 0, 1, 0),
     "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),

@@ -10,7 +10,14 @@ from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .steps import Pass, Run, Sweep
-from .tangent import APPLIED_SLOPE, DIRECTIONAL, LAGGED, TANGENT, TANGENT_SOLUTION
+from .tangent import (
+    APPLIED_SLOPE,
+    DIRECTIONAL,
+    LAGGED,
+    TANGENT,
+    TANGENT_BEYOND,
+    TANGENT_SOLUTION,
+)
 
 _GIVEN = (
     Run(whole=PRESCRIBED),
@@ -80,7 +87,8 @@ SOLUTION = Sweep(
 )
 
 SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, MOTION, POSED, FACTORISATION, SOLUTION,
-          DIRECTIONAL, APPLIED_SLOPE, TANGENT, TANGENT_SOLUTION)  # fmt: skip
+          DIRECTIONAL, APPLIED_SLOPE, TANGENT, TANGENT_SOLUTION,
+          TANGENT_BEYOND)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between
 #: their runs, observations.

@@ -115,55 +115,68 @@ _TURN = call("frames.tangent_turned", R="hinge.R", d_R=D + "hinge.R", d_d=D + "h
              **_TURNED)  # fmt: skip
 
 
-def _column(matrices: str, laws: str) -> dict[str, str]:
+def _column(b: str, g: str, laws: str) -> dict[str, str]:
     """A direction's row of B and of G, and what the hinge's rows change by."""
     return {
         **_TURNED, **_ACROSS_NOW, "Q": "local.carrier", "f": "body.e", "d_s": D + "body.given",
-        "J": "body.rotor", "laws": laws, "B": f"{matrices}.B[9 * c]", "G": f"{matrices}.G[6 * c]",
-        "row": "local.change",
+        "J": "body.rotor", "laws": laws, "B": b, "G": g, "row": "local.change",
     }  # fmt: skip
 
 
 _CHANGES = {"s": "body.s"} | {f"d_{name}": f"{D}hinge.{name}" for name in ("H", "v", "w", "c")}
 
 
-def _section(matrices: str) -> tuple[Step, ...]:
-    """A section has no speeds: its rows are those of the modes."""
+def _along_modes(b: str, g: str) -> tuple[Step, ...]:
+    """Where the derivatives of modes point: of a section and, in d:modes.felt, of the rows."""
     felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
                 tau="modes.felt")  # fmt: skip
+    return (
+        Do(whole=sloped(SECTION_MOTION)),
+        _TURN,
+        call("generic{nu}.tangent_column", **_column(b, g, "none"), **_CHANGES),
+        _still(felt, "e"),
+    )
+
+
+def _section(matrices: str) -> tuple[Step, ...]:
+    """A section has no speeds: its rows are those of the modes."""
     return (
         _CARRIER,
         Along(
             of="modes",
             steps=(
-                Do(whole=sloped(SECTION_MOTION)),
-                _TURN,
-                call("generic{nu}.tangent_column", **_column(matrices, "none"), **_CHANGES),
                 Copy(to=D + "modes.e_f"),
-                _still(felt, "e"),
+                *_along_modes(f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]"),
                 Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
             ),
         ),
     )
 
 
-_OWN_COLUMN = _column("tangent", "tangent.laws[nu * c]")
+def _along_hinge(b: str, g: str, laws: str) -> tuple[Step, ...]:
+    """Where the derivatives of a hinge point; its rows in local.change."""
+    column = _column(b, g, laws)
+    return (
+        Do(whole=sloped(_HINGE_MOTION), when="!steady"),
+        Do(whole=sloped(_HINGE_MOTION), when="steady curved"),
+        call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
+             **_TURNED),
+        replace(_TURN, when="curved"),
+        call("generic{nu}.tangent_steady", when="steady", **column, d_u=D + "body.u"),
+        call("generic{nu}.tangent_column", when="!steady", **column, **_CHANGES),
+    )  # fmt: skip
+
+
 _HINGE = (
     _CARRIER,
     Along(
         of="free",
         steps=(
-            Do(whole=sloped(_HINGE_MOTION), when="!steady"),
-            Do(whole=sloped(_HINGE_MOTION), when="steady curved"),
-            call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
-                 **_TURNED),
-            replace(_TURN, when="curved"),
-            call("generic{nu}.tangent_steady", when="steady", **_OWN_COLUMN, d_u=D + "body.u"),
-            call("generic{nu}.tangent_column", when="!steady", **_OWN_COLUMN, **_CHANGES),
+            *_along_hinge("tangent.B[9 * c]", "tangent.G[6 * c]", "tangent.laws[nu * c]"),
             Pick(to="tangent.W[speeds * c]", source="local.change"),
         ),
     ),
-)  # fmt: skip
+)
 
 LAG = Pass(
     "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
@@ -198,20 +211,17 @@ LAGGED = Pass(
 
 # --- factored -----------------------------------------------------------------------------------
 
+#: Change of a law's efforts by its hinge alone: what expressions say of its effort reaches further.
+_LAW_CHANGE = tuple(
+    Sloped(step.when, step.kernel + SLOPE, step.ports, still=("effort",))
+    for step in LAWS.steps
+    if isinstance(step, Call)
+)
+
 LAW_SLOPES = Pass(
     "law_slopes", "law", "Slopes of a law along the unknowns of its hinge.",
     (
-        Along(
-            of="felt",
-            steps=(
-                *(
-                    Sloped(step.when, step.kernel + SLOPE, step.ports, still=("effort",))
-                    for step in LAWS.steps
-                    if isinstance(step, Call)
-                ),
-                Add(to="law.slopes", source=D + "local.tau"),
-            ),
-        ),
+        Along(of="felt", steps=(*_LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))),
     ),
 )  # fmt: skip
 
@@ -299,14 +309,16 @@ _FELT_CHANGE = (
     Copy(to=D + "modes.e_f", source=D + "modes.felt"),
 )  # fmt: skip
 
+_NO_LOAD = Copy(to=D + "body.e")
+_RIGHT = Add(to=D + "modes.e_f", source="modes.column", times=-1)
+
 TANGENT_COLUMN = Pass(
     "tangent_column", "body", "A right-hand side as loads of the rows.",
     (
-        Copy(to=D + "body.e"),
+        _NO_LOAD,
         Copy(to=D + "body.tau"),
         Add(to=D + "body.tau", source="body.column", times=-1),
-        *only("modal", Copy(to=D + "modes.e_f"),
-              Add(to=D + "modes.e_f", source="modes.column", times=-1)),
+        *only("modal", Copy(to=D + "modes.e_f"), _RIGHT),
     ),
 )  # fmt: skip
 
@@ -320,6 +332,14 @@ def _pushed(subspace: str) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
+_PUSH = {
+    "Rc": "body.R", "r": "body.r", "H": "tangent.H", "V": "tangent.V",
+    "inverse": "tangent.inverse", "e": D + "body.e", "e_f": "local.rows", "y": "tangent.y",
+    "e_I": D + "parent.e",
+}  # fmt: skip
+_STILL = call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
+              e_I=D + "parent.e")  # fmt: skip
+
 TANGENT_CARRIED = Pass(
     "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
     (
@@ -329,30 +349,24 @@ TANGENT_CARRIED = Pass(
         *only(
             "moving",
             Pick(to="local.rows", source=D + "body.tau"),
-            call("generic{free}.tangent_push", Rc="body.R", r="body.r", H="tangent.H",
-                 V="tangent.V", inverse="tangent.inverse", e=D + "body.e", e_f="local.rows",
-                 y="tangent.y", e_I=D + "parent.e"),
+            call("generic{free}.tangent_push", **_PUSH),
         ),
-        call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
-             e_I=D + "parent.e"),
+        _STILL,
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
 _MOVED = Copy(to=D + "body.motion", source="local.z")
 _BEHIND = _TH | {"z_I": D + "parent.motion", "z": D + "body.motion"}
+_ANSWER = _BEHIND | {"B": "tangent.B", "gain": "tangent.gain", "y": "tangent.y", "x": "local.x"}
+_SPREAD = Spread(to="body.answer", free="local.x")
 
-TANGENT_ANSWERED = Pass(
-    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
-    (
-        Copy(to="body.answer"),
-        *only(
-            "moving",
-            call("generic{free}.tangent_answer", **_BEHIND, B="tangent.B", gain="tangent.gain",
-                 y="tangent.y", x="local.x"),
-            Spread(to="body.answer", free="local.x"),
-        ),
+
+def _behind_modes(*known: Step) -> tuple[Step, ...]:
+    """Motion behind a body's own modes or those of the body that it is an end of."""
+    return (
         call("frames.tangent_moved", when="!moving", **_BEHIND),
+        *known,
         call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
         *only("outward", _MOVED),
@@ -362,6 +376,15 @@ TANGENT_ANSWERED = Pass(
                  z_c=D + "body.motion", x="modes.answer", z="local.z"),
             _MOVED,
         ),
+    )  # fmt: skip
+
+
+TANGENT_ANSWERED = Pass(
+    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
+    (
+        Copy(to="body.answer"),
+        *only("moving", call("generic{free}.tangent_answer", **_ANSWER), _SPREAD),
+        *_behind_modes(),
     ),
     skip="idle",
 )  # fmt: skip
@@ -374,5 +397,77 @@ TANGENT_SOLUTION = Sweep(
         Run(hook="unit_load"),
         Run(whole=TANGENT_CARRIED),
         Run(whole=TANGENT_ANSWERED),
+    ),
+)
+
+
+# --- one right-hand side, and increments that are known -----------------------------------------
+
+KNOWN_COLUMN = Pass(
+    "known_column", "body", "A right-hand side, and own loads by what is known of modes.",
+    (
+        _NO_LOAD,
+        Copy(to=D + "body.tau", source="body.column"),
+        *only("modal", Copy(to=D + "body.motion"), Do(whole=sloped(MODAL_OWN)), _RIGHT),
+    ),
+)  # fmt: skip
+
+KNOWN_LAWS = Pass(
+    "known_laws", "law", "Change of a law's efforts by what is known of its hinge.",
+    (*_LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
+)  # fmt: skip
+
+_KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",
+              e_S="local.seen", e_b="local.known")  # fmt: skip
+_KNOWN_ROWS = (
+    *_along_modes("tangent.known", "local.turned"),
+    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+)
+_KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
+
+#: Rows of a hinge are those of the load that is carried by its change along what is known, less
+#: the right-hand side and what laws make of it, which KNOWN_COLUMN and KNOWN_LAWS put together.
+KNOWN_CARRIED = Pass(
+    "known_carried", "body", "The same loads carried to the parent, with what is known.",
+    (
+        *only("section", _CARRIER, *_KNOWN_ROWS),
+        *only("modal section", *_pushed("section.H")),
+        *only("modal !section", *_pushed("bend.still")),
+        *only("section", _KNOWN),
+        *only("outward", Add(to=D + "body.e", source="local.seen"), *_FELT_CHANGE,
+              Add(to=D + "body.e", source="local.turned")),
+        *only("modal section", _KNOWN_LOAD),
+        *only(
+            "moving",
+            _CARRIER,
+            *_along_hinge("tangent.known", "local.turned", D + "body.tau"),
+            Pick(to="local.rows", source="local.change"),
+            _KNOWN,
+            call("generic{free}.tangent_push_known", **_PUSH, e_b="local.known"),
+        ),
+        _STILL,
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+KNOWN_ANSWERED = Pass(
+    "known_answered", "body", "Unknowns that answer a right-hand side, beside what is known.",
+    (
+        Copy(to="body.answer"),
+        *only("moving", call("generic{free}.tangent_answer_known", **_ANSWER, b="tangent.known"),
+              _SPREAD),
+        *_behind_modes(Add(to=D + "body.motion", source="tangent.known", when="section")),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+TANGENT_BEYOND = Sweep(
+    "tangent_beyond",
+    "One right-hand side through the factored tangent, parts of the increments being known.",
+    (
+        Run(whole=KNOWN_COLUMN),
+        Run(whole=KNOWN_LAWS),
+        Run(whole=KNOWN_CARRIED),
+        Run(whole=KNOWN_ANSWERED),
     ),
 )

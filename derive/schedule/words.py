@@ -179,6 +179,7 @@ tangent.V | 6 nu | load by the unknowns, a row a speed
 tangent.gain | 9 nu | rows by the motion, divided by those by the unknowns
 tangent.inverse | nu nu | inverse of the rows by the unknowns
 tangent.y | nu | what is left of the rows, divided by those by the unknowns
+tangent.known | 9 | change of motion across the connection that is known
 tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
 tangent.turns | nq nq | slopes of the rates by the coordinates, a row a coordinate
 tangent.ways | nq nu | slopes of the rates by the speeds, a row a speed

@@ -68,10 +68,17 @@ class Tangent:
         slopes by the coordinates."""
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
 
-    def solve(self, r: Array) -> Array:
-        """x (nu,) along which R changes by r (nu,)."""
-        x = np.empty(self.nu)
-        self._call("tangent_solve", np.ascontiguousarray(r, float), x)
+    def solve(self, r: Array, d_q: Array | None = None, d_a: Array | None = None) -> Array:
+        """x (nu,) along which, beside known changes of coordinates (nq,) and accelerations (nu,),
+        R changes by r (nu,); what is known must be zero where somebody imposes."""
+        x, known, kept = np.empty(self.nu), self.engine.ffi.NULL, None
+        if d_q is not None or d_a is not None:
+            kept = (
+                np.zeros(self.nq) if d_q is None else np.ascontiguousarray(d_q, float),
+                np.zeros(self.nu) if d_a is None else np.ascontiguousarray(d_a, float),
+            )
+            known = self.engine.ffi.new("mstmm_known *", tuple(map(self.engine.pointer, kept)))
+        self._call("tangent_solve", np.ascontiguousarray(r, float), known, x)
         return x
 
     def rates(self, q: Array, u: Array) -> Array:

@@ -78,7 +78,7 @@ class SceneSystem:
         if self.system.implicit:
             return
         base = Tangent(engine, self.memory)
-        stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 3 * engine.nu
+        stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 2 * engine.nu
         work = np.zeros(engine.lib.mstmm_residual_work(engine.packed.model))
         known, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
         stage.workspace, stage.work = run.workspace, engine.pointer(work)

@@ -108,6 +108,14 @@ def check_solution(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     size = np.sqrt(np.abs(np.diag(free)))
     condition = float(np.linalg.cond(free / np.outer(size, size))) if len(rows) else 1.0
     assert worst(tangent.solve(right), expected) < max(1e-12, 100 * UNIT * condition)
+    # The same x, if what other increments change is added to the right-hand side.
+    d_q = tangent.coordinates(np.zeros(tangent.nu), rng.normal(size=tangent.nq))
+    d_a = np.zeros(tangent.nu)
+    d_a[rows] = rng.normal(size=len(rows))
+    changed = tangent.slope(0.0, d_q, np.zeros(tangent.nu), d_a)
+    lost = UNIT * max(1.0, worst(changed, right))
+    found = tangent.solve(right + changed, d_q, d_a)
+    assert worst(found, expected) < max(1e-12, 100 * lost * condition)
 
 
 @pytest.mark.parametrize("draw", range(10))

@@ -58,26 +58,24 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, 1, s, sq, kappa));
 }
 
-/* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
+/* Known increments: the coordinates' of rho_q, -rho_u of the accelerations. */
 static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
                  double *dq, double *du, double *da)
 {
     mstmm_scene_run *run = context;
     const int nq = run->model->nq, nu = run->model->nu;
     mstmm_tangent *base = run->base;
-    real *known_q = run->known, *known_u = known_q + nq, *known_a = known_u + nu;
-    real *right = known_a + nu;
+    real *known_q = run->known, *still = known_q + nq, *known_a = still + nu;
+    const mstmm_known known = {.q = known_q, .a = known_a};
+    const int some = rho_q || rho_u;
     int code = 0;
-    memcpy(right, r, (size_t)nu * sizeof(real));
-    if (rho_q || rho_u) {
-        memset(known_u, 0, (size_t)nu * sizeof(real));
+    if (some) {
+        memset(still, 0, (size_t)nu * sizeof(real));
         for (int j = 0; j < nu; j++) known_a[j] = rho_u ? -rho_u[j] : 0;
         mstmm_tangent_free(base, known_a);
-        code = mstmm_tangent_coordinates(base, known_u, rho_q, known_q);
-        if (!code) code = mstmm_residual_slope(base, 0, known_q, known_u, known_a, da);
-        for (int j = 0; !code && j < nu; j++) right[j] -= da[j];
+        code = mstmm_tangent_coordinates(base, still, rho_q, known_q);
     }
-    if (!code) code = mstmm_tangent_solve(base, right, du);
+    if (!code) code = mstmm_tangent_solve(base, r, some ? &known : NULL, du);
     if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
     for (int j = 0; !code && j < nu; j++) da[j] = base->s * du[j] - (rho_u ? rho_u[j] : 0);
     if (!code) mstmm_tangent_free(base, da);

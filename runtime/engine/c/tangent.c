@@ -261,8 +261,8 @@ static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
     return mstmm_values(slope) + all->values[k];
 }
 
-/* The change of every coupling along x. */
-static int coupled_along(mstmm_tangent *at, const real *x, real *changes)
+/* The change of every coupling along x and increments that are known (NULL: none). */
+static int coupled_along(mstmm_tangent *at, const real *x, const mstmm_known *known, real *changes)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
@@ -274,6 +274,8 @@ static int coupled_along(mstmm_tangent *at, const real *x, real *changes)
         parts.d_u[j] = at->rate * x[j];
         parts.d_a[j] = at->s * x[j];
     }
+    for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
+    for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
     state.slope = &slope;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     code = mstmm_run_applied_slope(&state);
@@ -287,8 +289,9 @@ int mstmm_hook_unit_load(mstmm_state *state)
     return 0;
 }
 
-/* du to r, and to a unit of coupling k (-1: of none), the couplings left out. */
-static int solve_alone(mstmm_tangent *at, const real *r, int k, real *du)
+/* x to r beside increments that are known (NULL: none), and to a unit of coupling k (-1: of none),
+ * the couplings left out. */
+static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int k, real *x)
 {
     const mstmm_parts parts = parts_of(at);
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa};
@@ -297,11 +300,17 @@ static int solve_alone(mstmm_tangent *at, const real *r, int k, real *du)
     state.slope = &slope;
     state.tangents = &step;
     state.column = r;
-    state.answer = du;
+    state.answer = x;
     if (k >= 0 && k < loads) step.unit = coupled(at, &slope, k);
     if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 1;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
-    const int code = mstmm_run_tangent_solution(&state);
+    if (known) {
+        memset(parts.d_u, 0, (size_t)at->model->nu * sizeof(real));
+        slope.q = known->q;
+        slope.given = known->a;
+    }
+    const int code =
+        known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
     if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 0;
     return code;
 }
@@ -314,8 +323,8 @@ static int close_couplings(mstmm_tangent *at, int negative)
     memset(parts.column, 0, (size_t)nu * sizeof(real));
     for (int k = 0; k < m; k++) {
         real *answer = at->answers + (int64_t)k * nu, *changes = at->closure + 2 * m * m;
-        int code = solve_alone(at, parts.column, k, answer);
-        if (!code) code = coupled_along(at, answer, changes);
+        int code = solve_alone(at, parts.column, NULL, k, answer);
+        if (!code) code = coupled_along(at, answer, NULL, changes);
         if (code) return code;
         for (int i = 0; i < m; i++) at->closure[i * m + k] = (i == k) - changes[i];
     }
@@ -349,17 +358,17 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     return code || !at->n_coupled ? code : close_couplings(at, negative);
 }
 
-int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *du)
+int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x)
 {
     const int m = at->n_coupled, nu = at->model->nu;
-    int code = solve_alone(at, r, -1, du);
+    int code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
     real *work = at->closure + m * m, *changes = work + m * m, *amounts = changes + m;
-    code = coupled_along(at, du, changes);
+    code = coupled_along(at, x, known, changes);
     if (code) return code;
     mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, 1e-13); /* regular: see above */
     for (int k = 0; k < m; k++)
-        for (int j = 0; j < nu; j++) du[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
+        for (int j = 0; j < nu; j++) x[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
     return 0;
 }
 

@@ -50,8 +50,13 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 /* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the
  * slopes of the coordinates' rates N u by the coordinates. */
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
-/* x (nu) that makes the change of R equal to r. */
-int mstmm_tangent_solve(mstmm_tangent *at, const real *r, real *x);
+/* Increments that are there before any x: of coordinates (nq) and accelerations (nu). */
+typedef struct {
+    const real *q, *a;
+} mstmm_known;
+/* x (nu) that makes the change of R equal to r, beside what is known (NULL: nothing), which must be
+ * zero where somebody imposes. */
+int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x);
 /* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
  * residual, whose workspace this writes to. */
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);
