@@ -168,6 +168,7 @@ class Run:
     ) -> None:
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
         self._refuse_without_tangent(tableau)
+        self._refuse_too_large(tableau)
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
@@ -201,6 +202,15 @@ class Run:
             raise SceneError(
                 f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
                 "motion, which this system has not; take an explicit method such as dop853"
+            )
+
+    def _refuse_too_large(self, tableau: Tableau) -> None:
+        at = self._system.implicit
+        if tableau.most_unknowns and at.n_q + at.n_u > tableau.most_unknowns:
+            raise SceneError(
+                f"method {tableau.name!r} takes the exponential of a matrix of all coordinates and "
+                f"speeds, at most {tableau.most_unknowns}; here there are {at.n_q + at.n_u}: take "
+                "rodas5p or, for vibration that is to stay, dop853, or bend bodies by fewer shapes"
             )
 
     def _room(self, tableau: Any) -> Any:
@@ -295,6 +305,7 @@ class Run:
         Raises SceneError within a step, and for methods or runs of fixed steps.
         """
         self._refuse_without_tangent(tableau)
+        self._refuse_too_large(tableau)
         c_method = c_tableau(self._ffi, tableau)
         space = self._room(c_method)
         if self._lib.mstmm_run_change(self._run, c_method, space):

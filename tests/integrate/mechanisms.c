@@ -131,7 +131,7 @@ static int rates(void *context, const double *q, const double *u, double *dq) {
   for (int i = 0; i < kind->n_q; i++) x[i] = q[i];
   for (int i = 0; i < kind->n_u; i++) v[i] = u[i];
   kind->rates(x, v, dx);
-  for (int i = 0; i < kind->n_q; i++) dq[i] = creal(dx[i]);
+  for (int i = 0; i < kind->n_q; i++) dq[i] = i < kind->imposed ? 0.0 : creal(dx[i]);
   return 0;
 }
 
@@ -226,6 +226,22 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
   }
   for (int i = 0; i < n_u; i++)
     da[i] = i < kind->imposed ? 0.0 : it->s * du[i] - (rho_u ? rho_u[i] : 0.0);
+  return 0;
+}
+
+/* Along (dq, du): a step into the imaginary of the whole state */
+static int slope(void *context, double t, const double *y, const double *a, const double *dq,
+                 const double *du, double *d_rates, double *d_r) {
+  const mechanism *it = context;
+  const sort *kind = it->kind;
+  number rate[MOST];
+  point at = point_of(it, t, y, a);
+  for (int i = 0; i < kind->n_q; i++) at.q[i] += dq[i] * TINY * I;
+  for (int i = 0; i < kind->n_u; i++) at.u[i] += du[i] * TINY * I;
+  residual_of(it, &at);
+  kind->rates(at.q, at.u, rate);
+  for (int i = 0; i < kind->n_u; i++) d_r[i] = cimag(at.r[i]) / TINY;
+  for (int i = 0; i < kind->n_q; i++) d_rates[i] = i < kind->imposed ? 0.0 : cimag(rate[i]) / TINY;
   return 0;
 }
 
@@ -457,7 +473,7 @@ parameters *test_mechanism(mstmm_system *system, const char *name) {
       .n_q = it->kind->n_q, .n_u = it->kind->n_u, .residual = residual,
       .residual_rate = residual_rate, .rates = rates, .tangent = tangent, .solve = solve,
       .coordinates = it->kind->n_q == it->kind->n_u ? NULL : of_ball,
-      .impose = it->kind->impose ? impose : NULL};
+      .slope = slope, .impose = it->kind->impose ? impose : NULL};
   system->context = it;
   system->rhs = rhs;
   system->n_state = it->kind->n_q + it->kind->n_u + it->kind->n_rest;

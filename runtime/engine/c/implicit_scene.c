@@ -44,6 +44,18 @@ static int residual_rate(void *context, double t, const double *y, const double 
                                                        still + model->nq + model->nu, r_t));
 }
 
+static int slope(void *context, double t, const double *y, const double *a, const double *dq,
+                 const double *du, double *d_rates, double *d_r)
+{
+    mstmm_scene_run *run = context;
+    int code = at_base(run, t, y, a);
+    if (code) return code;
+    memset(run->known, 0, (size_t)run->model->nu * sizeof(real));
+    code = mstmm_residual_slope(run->base, 0, dq, du, run->known, d_r);
+    if (!code) mstmm_rates_slope(run->base, d_rates);
+    return failed(run, run->base, code);
+}
+
 static int rates(void *context, const double *q, const double *u, double *dq)
 {
     mstmm_scene_run *run = context;
@@ -134,7 +146,7 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     run->implicit = (mstmm_implicit){
         .n_q = model->nq, .n_u = model->nu, .coordinates = run->coordinates, .residual = residual,
         .residual_rate = residual_rate, .rates = is_straight(model) ? NULL : rates,
-        .tangent = tangent, .solve = solve,
+        .tangent = tangent, .solve = solve, .slope = slope,
         .impose = somebody_imposes(model) ? impose : NULL,
     };
     system->implicit = &run->implicit;

@@ -386,6 +386,12 @@ static void without_imposed_coordinates(const mstmm_model *model, const real *me
     }
 }
 
+void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates)
+{
+    memcpy(d_rates, parts_of(at).d_qdot, (size_t)at->model->nq * sizeof(real));
+    without_imposed_coordinates(at->model, at->memory, d_rates);
+}
+
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq)
 {
     const mstmm_model *model = at->model;

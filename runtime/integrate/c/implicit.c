@@ -59,8 +59,9 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
 
 /* Rates of the quadratures at a state inside the step */
 static int rates_of_quadratures(const mstmm_work *work, double t, double *row, double *to) {
-  const int rest = mstmm_n_rest(work);
-  if (work->tableau->kind != MSTMM_ROSENBROCK) return mstmm_step_residual(work, t, row, to);
+  const int rest = mstmm_n_rest(work), kind = work->tableau->kind;
+  if (kind != MSTMM_ROSENBROCK && kind != MSTMM_EXPONENTIAL)
+    return mstmm_step_residual(work, t, row, to);
   const int status = mstmm_evaluate(work, t, row, work->y_event);
   memcpy(to, work->y_event + work->system->n_state - rest, (size_t)rest * sizeof *to);
   return status ? status : mstmm_check_finite(work, t, work->y_event);
@@ -88,6 +89,7 @@ int mstmm_implicit_stages(const mstmm_work *work) {
   switch (work->tableau->kind) {
     case MSTMM_ROSENBROCK: return mstmm_rosenbrock_stages(work);
     case MSTMM_DIRK: return mstmm_dirk_stages(work);
+    case MSTMM_EXPONENTIAL: return mstmm_exponential_stages(work);
     default: return mstmm_alpha_stages(work);
   }
 }

@@ -17,7 +17,7 @@ typedef struct mstmm_implicit {
                   double *work);
   /* dR/dt at fixed (q, u, a), drives and their derivatives included */
   int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
-  /* dq = N(q) u; NULL: dq = u, entry by entry */
+  /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, and nobody does */
   int (*rates)(void *context, const double *q, const double *u, double *dq);
   /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du, dq = W du,
    * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base.  With kappa
@@ -28,6 +28,10 @@ typedef struct mstmm_implicit {
    * point; rho may be NULL (zeros).  Entries of imposed speeds come back as zeros. */
   int (*solve)(void *context, const double *r, const double *rho_q, const double *rho_u,
                double *dq, double *du, double *da);
+  /* Changes of the rates of the coordinates (n_q) and of R (n_u) along (dq, du) at (t, y, a), zeros
+   * where somebody imposes them.  Exponential methods alone ask for it. */
+  int (*slope)(void *context, double t, const double *y, const double *a, const double *dq,
+               const double *du, double *d_rates, double *d_r);
   /* Writes the coordinates, speeds and accelerations that drives prescribe at t into y and a; NULL:
    * there are none */
   int (*impose)(void *context, double t, double *y, double *a);

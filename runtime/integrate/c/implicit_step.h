@@ -22,6 +22,10 @@ double mstmm_implicit_first_step(const mstmm_work *work, double interval);
 int mstmm_rosenbrock_stages(const mstmm_work *work);
 int mstmm_dirk_stages(const mstmm_work *work);
 int mstmm_alpha_stages(const mstmm_work *work);
+int mstmm_exponential_stages(const mstmm_work *work);
+/* Coordinates and speeds inside the step at hand: exactly what its forces make of them, however often
+ * the motion swings in it. */
+void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y);
 
 /* ---- the system, with its failures and counts; a row holds its accelerations ---- */
 

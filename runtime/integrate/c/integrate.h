@@ -46,7 +46,8 @@ enum {
   MSTMM_FIRE_CONTINUE = 3  /* nothing changed; fire again the next time it becomes true */
 };
 
-enum { MSTMM_EXPLICIT = 0, MSTMM_ROSENBROCK = 1, MSTMM_DIRK = 2, MSTMM_ALPHA = 3 };
+enum { MSTMM_EXPLICIT = 0, MSTMM_ROSENBROCK = 1, MSTMM_DIRK = 2, MSTMM_ALPHA = 3,
+       MSTMM_EXPONENTIAL = 4 };
 
 /* s = n_stages stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage of
  * the next step, then n_extra stages for dense output alone.
@@ -77,7 +78,7 @@ typedef struct mstmm_tableau {
    * tangent; s - 1 rows more, behind those of dense output, hold C.
    * DIRK: k_i the slopes at the stages, the last one at the step's end; rows of stages without the
    * diagonal; s - 1 rows more: weights of the k_j from which the iteration for k_i starts.
-   * Alpha: k_1 = (y_new - y) / h, k_2 the error / h. */
+   * Alpha and exponential: k_1 = (y_new - y) / h, k_2 the error / h. */
   int kind;
   double gamma;    /* Rosenbrock and DIRK: the diagonal */
   const double *d; /* Rosenbrock: s weights of h dR/dt */

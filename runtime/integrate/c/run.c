@@ -35,6 +35,15 @@ static int64_t accelerations(const mstmm_implicit *implicit, const mstmm_tableau
   return (int64_t)implicit->n_u * (tableau->kind != MSTMM_ALPHA ? 1 : tableau->backward ? 3 : 2);
 }
 
+static void cut_exponential(cutting *at, mstmm_work *work) {
+  const int64_t n_u = work->implicit->n_u, n = work->implicit->n_q + n_u;
+  work->jacobian = take(at, n * n);
+  work->inverse_mass = take(at, n_u * n_u);
+  work->time_slope = take(at, n);
+  work->motion = take(at, 4 * n);
+  work->phi = mstmm_phi_lay((int)n, take(at, mstmm_phi_size((int)n)));
+}
+
 static void cut_implicit(cutting *at, mstmm_work *work) {
   const int64_t n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   double **of_row[] = {&work->y_star, &work->y_first, &work->error};
@@ -46,6 +55,7 @@ static void cut_implicit(cutting *at, mstmm_work *work) {
   for (size_t i = 0; i < sizeof of_u / sizeof *of_u; i++) *of_u[i] = take(at, n_u);
   work->flow = take(at, 3 * n_q);
   work->nodes = take(at, (work->tableau->n_inner + 2) * (int64_t)mstmm_n_rest(work));
+  if (work->tableau->kind == MSTMM_EXPONENTIAL) cut_exponential(at, work);
 }
 
 /* Cuts `base` into the arrays of *work, whose sizes are there.  Returns the doubles needed; *kept
@@ -97,7 +107,8 @@ static int implicit_is_sound(const mstmm_system *system, const mstmm_tableau *ta
   if (tableau->kind == MSTMM_EXPLICIT) return 1;
   return at && at->n_q >= 0 && at->n_u >= 0 && at->n_q + at->n_u <= system->n_state &&
          ((at->coordinates && at->rates) || at->n_q == at->n_u) && at->residual && at->tangent &&
-         at->solve && (at->residual_rate || tableau->kind != MSTMM_ROSENBROCK) &&
+         at->solve && (at->residual_rate || newton(tableau)) &&
+         (at->slope || tableau->kind != MSTMM_EXPONENTIAL) &&
          tableau->n_extra == 0 && tableau->n_nodes == 0 && tableau->n_inner >= 0;
 }
 

@@ -81,5 +81,6 @@ MSTMM_WIDE void mstmm_dense(const mstmm_work *work, double t, double *y) {
       sum = (j % 2 ? 1.0 - theta : theta) * (sum + *(const wide *)(work->dense + j * row + i));
     *(wide *)(y + i) = *(const wide *)(work->y + i) + sum;
   }
+  if (work->tableau->kind == MSTMM_EXPONENTIAL) mstmm_exponential_dense(work, theta, y);
   if (work->implicit) (void)mstmm_step_impose(work, t, y); /* who needs what fails here fails by it */
 }

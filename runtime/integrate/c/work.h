@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "integrate.h"
+#include "phi.h"
 #include "wide.h"
 
 #define MSTMM_SAME_STEP 1e-9 /* relative difference of two steps that are of one length */
@@ -40,6 +41,11 @@ typedef struct mstmm_work {
   double *map_q, *map_u;       /* n_u each: what is known of the step, see alpha.c */
   double *flow;                /* 3 n_q */
   double *nodes;               /* quadratures at the ends and nodes of a step */
+  /* Exponential methods; n = n_q + n_u */
+  double *jacobian, *inverse_mass; /* n x n; n_u x n_u */
+  double *time_slope;              /* n */
+  double *motion;                  /* 4 n: see exponential.c */
+  mstmm_phi phi;
 } mstmm_work;
 
 MSTMM_INLINE double *mstmm_row_a(const mstmm_work *work, double *row) {

@@ -35,7 +35,7 @@ __all__ = [
 EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
 IMPLICIT = (
     "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
-    "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt",
+    "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt", "exprb32",
 )  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
 

@@ -1,4 +1,5 @@
-"""Implicit methods as the C loop takes them: Rosenbrock, diagonally implicit, Newmark's family.
+"""Methods with a tangent as the C loop takes them: Rosenbrock, diagonally implicit, Newmark's family,
+exponential.
 
 All of them work on q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is
 the slope at the start of the step, and k_s that at its end.
@@ -20,7 +21,7 @@ from mstmm.arrays import Array
 
 from .tableau import Tableau, divided_difference, frozen, hermite, integrals_in_basis
 
-ROSENBROCK, DIRK, ALPHA = 1, 2, 3  # as in `c/integrate.h`
+ROSENBROCK, DIRK, ALPHA, EXPONENTIAL = 1, 2, 3, 4  # as in `c/integrate.h`
 
 #: Nodes between the ends of a step of the rules of Lobatto, by the order that is asked for.
 _LOBATTO = {2: (), 4: (0.5,), 6: ((1 - math.sqrt(0.2)) / 2, (1 + math.sqrt(0.2)) / 2)}
@@ -333,4 +334,34 @@ def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Al
         B=frozen([0.0, 1.0, 0.0]), E=frozen([0.0, 0.0, 1.0, 0.0]) if adaptive else None,
         error_order=2 if adaptive else 0, dense=hermite([0.0, 1.0, 0.0]), dense_order=2,
         second=frozen(np.zeros((3, 3))), **constants,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Exponential(Implicit):
+    """An exponential Rosenbrock method: the linearised motion exactly, and two evaluations a step.
+
+    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here tell the loop where
+    the step and its error lie.
+    """
+
+    kind: ClassVar[int] = EXPONENTIAL
+
+    def _check_consistency(self) -> None:
+        if not self.most_unknowns > 0:
+            raise ValueError(f"tableau {self.name}: most_unknowns must be above zero")
+
+    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
+        """R(z) of one step on y' = lambda y with z = h lambda: what the motion itself does."""
+        return np.asarray(np.exp(np.asarray(z, dtype=np.complex128)))
+
+
+def exponential(name: str, order: int, error_order: int, most: int, source: str) -> Exponential:
+    """A method by its orders, for scenes of at most so many coordinates and speeds together."""
+    zeros = np.zeros(3)
+    return Exponential(
+        name=name, order=order, source=source, A=frozen(np.zeros((3, 3))), C=frozen(zeros),
+        B=frozen([0.0, 1.0, 0.0]), E=frozen([0.0, 0.0, 1.0, 0.0]), error_order=error_order,
+        dense=hermite([0.0, 1.0, 0.0]), dense_order=order, second=frozen(np.zeros((3, 3))),
+        most_unknowns=most,
     )  # fmt: skip

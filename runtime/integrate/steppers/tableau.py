@@ -68,6 +68,7 @@ class Tableau:
         iterated: (nodes, iterations) of a method whose stages behind the first are so many blocks,
             each depending on the block before alone (the first on k_0 alone) with the same weights:
             the stages of a block are evaluated side by side.  None for other methods.
+        most_unknowns: coordinates and speeds that the method takes at most, 0 for any number.
         source: where the coefficients come from.
 
     Raises:
@@ -88,6 +89,7 @@ class Tableau:
     C_extra: Array = field(default_factory=lambda: frozen(np.zeros(0)))
     beta: float = 0.0
     iterated: tuple[int, int] | None = None
+    most_unknowns: int = 0
     source: str = ""
 
     def __post_init__(self) -> None:
