@@ -87,8 +87,8 @@ def simulate(
         str,
         typer.Option(
             "--method", metavar="NAME", help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
-            "more for stiff motion (see mstmm list); auto, which chooses; dttmm-classical; "
-            "scipy-NAME or sundials-NAME."
+            "more for stiff motion (see mstmm list); exprb32 for undamped vibration; auto, which "
+            "chooses; dttmm-classical; scipy-NAME or sundials-NAME."
         ),
     ] = METHOD,
     step: Annotated[

@@ -20,7 +20,7 @@ from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 
 from .settings import Settings
-from .steppers import Tableau
+from .steppers import Tableau, check_size
 from .tableau_in_c import c_tableau
 
 _SAMPLE_DOUBLES = 2**19  # of one buffer, about 4 MB
@@ -167,8 +167,7 @@ class Run:
         capacity: int | None = None,
     ) -> None:
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
-        self._refuse_without_tangent(tableau)
-        self._refuse_too_large(tableau)
+        self._refuse_unsuited(tableau)
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
@@ -197,21 +196,15 @@ class Run:
         if lib.mstmm_run_start(run, self._doubles(start)) == Status.BAD_ARGUMENT:
             raise SceneError(f"{tableau.name}: check {_ARGUMENTS[run.count.code]}")
 
-    def _refuse_without_tangent(self, tableau: Tableau) -> None:
-        if tableau.implicit and not self._system.implicit:
+    def _refuse_unsuited(self, tableau: Tableau) -> None:
+        at = self._system.implicit
+        if tableau.implicit and not at:
             raise SceneError(
                 f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
                 "motion, which this system has not; take an explicit method such as dop853"
             )
-
-    def _refuse_too_large(self, tableau: Tableau) -> None:
-        at = self._system.implicit
-        if tableau.most_unknowns and at.n_q + at.n_u > tableau.most_unknowns:
-            raise SceneError(
-                f"method {tableau.name!r} takes the exponential of a matrix of all coordinates and "
-                f"speeds, at most {tableau.most_unknowns}; here there are {at.n_q + at.n_u}: take "
-                "rodas5p or, for vibration that is to stay, dop853, or bend bodies by fewer shapes"
-            )
+        if at:
+            check_size(tableau, at.n_q + at.n_u)
 
     def _room(self, tableau: Any) -> Any:
         """Workspace for a method; it lives as long as what is returned."""
@@ -304,8 +297,7 @@ class Run:
 
         Raises SceneError within a step, and for methods or runs of fixed steps.
         """
-        self._refuse_without_tangent(tableau)
-        self._refuse_too_large(tableau)
+        self._refuse_unsuited(tableau)
         c_method = c_tableau(self._ffi, tableau)
         space = self._room(c_method)
         if self._lib.mstmm_run_change(self._run, c_method, space):

@@ -215,10 +215,11 @@ class Model(Compiled):
                 code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol
                 from 1e-5 on) or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4,
                 ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, newmark, wilson or
-                houbolt; scipy-DOP853, scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA,
-                sundials-BDF, sundials-Adams: integrators of SciPy and SUNDIALS on the same kernels;
-                dttmm-classical, dttmm-classical-product (with `step`): the discrete-time transfer
-                matrix method in absolute coordinates.
+                houbolt; exprb32 for undamped vibration of few unknowns; scipy-DOP853, scipy-RK45,
+                scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators
+                of SciPy and SUNDIALS on the same kernels; dttmm-classical,
+                dttmm-classical-product (with `step`): the discrete-time transfer matrix method in
+                absolute coordinates.
             step: fixed step in s; otherwise `rtol` and `atol` control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.

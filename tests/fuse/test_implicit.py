@@ -138,7 +138,7 @@ def by(engine: str, scene: Scene, method: str, **options: Any) -> Result:
     return model.simulate(options.pop("t_end", 0.2), method=method, certify=False, **options)
 
 
-@pytest.mark.parametrize("method", ["rodas4p2", "kvaerno5", "genalpha"])
+@pytest.mark.parametrize("method", ["rodas4p2", "kvaerno5", "genalpha", "exprb32"])
 def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
     fused, looped = (by(engine, arm(4), method, step=2e-3) for engine in ("fused", "looped"))
     assert fused.success and looped.success

@@ -37,6 +37,10 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "fixed": ("genalpha", {"step": 0.01, "breaks": [0.305]}),
     "one iteration": ("dttmm", {"step": 0.01}),
     "collocation": ("wilson", {"step": 0.01}),
+    "exponential": (
+        "exprb32",
+        {"rtol": 1e-6, "breaks": [0.3], "output_times": np.linspace(0, 1.5, 61)},
+    ),
     "history": ("houbolt", {"step": 0.01, "breaks": [0.305]}),
 }
 SYSTEMS = {"bouncing": (bouncing, (1.0, 0.0)), "hanging": (hanging, (0.0, 0.4, 0, 0, 0))}

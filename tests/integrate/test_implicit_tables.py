@@ -12,7 +12,13 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate import steppers
 from mstmm.runtime.integrate.steppers import Tableau, frozen, get
-from mstmm.runtime.integrate.steppers.implicit import Alpha, Diagonal, Rosenbrock, rosenbrock
+from mstmm.runtime.integrate.steppers.implicit import (
+    Alpha,
+    Diagonal,
+    Exponential,
+    Rosenbrock,
+    rosenbrock,
+)
 
 ROSENBROCK = ("rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw")
 DIAGONAL = ("esdirk436", "kvaerno5")
@@ -98,6 +104,13 @@ def test_a_radius_that_makes_no_sense_is_refused() -> None:
         get("rodas4", 0.5)
 
 
+def test_an_exponential_step_moves_as_the_linear_motion_does() -> None:
+    exprb = get("exprb32")
+    assert isinstance(exprb, Exponential)
+    assert (exprb.order, exprb.error_order, exprb.adaptive) == (3, 2, True)
+    assert exprb.amplification([-1e9, 0.0, 1j * np.pi]) == pytest.approx([0.0, 1.0, -1.0])
+
+
 def test_contradictory_coefficients_are_refused() -> None:
     rodas, esdirk, newmark = of_rosenbrock("rodas4"), get("esdirk436"), get("newmark")
     assert isinstance(esdirk, Diagonal)
@@ -113,6 +126,7 @@ def test_contradictory_coefficients_are_refused() -> None:
         (esdirk, {"C": frozen([0.0] * 6)}, "does not hold"),
         (esdirk, {"second": frozen(np.eye(6))}, "starts from later stages"),
         (newmark, {"beta_n": 0.0}, "above zero"),
+        (get("exprb32"), {"most_unknowns": 0}, "above zero"),
     ]
     for tableau, change, message in cases:
         with pytest.raises(ValueError, match=message):

@@ -23,6 +23,7 @@ METHODS: list[tuple[str, dict[str, Any]]] = [
     ("rodas4p2", {"rtol": 1e-5, "atol": 1e-6}), ("rodas5p", {"rtol": 1e-5, "atol": 1e-6}),
     ("esdirk436", {"rtol": 1e-5, "atol": 1e-6}), ("kvaerno5", {"rtol": 1e-5, "atol": 1e-6}),
     ("genalpha", {"rtol": 1e-6, "atol": 1e-7}), ("dttmm", {"step": 2e-3}),
+    ("exprb32", {"rtol": 1e-5, "atol": 1e-6}),
 ]  # fmt: skip
 
 

@@ -31,7 +31,9 @@ def energy(frequency: float, method: str, radius: float | None = None) -> Array:
     return np.asarray(found / found[0])
 
 
-@pytest.mark.parametrize("method, radius", [("newmark", None), ("genalpha", 1.0), ("dttmm", 1.0)])
+@pytest.mark.parametrize(
+    "method, radius", [("newmark", None), ("genalpha", 1.0), ("dttmm", 1.0), ("exprb32", None)]
+)
 def test_without_damping_the_energy_stays(method: str, radius: float | None) -> None:
     for frequency in (0.1, 1.0, 10.0, 100.0):
         assert energy(frequency, method, radius) == pytest.approx(1.0, abs=1e-9)

@@ -14,9 +14,13 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate.loop import Status
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
-from mstmm.runtime.integrate.steppers.implicit import Alpha, Implicit
+from mstmm.runtime.integrate.steppers.implicit import Alpha, Exponential, Implicit
 
-ADAPTIVE = [method for method in IMPLICIT if get(method).adaptive]
+#: Those whose stages solve equations, which a motion that leaves by itself can make indefinite.
+SOLVING = [
+    method for method in IMPLICIT
+    if get(method).adaptive and not isinstance(get(method), Exponential)
+]  # fmt: skip
 
 
 def steps(method: str, step: float = 0.01) -> dict[str, Any]:
@@ -67,7 +71,7 @@ def part_of_a_step(method: Implicit) -> float:
 
 
 @pytest.mark.parametrize("count", [1, 5, 20])
-@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("method", SOLVING)
 def test_a_step_longer_than_the_fall_of_a_chain_is_refused(method: str, count: int) -> None:
     """Z is definite up to c h lambda = 1, lambda the fastest rate at which the chain falls."""
     model = mstmm.compile(mstmm.Scene(**motions.upright_chain(count, 1e-6)), engine="looped")
@@ -83,7 +87,7 @@ def test_a_step_longer_than_the_fall_of_a_chain_is_refused(method: str, count: i
     assert run.last_state[0] == 0.0
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("method", SOLVING)
 def test_adaptive_steps_are_cut_where_a_chain_topples(method: str) -> None:
     """Tolerances that ask for nothing while the motion is small: the steps grow until Z is
     indefinite, and go on shorter."""

@@ -61,7 +61,7 @@ def test_implicit_runs_agree_with_an_explicit_one(method: str) -> None:
     assert found.trajectory.work == pytest.approx(exact.trajectory.work, abs=2e-3)
 
 
-@pytest.mark.parametrize("method", [m for m in IMPLICIT if get(m).adaptive])
+@pytest.mark.parametrize("method", [m for m in IMPLICIT if get(m).adaptive and m != "exprb32"])
 def test_stiff_springs_do_not_set_the_step(method: str) -> None:
     model = mstmm.compile(stiff(), engine="looped")
     # at rest the springs carry the load: their turns are some load / 1e6
@@ -79,7 +79,8 @@ def test_stiff_springs_do_not_set_the_step(method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "how"),
     [("rodas4p2", {"rtol": 1e-4}), ("esdirk436", {"rtol": 1e-4}), ("genalpha", {"rtol": 1e-3}),
-     ("genalpha", {"step": 0.01, "radius": 0.5}), ("houbolt", {"step": 0.01})],
+     ("genalpha", {"step": 0.01, "radius": 0.5}), ("houbolt", {"step": 0.01}),
+     ("exprb32", {"rtol": 1e-4})],
 )  # fmt: skip
 def test_a_scene_continues_bit_for_bit_from_every_step(method: str, how: dict[str, Any]) -> None:
     model = mstmm.compile(remembering(), engine="looped")

@@ -167,17 +167,22 @@ static void square_up(const mstmm_phi *phi, const double *from, double *to) {
   for (int64_t i = 0; i < square_of(phi); i++) to[i] += 2.0 * from[i];
 }
 
-static void take(const mstmm_phi *phi, double h, const double *J) {
+/* Is all of h J finite, and so small that sums of it are? */
+static int take(const mstmm_phi *phi, double h, const double *J) {
+  double size = 0.0;
   memset(phi->matrix, 0, (size_t)square_of(phi) * sizeof(double));
   for (int i = 0; i < phi->n; i++) {
     phi->scale[i] = 1.0;
-    for (int j = 0; j < phi->n; j++) phi->matrix[i * phi->row + j] = h * J[i * phi->n + j];
+    for (int j = 0; j < phi->n; j++) {
+      phi->matrix[i * phi->row + j] = h * J[i * phi->n + j];
+      size += fabs(phi->matrix[i * phi->row + j]);
+    }
   }
+  return isfinite(size);
 }
 
 int mstmm_phi_prepare(const mstmm_phi *phi, double h, const double *J) {
-  take(phi, h, J);
-  if (!isfinite(norm(phi))) return 1;
+  if (!take(phi, h, J)) return 1;
   balance(phi);
   double size = norm(phi);
   int levels = 0;

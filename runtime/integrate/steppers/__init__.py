@@ -24,6 +24,7 @@ __all__ = [
     "WITH_RADIUS",
     "Tableau",
     "check_radius",
+    "check_size",
     "from_monomials",
     "frozen",
     "get",
@@ -81,6 +82,16 @@ def check_radius(name: str, radius: float | None) -> None:
         raise SceneError(
             f"radius = {radius:g}: method {name!r} takes none; those that do are "
             + ", ".join(WITH_RADIUS)
+        )
+
+
+def check_size(tableau: Tableau, unknowns: int) -> None:
+    """SceneError for more coordinates and speeds together than the method takes."""
+    if tableau.most_unknowns and unknowns > tableau.most_unknowns:
+        raise SceneError(
+            f"method {tableau.name!r} takes the exponential of a matrix of all coordinates and "
+            f"speeds, at most {tableau.most_unknowns}; here there are {unknowns}: take rodas5p or, "
+            "for vibration that is to stay, dop853, or bend bodies by fewer shapes"
         )
 
 

@@ -1,5 +1,5 @@
-"""Methods with a tangent as the C loop takes them: Rosenbrock, diagonally implicit, Newmark's family,
-exponential.
+"""Methods with a tangent as the C loop takes them: Rosenbrock, diagonally implicit, exponential,
+Newmark's family.
 
 All of them work on q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is
 the slope at the start of the step, and k_s that at its end.
@@ -341,8 +341,8 @@ def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Al
 class Exponential(Implicit):
     """An exponential Rosenbrock method: the linearised motion exactly, and two evaluations a step.
 
-    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here tell the loop where
-    the step and its error lie.
+    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here tell the loop
+    where the step and its error lie.
     """
 
     kind: ClassVar[int] = EXPONENTIAL
