@@ -492,7 +492,10 @@ def failure_text(
         "tolerance; max_steps, if given, is the only limit",
         Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {at} (code "
         f"{fail.code}): the motion may be singular there, or leave an unstable position faster "
-        "than the step allows; " + (cause or "a smaller step may help"),
+        "than the step allows; " + (cause or "a smaller step may help")
+        if fail.code
+        else f"a step from t = {fail.time:.9g} s would leave nothing but rounding of its fastest "
+        "motion; take a shorter step, or see whether a stiffness or damping is far too large",
         Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}: {what} still changes; "
         + (cause or "a smaller step, or a Rosenbrock method such as rodas4p2, may help"),
         Status.EVENT_CHATTER: f"{event} fires without end {at}",

@@ -13,6 +13,7 @@ from stiff import motions
 import mstmm
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.runtime.integrate.loop import Status
 from mstmm.runtime.integrate.steppers import get
 from mstmm.runtime.model.model import Model
 
@@ -101,6 +102,15 @@ def test_a_linear_motion_is_exact_in_one_step(step: float) -> None:
     assert np.abs(run.q - exact).max() < 10 * rounding
     energy = np.asarray(run.energy())
     assert np.abs(energy / energy[0] - 1).max() < 10 * rounding
+
+
+def test_steps_that_would_leave_nothing_but_rounding_are_refused() -> None:
+    spring = {"name": "spring", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+              "outboard": "mass", "initial": {"q": [1e-3]}, "law": {"stiffness": 1e30}}  # fmt: skip
+    scene = mstmm.Scene(gravity=(0, 0, 0), body=[{"name": "mass", "mass": 1.0}], hinge=[spring])
+    run = mstmm.compile(scene, engine="looped").simulate(1.0, "exprb32", 1.0)
+    assert run.status is Status.TANGENT_FAILED
+    assert "nothing but rounding of its fastest motion; take a shorter step" in run.message
 
 
 def test_more_unknowns_than_it_takes_are_refused() -> None:
