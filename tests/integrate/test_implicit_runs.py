@@ -83,6 +83,26 @@ def test_slices_and_small_buffers_change_nothing(lab: Lab, case: str) -> None:
     assert run.statistics == whole.statistics
 
 
+@pytest.mark.parametrize("case", ["outputs", "alpha", "exponential"])
+def test_a_run_continues_bit_for_bit_from_within_a_step(lab: Lab, case: str) -> None:
+    method, options = CASES[case]
+    options = options | {"output_times": np.linspace(0, 0.3, 181)}  # several in a step
+    start = (0.0, 0.4, 0, 0, 0)
+    whole = hanging(lab).solved(method, 0.3, start, **options)
+    parts, inside, before = [], 0, -1
+    run = hanging(lab).run(method, 0.3, start, capacity=2, **options)
+    while run.advance(0.0) is Status.RUNNING:
+        inside += run.statistics.steps == before
+        before = run.statistics.steps
+        parts.append(run.take())
+        state = run.state()
+        run = hanging(lab).run(method, 0.3, start, capacity=2, **options)
+        run.restore(state)
+    assert inside > 2
+    assert equal(Samples.joined([*parts, run.samples]), whole.samples)
+    assert run.statistics == whole.statistics
+
+
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_falling_body_bounces_when_it_should(lab: Lab, method: str) -> None:
     options: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-10} if method in ADAPTIVE else {}

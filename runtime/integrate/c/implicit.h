@@ -17,7 +17,7 @@ typedef struct mstmm_implicit {
                   double *work);
   /* dR/dt at fixed (q, u, a), drives and their derivatives included */
   int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
-  /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, and nobody does */
+  /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, nobody does */
   int (*rates)(void *context, const double *q, const double *u, double *dq);
   /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du, dq = W du,
    * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base.  With kappa

@@ -1,19 +1,20 @@
 /* Scaling and squaring: X is balanced by powers of two, so that a coordinate and its speed, and stiff
  * and slack parts, are of one size; halved until a short Taylor polynomial has all digits; and its
- * exponential squared back.  The phi follow in products with vectors alone, by
+ * exponential squared back.  With E = exp(tau A) and a_k(tau) = tau^k phi_k(tau A) the phi follow in
+ * products with vectors alone:
  *
  *   a_1(2 tau) = E a_1 + a_1,  a_2(2 tau) = E a_2 + a_2 + tau a_1,
- *   a_3(2 tau) = E a_3 + a_3 + tau a_2 + tau^2/2 a_1     with a_k(tau) = tau^k phi_k(tau A), E = exp(tau A).
+ *   a_3(2 tau) = E a_3 + a_3 + tau a_2 + tau^2/2 a_1.
  *
- * Kept is E - 1, squared as 2 (E - 1) + (E - 1)^2: beside fast motion the first levels of a slow one are so
- * close to 1 that they would lose it.
+ * Kept is E - 1, squared as 2 (E - 1) + (E - 1)^2: beside fast motion the first levels of a slow one
+ * are so close to 1 that they would lose it.
  *
  * All levels are kept: w(theta) is a piece of the first level by the polynomial and one product for
  * every bit of what is left.
  *
  * N. J. Higham, Functions of Matrices (2008), sections 10.3 and 10.7; A. H. Al-Mohy, N. J. Higham,
- * SIAM Journal on Scientific Computing 33 (2011) 488-511 (the motion above as one exponential); B. N.
- * Parlett, C. Reinsch, Numerische Mathematik 13 (1969) 293-304 (balancing). */
+ * SIAM Journal on Scientific Computing 33 (2011) 488-511 (the motion above as one exponential);
+ * B. N. Parlett, C. Reinsch, Numerische Mathematik 13 (1969) 293-304 (balancing). */
 #include "phi.h"
 
 #include <math.h>
@@ -60,7 +61,8 @@ static double *moved_of(const mstmm_phi *phi, int level, int product) {
 
 /* ---- products; rows are whole vectors, zeros behind n ---- */
 
-MSTMM_WIDE static void multiply(const mstmm_phi *phi, const double *a, const double *b, double *out) {
+MSTMM_WIDE static void multiply(const mstmm_phi *phi, const double *a, const double *b,
+                                double *out) {
   const int n = phi->n, row = phi->row;
   memset(out, 0, (size_t)square_of(phi) * sizeof(double));
   for (int i = 0; i < n; i++)

@@ -23,14 +23,14 @@ typedef struct mstmm_phi {
 
 int64_t mstmm_phi_size(int n);
 mstmm_phi mstmm_phi_lay(int n, double *numbers);
-/* Takes X = h J, J (n x n).  1 where that is not finite, or so large that nothing but rounding would
- * be left. */
+/* Takes X = h J, J (n x n).  1 where that is not finite, or so large that nothing but rounding
+ * would be left. */
 int mstmm_phi_prepare(const mstmm_phi *phi, double h, const double *J);
-/* Takes c_k (n), k = 0, 1, 2, for the X at hand: all three are asked for before the two below. */
+/* Takes c_k (n), k = 0, 1, 2, for the X at hand. */
 void mstmm_phi_force(const mstmm_phi *phi, int k, const double *c);
-/* phi_(k+1)(X) c_k (n) */
+/* phi_(k+1)(X) c_k (n), once c_k has been taken */
 void mstmm_phi_part(const mstmm_phi *phi, int k, double *part);
-/* w(theta) (n) */
+/* w(theta) (n), once all three have been */
 void mstmm_phi_at(const mstmm_phi *phi, double theta, double *w);
 
 #endif
