@@ -13,7 +13,7 @@ from mstmm.ir import KernelIR
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, screw, sweep, tangent
+from ..equations import columns, frames, laws, link, screw, sweep, tangent, tangent_hinge
 from ..equations import force as force_kernels
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
@@ -33,16 +33,16 @@ FRAME_DERIVATIONS = (
     frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
     frames.driven_effort, frames.speed_power, frames.length, frames.turned,
     frames.classical_body, frames.state_deviation,
-    tangent.tangent_carry, tangent.tangent_moved, tangent.tangent_turned,
+    tangent.tangent_carry, tangent.tangent_moved, tangent_hinge.tangent_turned,
     tangent.tangent_known,
 )  # fmt: skip
 
 #: Steps of the tangent for hinges with any number of speeds, and for those that have some.
-_ALONG_HINGES = (tangent.tangent_carrier, tangent.tangent_column)
+_ALONG_HINGES = (tangent_hinge.tangent_carrier, tangent_hinge.tangent_column)
 _OF_SPEEDS = (
-    tangent.tangent_along, tangent.tangent_steady, tangent.tangent_rows, tangent.tangent_reduce,
-    tangent.tangent_push, tangent.tangent_answer, tangent.tangent_push_known,
-    tangent.tangent_answer_known,
+    tangent_hinge.tangent_along, tangent_hinge.tangent_steady, tangent_hinge.tangent_rows,
+    tangent_hinge.tangent_reduce, tangent_hinge.tangent_push, tangent_hinge.tangent_answer,
+    tangent_hinge.tangent_push_known, tangent_hinge.tangent_answer_known,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.

@@ -59,6 +59,18 @@ class Loop:
     stores: list[tuple[tuple[int, ...], Value]] = field(default_factory=list)
 
     @property
+    def taken_off(self) -> dict[int, Value]:
+        """Values that are but added to the port and are the opposite of another: which one."""
+        used = {a.number for v in self.values for a in v.args if isinstance(a, Value)}
+        added = (v for _, v in self.stores) if self.port.accumulate else ()
+        return {
+            value.number: first
+            for value in added
+            for first in value.args[:1]
+            if value.op == "neg" and value.number not in used and isinstance(first, Value)
+        }
+
+    @property
     def count(self) -> int:
         """Number of entries along the axis."""
         extent = self.port.shape[self.axis]
@@ -111,7 +123,11 @@ class Alike:
                 )
                 loop.store(index, lanes)
         if not port.accumulate:
-            self.kept |= {v: Element(port.name, index) for index, v in stored.items()}
+            self.kept |= {
+                value: Element(port.name, index)
+                for index, value in stored.items()
+                if isinstance(value, Temporary)
+            }
         return loop.loop
 
 

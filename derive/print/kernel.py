@@ -111,16 +111,15 @@ class KernelText:
         if odd:
             lines.append(f"    const int next = k + 1 < {loop.count};")
         port = self.ports[loop.port.name]
-        taken = {v: _taken_off(port, v) for _, v in loop.stores}
+        taken_off = loop.taken_off
         for value in loop.values:
-            if taken.get(value) is None:
+            if value.number not in taken_off:
                 lines.append(f"    const two_t v{value.number} = {self._pair(value, odd)};")
         second = []
         for index, stored in loop.stores:
             value, sign = stored, "+=" if port.accumulate else "="
-            off = taken[stored]
-            if off is not None:
-                value, sign = off, "-="
+            if stored.number in taken_off:
+                value, sign = taken_off[stored.number], "-="
             place, stride = self._moving(port, index, loop.axis)
             if stride == 1 and not odd:
                 lines.append(f"    *(two_free_t *)({place}) {sign} v{value.number};")
@@ -243,12 +242,6 @@ class KernelText:
 
     def _entry(self, port: Port, index: tuple[int | str, ...]) -> str:
         return f"{self.names[port.name]}[{_place(port, index)}]"
-
-
-def _taken_off(port: Port, value: Value) -> Value | None:
-    """The value whose opposite is added to a port, if it is one."""
-    first = value.args[0] if port.accumulate and value.op == "neg" else None
-    return first if isinstance(first, Value) else None
 
 
 def _place(port: Port, index: tuple[int | str, ...]) -> str:

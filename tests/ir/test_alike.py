@@ -22,14 +22,17 @@ GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
 
 def turned(lanes: int) -> KernelIR:
-    """Rows of Y are R times those of X; Z gathers what is in Y, and takes off its squares."""
+    """Rows of Y are R times those of X; Z gathers and takes off what is in Y."""
     graph = Graph()
     x, r = graph.matrix("X", 2, lanes), graph.matrix("R", 2, 2)
     scale = r[0][0] / r[1][1]
     y = [[scale * (row[0] * x[0][k] + x[1][k] * row[1]) for k in range(lanes)] for row in r]
-    z = [[y[0][k] + y[1][k], -(y[0][k] * y[0][k])] for k in range(lanes)]
+    z = [
+        [y[0][k] + y[1][k], -(y[0][k] * y[0][k]), -y[1][k], x[0][k] / -y[1][k]]
+        for k in range(lanes)
+    ]
     total = sum((entry for entry in y[0]), graph.constant(0))
-    outputs = (Port("Y", (2, lanes)), Port("Z", (lanes, 2), accumulate=True), Port("total", ()))
+    outputs = (Port("Y", (2, lanes)), Port("Z", (lanes, 4), accumulate=True), Port("total", ()))
     return graph.kernel(
         "k", (Port("X", (2, lanes)), Port("R", (2, 2))), outputs,
         {"Y": y, "Z": z, "total": total},
