@@ -2159,7 +2159,7 @@ int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restri
         *(two_free_t *)(T + 48 + k) = v43;
     }
     for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
+        const int next = k < 8;
         const two_t v0 = mstmm_apart(T + 0 + 6 * k, 6 * next);
         const two_t v1 = Rc[0] * v0;
         const two_t v2 = mstmm_apart(T + 1 + 6 * k, 6 * next);

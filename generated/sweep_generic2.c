@@ -2963,23 +2963,22 @@ int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restri
         *(two_free_t *)(K + 0 + k) = v25;
         *(two_free_t *)(K + 6 + k) = v42;
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
         const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
         const two_t v3 = H[2] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
         const two_t v6 = H[4] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
         const two_t v9 = H[6] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
         const two_t v12 = H[8] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
         const two_t v15 = H[10] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = H[1] * v0;
@@ -2993,12 +2992,8 @@ int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restri
         const two_t v25 = v23 + v24;
         const two_t v26 = H[11] * v14;
         const two_t v27 = v25 + v26;
-        right[0 + k] = v16[0];
-        right[9 + k] = v27[0];
-        if (next) {
-            right[1 + k] = v16[1];
-            right[10 + k] = v27[1];
-        }
+        *(two_free_t *)(right + 0 + k) = v16;
+        *(two_free_t *)(right + 9 + k) = v27;
     }
     const real t402 = H[0] * K[0];
     const real t403 = H[2] * K[1];
@@ -3094,22 +3089,17 @@ int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S)
 {
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_beside(right + 0 + k);
         const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v2 = mstmm_beside(right + 9 + k);
         const two_t v3 = inverse[1] * v2;
         const two_t v4 = v1 + v3;
         const two_t v5 = inverse[2] * v0;
         const two_t v6 = inverse[3] * v2;
         const two_t v7 = v5 + v6;
-        gain[0 + k] = v4[0];
-        gain[9 + k] = v7[0];
-        if (next) {
-            gain[1 + k] = v4[1];
-            gain[10 + k] = v7[1];
-        }
+        *(two_free_t *)(gain + 0 + k) = v4;
+        *(two_free_t *)(gain + 9 + k) = v7;
     }
     for (int k = 0; k < 6; k += 2) {
         const two_t v0 = mstmm_beside(K + 0 + k);

@@ -3631,23 +3631,22 @@ int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restri
         *(two_free_t *)(K + 6 + k) = v42;
         *(two_free_t *)(K + 12 + k) = v59;
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
         const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
         const two_t v3 = H[3] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
         const two_t v6 = H[6] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
         const two_t v9 = H[9] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
         const two_t v12 = H[12] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
         const two_t v15 = H[15] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = H[1] * v0;
@@ -3672,14 +3671,9 @@ int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restri
         const two_t v36 = v34 + v35;
         const two_t v37 = H[17] * v14;
         const two_t v38 = v36 + v37;
-        right[0 + k] = v16[0];
-        right[9 + k] = v27[0];
-        right[18 + k] = v38[0];
-        if (next) {
-            right[1 + k] = v16[1];
-            right[10 + k] = v27[1];
-            right[19 + k] = v38[1];
-        }
+        *(two_free_t *)(right + 0 + k) = v16;
+        *(two_free_t *)(right + 9 + k) = v27;
+        *(two_free_t *)(right + 18 + k) = v38;
     }
     const real t603 = H[0] * K[0];
     const real t604 = H[3] * K[1];
@@ -3845,14 +3839,13 @@ int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S)
 {
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_beside(right + 0 + k);
         const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v2 = mstmm_beside(right + 9 + k);
         const two_t v3 = inverse[1] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v5 = mstmm_beside(right + 18 + k);
         const two_t v6 = inverse[2] * v5;
         const two_t v7 = v4 + v6;
         const two_t v8 = inverse[3] * v0;
@@ -3865,14 +3858,9 @@ int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real
         const two_t v15 = v13 + v14;
         const two_t v16 = inverse[8] * v5;
         const two_t v17 = v15 + v16;
-        gain[0 + k] = v7[0];
-        gain[9 + k] = v12[0];
-        gain[18 + k] = v17[0];
-        if (next) {
-            gain[1 + k] = v7[1];
-            gain[10 + k] = v12[1];
-            gain[19 + k] = v17[1];
-        }
+        *(two_free_t *)(gain + 0 + k) = v7;
+        *(two_free_t *)(gain + 9 + k) = v12;
+        *(two_free_t *)(gain + 18 + k) = v17;
     }
     for (int k = 0; k < 6; k += 2) {
         const two_t v0 = mstmm_beside(K + 0 + k);

@@ -4391,23 +4391,22 @@ int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restri
         *(two_free_t *)(K + 12 + k) = v59;
         *(two_free_t *)(K + 18 + k) = v76;
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
         const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
         const two_t v3 = H[4] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
         const two_t v6 = H[8] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
         const two_t v9 = H[12] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
         const two_t v12 = H[16] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
         const two_t v15 = H[20] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = H[1] * v0;
@@ -4443,16 +4442,10 @@ int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restri
         const two_t v47 = v45 + v46;
         const two_t v48 = H[23] * v14;
         const two_t v49 = v47 + v48;
-        right[0 + k] = v16[0];
-        right[9 + k] = v27[0];
-        right[18 + k] = v38[0];
-        right[27 + k] = v49[0];
-        if (next) {
-            right[1 + k] = v16[1];
-            right[10 + k] = v27[1];
-            right[19 + k] = v38[1];
-            right[28 + k] = v49[1];
-        }
+        *(two_free_t *)(right + 0 + k) = v16;
+        *(two_free_t *)(right + 9 + k) = v27;
+        *(two_free_t *)(right + 18 + k) = v38;
+        *(two_free_t *)(right + 27 + k) = v49;
     }
     const real t804 = H[0] * K[0];
     const real t805 = H[4] * K[1];
@@ -4716,17 +4709,16 @@ int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S)
 {
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_beside(right + 0 + k);
         const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v2 = mstmm_beside(right + 9 + k);
         const two_t v3 = inverse[1] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v5 = mstmm_beside(right + 18 + k);
         const two_t v6 = inverse[2] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v8 = mstmm_beside(right + 27 + k);
         const two_t v9 = inverse[3] * v8;
         const two_t v10 = v7 + v9;
         const two_t v11 = inverse[4] * v0;
@@ -4750,16 +4742,10 @@ int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real
         const two_t v29 = v27 + v28;
         const two_t v30 = inverse[15] * v8;
         const two_t v31 = v29 + v30;
-        gain[0 + k] = v10[0];
-        gain[9 + k] = v17[0];
-        gain[18 + k] = v24[0];
-        gain[27 + k] = v31[0];
-        if (next) {
-            gain[1 + k] = v10[1];
-            gain[10 + k] = v17[1];
-            gain[19 + k] = v24[1];
-            gain[28 + k] = v31[1];
-        }
+        *(two_free_t *)(gain + 0 + k) = v10;
+        *(two_free_t *)(gain + 9 + k) = v17;
+        *(two_free_t *)(gain + 18 + k) = v24;
+        *(two_free_t *)(gain + 27 + k) = v31;
     }
     for (int k = 0; k < 6; k += 2) {
         const two_t v0 = mstmm_beside(K + 0 + k);

@@ -5249,23 +5249,22 @@ int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restri
         *(two_free_t *)(K + 18 + k) = v76;
         *(two_free_t *)(K + 24 + k) = v93;
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
         const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
         const two_t v3 = H[5] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
         const two_t v6 = H[10] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
         const two_t v9 = H[15] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
         const two_t v12 = H[20] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
         const two_t v15 = H[25] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = H[1] * v0;
@@ -5312,18 +5311,11 @@ int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restri
         const two_t v58 = v56 + v57;
         const two_t v59 = H[29] * v14;
         const two_t v60 = v58 + v59;
-        right[0 + k] = v16[0];
-        right[9 + k] = v27[0];
-        right[18 + k] = v38[0];
-        right[27 + k] = v49[0];
-        right[36 + k] = v60[0];
-        if (next) {
-            right[1 + k] = v16[1];
-            right[10 + k] = v27[1];
-            right[19 + k] = v38[1];
-            right[28 + k] = v49[1];
-            right[37 + k] = v60[1];
-        }
+        *(two_free_t *)(right + 0 + k) = v16;
+        *(two_free_t *)(right + 9 + k) = v27;
+        *(two_free_t *)(right + 18 + k) = v38;
+        *(two_free_t *)(right + 27 + k) = v49;
+        *(two_free_t *)(right + 36 + k) = v60;
     }
     const real t1005 = H[0] * K[0];
     const real t1006 = H[5] * K[1];
@@ -5713,20 +5705,19 @@ int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S)
 {
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_beside(right + 0 + k);
         const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v2 = mstmm_beside(right + 9 + k);
         const two_t v3 = inverse[1] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v5 = mstmm_beside(right + 18 + k);
         const two_t v6 = inverse[2] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v8 = mstmm_beside(right + 27 + k);
         const two_t v9 = inverse[3] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(right + 36 + k, 1 * next);
+        const two_t v11 = mstmm_beside(right + 36 + k);
         const two_t v12 = inverse[4] * v11;
         const two_t v13 = v10 + v12;
         const two_t v14 = inverse[5] * v0;
@@ -5765,18 +5756,11 @@ int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real
         const two_t v47 = v45 + v46;
         const two_t v48 = inverse[24] * v11;
         const two_t v49 = v47 + v48;
-        gain[0 + k] = v13[0];
-        gain[9 + k] = v22[0];
-        gain[18 + k] = v31[0];
-        gain[27 + k] = v40[0];
-        gain[36 + k] = v49[0];
-        if (next) {
-            gain[1 + k] = v13[1];
-            gain[10 + k] = v22[1];
-            gain[19 + k] = v31[1];
-            gain[28 + k] = v40[1];
-            gain[37 + k] = v49[1];
-        }
+        *(two_free_t *)(gain + 0 + k) = v13;
+        *(two_free_t *)(gain + 9 + k) = v22;
+        *(two_free_t *)(gain + 18 + k) = v31;
+        *(two_free_t *)(gain + 27 + k) = v40;
+        *(two_free_t *)(gain + 36 + k) = v49;
     }
     for (int k = 0; k < 6; k += 2) {
         const two_t v0 = mstmm_beside(K + 0 + k);

@@ -6211,23 +6211,22 @@ int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restri
         *(two_free_t *)(K + 24 + k) = v93;
         *(two_free_t *)(K + 30 + k) = v110;
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
         const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6 * next);
+        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
         const two_t v3 = H[6] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6 * next);
+        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
         const two_t v6 = H[12] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6 * next);
+        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
         const two_t v9 = H[18] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6 * next);
+        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
         const two_t v12 = H[24] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6 * next);
+        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
         const two_t v15 = H[30] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = H[1] * v0;
@@ -6285,20 +6284,12 @@ int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restri
         const two_t v69 = v67 + v68;
         const two_t v70 = H[35] * v14;
         const two_t v71 = v69 + v70;
-        right[0 + k] = v16[0];
-        right[9 + k] = v27[0];
-        right[18 + k] = v38[0];
-        right[27 + k] = v49[0];
-        right[36 + k] = v60[0];
-        right[45 + k] = v71[0];
-        if (next) {
-            right[1 + k] = v16[1];
-            right[10 + k] = v27[1];
-            right[19 + k] = v38[1];
-            right[28 + k] = v49[1];
-            right[37 + k] = v60[1];
-            right[46 + k] = v71[1];
-        }
+        *(two_free_t *)(right + 0 + k) = v16;
+        *(two_free_t *)(right + 9 + k) = v27;
+        *(two_free_t *)(right + 18 + k) = v38;
+        *(two_free_t *)(right + 27 + k) = v49;
+        *(two_free_t *)(right + 36 + k) = v60;
+        *(two_free_t *)(right + 45 + k) = v71;
     }
     const real t1206 = H[0] * K[0];
     const real t1207 = H[6] * K[1];
@@ -6842,23 +6833,22 @@ int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S)
 {
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k + 1 < 9;
-        const two_t v0 = mstmm_apart(right + 0 + k, 1 * next);
+    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+        const two_t v0 = mstmm_beside(right + 0 + k);
         const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_apart(right + 9 + k, 1 * next);
+        const two_t v2 = mstmm_beside(right + 9 + k);
         const two_t v3 = inverse[1] * v2;
         const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(right + 18 + k, 1 * next);
+        const two_t v5 = mstmm_beside(right + 18 + k);
         const two_t v6 = inverse[2] * v5;
         const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(right + 27 + k, 1 * next);
+        const two_t v8 = mstmm_beside(right + 27 + k);
         const two_t v9 = inverse[3] * v8;
         const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(right + 36 + k, 1 * next);
+        const two_t v11 = mstmm_beside(right + 36 + k);
         const two_t v12 = inverse[4] * v11;
         const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(right + 45 + k, 1 * next);
+        const two_t v14 = mstmm_beside(right + 45 + k);
         const two_t v15 = inverse[5] * v14;
         const two_t v16 = v13 + v15;
         const two_t v17 = inverse[6] * v0;
@@ -6916,20 +6906,12 @@ int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real
         const two_t v69 = v67 + v68;
         const two_t v70 = inverse[35] * v14;
         const two_t v71 = v69 + v70;
-        gain[0 + k] = v16[0];
-        gain[9 + k] = v27[0];
-        gain[18 + k] = v38[0];
-        gain[27 + k] = v49[0];
-        gain[36 + k] = v60[0];
-        gain[45 + k] = v71[0];
-        if (next) {
-            gain[1 + k] = v16[1];
-            gain[10 + k] = v27[1];
-            gain[19 + k] = v38[1];
-            gain[28 + k] = v49[1];
-            gain[37 + k] = v60[1];
-            gain[46 + k] = v71[1];
-        }
+        *(two_free_t *)(gain + 0 + k) = v16;
+        *(two_free_t *)(gain + 9 + k) = v27;
+        *(two_free_t *)(gain + 18 + k) = v38;
+        *(two_free_t *)(gain + 27 + k) = v49;
+        *(two_free_t *)(gain + 36 + k) = v60;
+        *(two_free_t *)(gain + 45 + k) = v71;
     }
     for (int k = 0; k < 6; k += 2) {
         const two_t v0 = mstmm_beside(K + 0 + k);

@@ -1644,23 +1644,28 @@ static int mstmm_at_lag(mstmm_state *state, int index)
 /* A body's own load by its motion and its modes. */
 static int mstmm_at_tangent_own(mstmm_state *state, int index)
 {
+    const mstmm_model *model = state->model;
     const mstmm_body *body = &state->model->bodies[index];
-    const int nu = body->nu;
-    real *tangent = state->tangents->numbers + body->tangent;
     int code;
     if (mstmm_idle(state, body)) return 0;
-    for (int j = 0; j < nu * nu; j++)
-        (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+    if (model->n_laws) {
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        for (int j = 0; j < nu * nu; j++)
+            (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+    }
     if (!body->straight) {
         code = mstmm_at_lag(state, index);
         if (code) return code;
     }
     if (!body->modal) {
         real *block = state->workspace + body->block;
+        real *tangent = state->tangents->numbers + body->tangent;
         mstmm_body_load_by_motion(body->load_by_motion,
             .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
             .J = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
     } else {
+        real *tangent = state->tangents->numbers + body->tangent;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;

@@ -105,12 +105,15 @@ class KernelText:
         return found
 
     def _loop(self, loop: Loop) -> list[str]:
-        """A pair of entries at a time; of an odd number the last comes with itself."""
-        odd = loop.count % 2 == 1
+        """A pair of entries at a time; of an odd number the last comes with the one before it once
+        more, or with itself where they are added to the port."""
+        port, last = self.ports[loop.port.name], loop.count - 1
+        odd = loop.count % 2 == 1 and port.accumulate
         lines = [f"for (int k = 0; k < {loop.count}; k += 2) {{"]
         if odd:
-            lines.append(f"    const int next = k + 1 < {loop.count};")
-        port = self.ports[loop.port.name]
+            lines.append(f"    const int next = k < {last};")
+        elif loop.count % 2 == 1:
+            lines = [f"for (int k = 0; k < {last}; k += k < {last - 2} ? 2 : 1) {{"]
         taken_off = loop.taken_off
         for value in loop.values:
             if value.number not in taken_off:

@@ -117,6 +117,7 @@ _PLACES = {
 
 #: Variables of the printed functions: name -> (declaration, variables it needs).
 VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "model": ("const mstmm_model *model = state->model;", ()),
     "law": ("const mstmm_law *law = &state->model->laws[index];", ()),
     "load": ("const mstmm_load *load = &state->model->loads[index];", ()),
     "force": ("const mstmm_force *force = &state->model->forces[index];", ()),

@@ -228,7 +228,7 @@ LAW_SLOPES = Pass(
 TANGENT_OWN = Pass(
     "tangent_own", "body", "A body's own load by its motion and its modes.",
     (
-        Copy(to="tangent.laws"),
+        Copy(to="tangent.laws", when="laws"),
         Do(whole=LAG, when="curved"),
         call("body.load_by_motion", when="!modal", p="body.p", motion="body.motion",
              J="tangent.S"),

@@ -46,7 +46,7 @@ def test_pairs_are_the_straight_line(
     """Of an odd number the last entry comes alone; what stands behind the loops reads them."""
     spec = element("drawn", turned(lanes))
     monkeypatch.setitem(ALIKE, ("drawn", "k"), (("Y", 1), ("Z", 0)))
-    assert element_source(spec).count("+= 2") == 2
+    assert element_source(spec).count("for (int k = 0;") == 2
     library = build(tmp_path, spec)
     inputs = {"X": rng.normal(size=2 * lanes).tolist(), "R": rng.normal(size=4).tolist()}
     found = library.call("drawn", "k", inputs)

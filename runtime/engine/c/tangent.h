@@ -16,7 +16,7 @@ typedef struct {
 } mstmm_couplings;
 
 /* A scene at one state with its derivatives: everything is the caller's.  `work` has
- * mstmm_tangent_work numbers, zero at first, `numbers` those of mstmm_tangent_lay. */
+ * mstmm_tangent_work numbers, `numbers` those of mstmm_tangent_lay, all of them zero at first. */
 typedef struct {
     const mstmm_model *model;
     real *workspace, *memory, *work, *numbers;
