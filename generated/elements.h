@@ -663,6 +663,10 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -734,6 +738,10 @@ int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -805,6 +813,10 @@ int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -876,6 +888,10 @@ int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -947,6 +963,10 @@ int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -1018,6 +1038,10 @@ int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);

@@ -2282,6 +2282,32 @@ static inline int mstmm_generic_tangent_steady_by(int speeds, struct mstmm_gener
 }
 #define mstmm_generic_tangent_steady(speeds, ...) mstmm_generic_tangent_steady_by(speeds, (struct mstmm_generic_tangent_steady){__VA_ARGS__})
 
+struct mstmm_generic_tangent_turning {
+    const real *theta;
+    const real *H;
+    const real *w;
+    const real *Q;
+    const real *f;
+    const real *d_u;
+    const real *d_s;
+    const real *J;
+    const real *laws;
+    real *B;
+    real *G;
+    real *row;
+};
+typedef int mstmm_generic_tangent_turning_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_tangent_turning_kernel *const mstmm_generic_tangent_turning_table[];
+static inline int mstmm_generic_tangent_turning_by(int speeds, struct mstmm_generic_tangent_turning to)
+{
+    return mstmm_generic_tangent_turning_table[speeds](
+        to.theta, to.H, to.w, to.Q, to.f, to.d_u, to.d_s, to.J, to.laws, to.B, to.G, to.row);
+}
+#define mstmm_generic_tangent_turning(speeds, ...) mstmm_generic_tangent_turning_by(speeds, (struct mstmm_generic_tangent_turning){__VA_ARGS__})
+
 struct mstmm_generic_tangent_rows {
     const real *H;
     const real *B;

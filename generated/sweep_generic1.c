@@ -50,6 +50,10 @@ int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -2336,6 +2340,153 @@ static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
     {"row", 1, "", 0, 0},
 };
 
+/* a direction of a hinge with 1 free speed, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[1]
+ * in  d_s[1]
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[1] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[3] * d_u[0];
+    const real t1 = theta[2] * Q[1];
+    const real t2 = theta[1] * Q[2];
+    const real t3 = t1 - t2;
+    const real t4 = t0 + t3;
+    B[0] = t4;
+    const real t5 = H[4] * d_u[0];
+    const real t6 = theta[0] * Q[2];
+    const real t7 = theta[2] * Q[0];
+    const real t8 = t6 - t7;
+    const real t9 = t5 + t8;
+    B[1] = t9;
+    const real t10 = H[5] * d_u[0];
+    const real t11 = theta[1] * Q[0];
+    const real t12 = theta[0] * Q[1];
+    const real t13 = t11 - t12;
+    const real t14 = t10 + t13;
+    B[2] = t14;
+    const real t15 = w[2] * t8;
+    const real t16 = w[1] * t13;
+    const real t17 = t15 - t16;
+    const real t18 = H[3] * d_s[0];
+    const real t19 = theta[2] * Q[4];
+    const real t20 = Q[1] * t10;
+    const real t21 = Q[2] * t5;
+    const real t22 = t20 - t21;
+    const real t23 = t19 + t22;
+    const real t24 = theta[1] * Q[5];
+    const real t25 = t23 - t24;
+    const real t26 = t18 + t25;
+    const real t27 = t17 + t26;
+    B[3] = t27;
+    const real t28 = w[0] * t13;
+    const real t29 = w[2] * t3;
+    const real t30 = t28 - t29;
+    const real t31 = H[4] * d_s[0];
+    const real t32 = theta[0] * Q[5];
+    const real t33 = Q[2] * t0;
+    const real t34 = Q[0] * t10;
+    const real t35 = t33 - t34;
+    const real t36 = theta[2] * Q[3];
+    const real t37 = t35 - t36;
+    const real t38 = t32 + t37;
+    const real t39 = t31 + t38;
+    const real t40 = t30 + t39;
+    B[4] = t40;
+    const real t41 = w[1] * t3;
+    const real t42 = w[0] * t8;
+    const real t43 = t41 - t42;
+    const real t44 = H[5] * d_s[0];
+    const real t45 = theta[1] * Q[3];
+    const real t46 = Q[0] * t5;
+    const real t47 = Q[1] * t0;
+    const real t48 = t46 - t47;
+    const real t49 = t45 + t48;
+    const real t50 = theta[0] * Q[4];
+    const real t51 = t49 - t50;
+    const real t52 = t44 + t51;
+    const real t53 = t43 + t52;
+    B[5] = t53;
+    const real t54 = theta[2] * Q[7];
+    const real t55 = theta[1] * Q[8];
+    const real t56 = t54 - t55;
+    B[6] = t56;
+    const real t57 = theta[0] * Q[8];
+    const real t58 = theta[2] * Q[6];
+    const real t59 = t57 - t58;
+    B[7] = t59;
+    const real t60 = theta[1] * Q[6];
+    const real t61 = theta[0] * Q[7];
+    const real t62 = t60 - t61;
+    B[8] = t62;
+    const real t63 = theta[1] * f[2];
+    const real t64 = theta[2] * f[1];
+    const real t65 = t63 - t64;
+    G[0] = t65;
+    const real t66 = theta[2] * f[0];
+    const real t67 = theta[0] * f[2];
+    const real t68 = t66 - t67;
+    G[1] = t68;
+    const real t69 = theta[0] * f[1];
+    const real t70 = theta[1] * f[0];
+    const real t71 = t69 - t70;
+    G[2] = t71;
+    const real t72 = theta[1] * f[5];
+    const real t73 = theta[2] * f[4];
+    const real t74 = t72 - t73;
+    G[3] = t74;
+    const real t75 = theta[2] * f[3];
+    const real t76 = theta[0] * f[5];
+    const real t77 = t75 - t76;
+    G[4] = t77;
+    const real t78 = theta[0] * f[4];
+    const real t79 = theta[1] * f[3];
+    const real t80 = t78 - t79;
+    G[5] = t80;
+    const real t81 = d_s[0] * J[0];
+    const real t82 = t81 - laws[0];
+    row[0] = t82;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 1, "", 0, 0},
+    {"d_s", 1, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 1, "", 0, 0},
+};
+
 /* rows of a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -3969,6 +4120,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_turning,
+        .call = mstmm_sweep_generic1_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic1_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_turning_outputs,
+        .ir_hash = "ae584d3ab2295d46f607be74345f8392d9f8864e4c2c5564e6796f83c38ce308",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic1_tangent_rows,
         .call = mstmm_sweep_generic1_tangent_rows_call,
@@ -4070,7 +4233,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "ccaf558664cf4bcde6e60478fde2d665bf99fa9caca23eeac5f547da039dc426",
+    .hash = "9b960ddb486a61146c071a6fe123a60300ff027c6b8cda8a46679b79e7ba831c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4080,6 +4243,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic1_kernels,
 };

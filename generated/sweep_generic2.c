@@ -50,6 +50,10 @@ int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -2900,6 +2904,168 @@ static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
     {"row", 2, "", 0, 0},
 };
 
+/* a direction of a hinge with 2 free speeds, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6][2]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[2]
+ * in  d_s[2]
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[2] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[2] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[6] * d_u[0];
+    const real t1 = H[7] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = theta[2] * Q[1];
+    const real t4 = theta[1] * Q[2];
+    const real t5 = t3 - t4;
+    const real t6 = t2 + t5;
+    B[0] = t6;
+    const real t7 = H[8] * d_u[0];
+    const real t8 = H[9] * d_u[1];
+    const real t9 = t7 + t8;
+    const real t10 = theta[0] * Q[2];
+    const real t11 = theta[2] * Q[0];
+    const real t12 = t10 - t11;
+    const real t13 = t9 + t12;
+    B[1] = t13;
+    const real t14 = H[10] * d_u[0];
+    const real t15 = H[11] * d_u[1];
+    const real t16 = t14 + t15;
+    const real t17 = theta[1] * Q[0];
+    const real t18 = theta[0] * Q[1];
+    const real t19 = t17 - t18;
+    const real t20 = t16 + t19;
+    B[2] = t20;
+    const real t21 = w[2] * t12;
+    const real t22 = w[1] * t19;
+    const real t23 = t21 - t22;
+    const real t24 = H[6] * d_s[0];
+    const real t25 = H[7] * d_s[1];
+    const real t26 = t24 + t25;
+    const real t27 = theta[2] * Q[4];
+    const real t28 = Q[1] * t16;
+    const real t29 = Q[2] * t9;
+    const real t30 = t28 - t29;
+    const real t31 = t27 + t30;
+    const real t32 = theta[1] * Q[5];
+    const real t33 = t31 - t32;
+    const real t34 = t26 + t33;
+    const real t35 = t23 + t34;
+    B[3] = t35;
+    const real t36 = w[0] * t19;
+    const real t37 = w[2] * t5;
+    const real t38 = t36 - t37;
+    const real t39 = H[8] * d_s[0];
+    const real t40 = H[9] * d_s[1];
+    const real t41 = t39 + t40;
+    const real t42 = theta[0] * Q[5];
+    const real t43 = Q[2] * t2;
+    const real t44 = Q[0] * t16;
+    const real t45 = t43 - t44;
+    const real t46 = theta[2] * Q[3];
+    const real t47 = t45 - t46;
+    const real t48 = t42 + t47;
+    const real t49 = t41 + t48;
+    const real t50 = t38 + t49;
+    B[4] = t50;
+    const real t51 = w[1] * t5;
+    const real t52 = w[0] * t12;
+    const real t53 = t51 - t52;
+    const real t54 = H[10] * d_s[0];
+    const real t55 = H[11] * d_s[1];
+    const real t56 = t54 + t55;
+    const real t57 = theta[1] * Q[3];
+    const real t58 = Q[0] * t9;
+    const real t59 = Q[1] * t2;
+    const real t60 = t58 - t59;
+    const real t61 = t57 + t60;
+    const real t62 = theta[0] * Q[4];
+    const real t63 = t61 - t62;
+    const real t64 = t56 + t63;
+    const real t65 = t53 + t64;
+    B[5] = t65;
+    const real t66 = theta[2] * Q[7];
+    const real t67 = theta[1] * Q[8];
+    const real t68 = t66 - t67;
+    B[6] = t68;
+    const real t69 = theta[0] * Q[8];
+    const real t70 = theta[2] * Q[6];
+    const real t71 = t69 - t70;
+    B[7] = t71;
+    const real t72 = theta[1] * Q[6];
+    const real t73 = theta[0] * Q[7];
+    const real t74 = t72 - t73;
+    B[8] = t74;
+    const real t75 = theta[1] * f[2];
+    const real t76 = theta[2] * f[1];
+    const real t77 = t75 - t76;
+    G[0] = t77;
+    const real t78 = theta[2] * f[0];
+    const real t79 = theta[0] * f[2];
+    const real t80 = t78 - t79;
+    G[1] = t80;
+    const real t81 = theta[0] * f[1];
+    const real t82 = theta[1] * f[0];
+    const real t83 = t81 - t82;
+    G[2] = t83;
+    const real t84 = theta[1] * f[5];
+    const real t85 = theta[2] * f[4];
+    const real t86 = t84 - t85;
+    G[3] = t86;
+    const real t87 = theta[2] * f[3];
+    const real t88 = theta[0] * f[5];
+    const real t89 = t87 - t88;
+    G[4] = t89;
+    const real t90 = theta[0] * f[4];
+    const real t91 = theta[1] * f[3];
+    const real t92 = t90 - t91;
+    G[5] = t92;
+    const real t93 = d_s[0] * J[0];
+    const real t94 = t93 - laws[0];
+    row[0] = t94;
+    const real t95 = d_s[1] * J[1];
+    const real t96 = t95 - laws[1];
+    row[1] = t96;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 2, "", 0, 0},
+    {"d_s", 2, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"laws", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 2, "", 0, 0},
+};
+
 /* rows of a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -4819,6 +4985,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_turning,
+        .call = mstmm_sweep_generic2_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic2_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_turning_outputs,
+        .ir_hash = "6ab0dc35dce53b53a15c4ffed5a43846ecda0c874627f28f5e9354cc63f244f7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic2_tangent_rows,
         .call = mstmm_sweep_generic2_tangent_rows_call,
@@ -4920,7 +5098,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "38323c5064f215c5c8f1b09b5bb7c65af43037f7f643cab6de8c17d4995c82ed",
+    .hash = "e316cab8182e0acaba91f617ee4212cabc854d2d093c29cfe36347fb7a2c27bc",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4930,6 +5108,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic2_kernels,
 };

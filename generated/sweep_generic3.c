@@ -50,6 +50,10 @@ int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -3550,6 +3554,183 @@ static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
     {"row", 3, "", 0, 0},
 };
 
+/* a direction of a hinge with 3 free speeds, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6][3]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[3]
+ * in  d_s[3]
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[3] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[9] * d_u[0];
+    const real t1 = H[10] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[11] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = theta[2] * Q[1];
+    const real t6 = theta[1] * Q[2];
+    const real t7 = t5 - t6;
+    const real t8 = t4 + t7;
+    B[0] = t8;
+    const real t9 = H[12] * d_u[0];
+    const real t10 = H[13] * d_u[1];
+    const real t11 = t9 + t10;
+    const real t12 = H[14] * d_u[2];
+    const real t13 = t11 + t12;
+    const real t14 = theta[0] * Q[2];
+    const real t15 = theta[2] * Q[0];
+    const real t16 = t14 - t15;
+    const real t17 = t13 + t16;
+    B[1] = t17;
+    const real t18 = H[15] * d_u[0];
+    const real t19 = H[16] * d_u[1];
+    const real t20 = t18 + t19;
+    const real t21 = H[17] * d_u[2];
+    const real t22 = t20 + t21;
+    const real t23 = theta[1] * Q[0];
+    const real t24 = theta[0] * Q[1];
+    const real t25 = t23 - t24;
+    const real t26 = t22 + t25;
+    B[2] = t26;
+    const real t27 = w[2] * t16;
+    const real t28 = w[1] * t25;
+    const real t29 = t27 - t28;
+    const real t30 = H[9] * d_s[0];
+    const real t31 = H[10] * d_s[1];
+    const real t32 = t30 + t31;
+    const real t33 = H[11] * d_s[2];
+    const real t34 = t32 + t33;
+    const real t35 = theta[2] * Q[4];
+    const real t36 = Q[1] * t22;
+    const real t37 = Q[2] * t13;
+    const real t38 = t36 - t37;
+    const real t39 = t35 + t38;
+    const real t40 = theta[1] * Q[5];
+    const real t41 = t39 - t40;
+    const real t42 = t34 + t41;
+    const real t43 = t29 + t42;
+    B[3] = t43;
+    const real t44 = w[0] * t25;
+    const real t45 = w[2] * t7;
+    const real t46 = t44 - t45;
+    const real t47 = H[12] * d_s[0];
+    const real t48 = H[13] * d_s[1];
+    const real t49 = t47 + t48;
+    const real t50 = H[14] * d_s[2];
+    const real t51 = t49 + t50;
+    const real t52 = theta[0] * Q[5];
+    const real t53 = Q[2] * t4;
+    const real t54 = Q[0] * t22;
+    const real t55 = t53 - t54;
+    const real t56 = theta[2] * Q[3];
+    const real t57 = t55 - t56;
+    const real t58 = t52 + t57;
+    const real t59 = t51 + t58;
+    const real t60 = t46 + t59;
+    B[4] = t60;
+    const real t61 = w[1] * t7;
+    const real t62 = w[0] * t16;
+    const real t63 = t61 - t62;
+    const real t64 = H[15] * d_s[0];
+    const real t65 = H[16] * d_s[1];
+    const real t66 = t64 + t65;
+    const real t67 = H[17] * d_s[2];
+    const real t68 = t66 + t67;
+    const real t69 = theta[1] * Q[3];
+    const real t70 = Q[0] * t13;
+    const real t71 = Q[1] * t4;
+    const real t72 = t70 - t71;
+    const real t73 = t69 + t72;
+    const real t74 = theta[0] * Q[4];
+    const real t75 = t73 - t74;
+    const real t76 = t68 + t75;
+    const real t77 = t63 + t76;
+    B[5] = t77;
+    const real t78 = theta[2] * Q[7];
+    const real t79 = theta[1] * Q[8];
+    const real t80 = t78 - t79;
+    B[6] = t80;
+    const real t81 = theta[0] * Q[8];
+    const real t82 = theta[2] * Q[6];
+    const real t83 = t81 - t82;
+    B[7] = t83;
+    const real t84 = theta[1] * Q[6];
+    const real t85 = theta[0] * Q[7];
+    const real t86 = t84 - t85;
+    B[8] = t86;
+    const real t87 = theta[1] * f[2];
+    const real t88 = theta[2] * f[1];
+    const real t89 = t87 - t88;
+    G[0] = t89;
+    const real t90 = theta[2] * f[0];
+    const real t91 = theta[0] * f[2];
+    const real t92 = t90 - t91;
+    G[1] = t92;
+    const real t93 = theta[0] * f[1];
+    const real t94 = theta[1] * f[0];
+    const real t95 = t93 - t94;
+    G[2] = t95;
+    const real t96 = theta[1] * f[5];
+    const real t97 = theta[2] * f[4];
+    const real t98 = t96 - t97;
+    G[3] = t98;
+    const real t99 = theta[2] * f[3];
+    const real t100 = theta[0] * f[5];
+    const real t101 = t99 - t100;
+    G[4] = t101;
+    const real t102 = theta[0] * f[4];
+    const real t103 = theta[1] * f[3];
+    const real t104 = t102 - t103;
+    G[5] = t104;
+    const real t105 = d_s[0] * J[0];
+    const real t106 = t105 - laws[0];
+    row[0] = t106;
+    const real t107 = d_s[1] * J[1];
+    const real t108 = t107 - laws[1];
+    row[1] = t108;
+    const real t109 = d_s[2] * J[2];
+    const real t110 = t109 - laws[2];
+    row[2] = t110;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 3, "", 0, 0},
+    {"d_s", 3, "", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 3, "", 0, 0},
+};
+
 /* rows of a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -5795,6 +5976,18 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_turning,
+        .call = mstmm_sweep_generic3_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic3_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_turning_outputs,
+        .ir_hash = "d60bed55d7ae0b9ec7edd229e5f5014309e4ff962c2ffb0bf4b35e43620283c5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic3_tangent_rows,
         .call = mstmm_sweep_generic3_tangent_rows_call,
@@ -5896,7 +6089,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "5e50abb9c4f8e46f266e3d83ff3cf2bd03334d57d35332d8ae2f2ec44c7686d8",
+    .hash = "682d2245f97377ee8e59ac9544f8a27a1328db2256f4777d44206db71bd719fc",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5906,6 +6099,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -50,6 +50,10 @@ int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -4292,6 +4296,198 @@ static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
     {"row", 4, "", 0, 0},
 };
 
+/* a direction of a hinge with 4 free speeds, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6][4]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[4]
+ * in  d_s[4]
+ * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[4] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[4] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[12] * d_u[0];
+    const real t1 = H[13] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[14] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = theta[2] * Q[1];
+    const real t8 = theta[1] * Q[2];
+    const real t9 = t7 - t8;
+    const real t10 = t6 + t9;
+    B[0] = t10;
+    const real t11 = H[16] * d_u[0];
+    const real t12 = H[17] * d_u[1];
+    const real t13 = t11 + t12;
+    const real t14 = H[18] * d_u[2];
+    const real t15 = t13 + t14;
+    const real t16 = H[19] * d_u[3];
+    const real t17 = t15 + t16;
+    const real t18 = theta[0] * Q[2];
+    const real t19 = theta[2] * Q[0];
+    const real t20 = t18 - t19;
+    const real t21 = t17 + t20;
+    B[1] = t21;
+    const real t22 = H[20] * d_u[0];
+    const real t23 = H[21] * d_u[1];
+    const real t24 = t22 + t23;
+    const real t25 = H[22] * d_u[2];
+    const real t26 = t24 + t25;
+    const real t27 = H[23] * d_u[3];
+    const real t28 = t26 + t27;
+    const real t29 = theta[1] * Q[0];
+    const real t30 = theta[0] * Q[1];
+    const real t31 = t29 - t30;
+    const real t32 = t28 + t31;
+    B[2] = t32;
+    const real t33 = w[2] * t20;
+    const real t34 = w[1] * t31;
+    const real t35 = t33 - t34;
+    const real t36 = H[12] * d_s[0];
+    const real t37 = H[13] * d_s[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[14] * d_s[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[15] * d_s[3];
+    const real t42 = t40 + t41;
+    const real t43 = theta[2] * Q[4];
+    const real t44 = Q[1] * t28;
+    const real t45 = Q[2] * t17;
+    const real t46 = t44 - t45;
+    const real t47 = t43 + t46;
+    const real t48 = theta[1] * Q[5];
+    const real t49 = t47 - t48;
+    const real t50 = t42 + t49;
+    const real t51 = t35 + t50;
+    B[3] = t51;
+    const real t52 = w[0] * t31;
+    const real t53 = w[2] * t9;
+    const real t54 = t52 - t53;
+    const real t55 = H[16] * d_s[0];
+    const real t56 = H[17] * d_s[1];
+    const real t57 = t55 + t56;
+    const real t58 = H[18] * d_s[2];
+    const real t59 = t57 + t58;
+    const real t60 = H[19] * d_s[3];
+    const real t61 = t59 + t60;
+    const real t62 = theta[0] * Q[5];
+    const real t63 = Q[2] * t6;
+    const real t64 = Q[0] * t28;
+    const real t65 = t63 - t64;
+    const real t66 = theta[2] * Q[3];
+    const real t67 = t65 - t66;
+    const real t68 = t62 + t67;
+    const real t69 = t61 + t68;
+    const real t70 = t54 + t69;
+    B[4] = t70;
+    const real t71 = w[1] * t9;
+    const real t72 = w[0] * t20;
+    const real t73 = t71 - t72;
+    const real t74 = H[20] * d_s[0];
+    const real t75 = H[21] * d_s[1];
+    const real t76 = t74 + t75;
+    const real t77 = H[22] * d_s[2];
+    const real t78 = t76 + t77;
+    const real t79 = H[23] * d_s[3];
+    const real t80 = t78 + t79;
+    const real t81 = theta[1] * Q[3];
+    const real t82 = Q[0] * t17;
+    const real t83 = Q[1] * t6;
+    const real t84 = t82 - t83;
+    const real t85 = t81 + t84;
+    const real t86 = theta[0] * Q[4];
+    const real t87 = t85 - t86;
+    const real t88 = t80 + t87;
+    const real t89 = t73 + t88;
+    B[5] = t89;
+    const real t90 = theta[2] * Q[7];
+    const real t91 = theta[1] * Q[8];
+    const real t92 = t90 - t91;
+    B[6] = t92;
+    const real t93 = theta[0] * Q[8];
+    const real t94 = theta[2] * Q[6];
+    const real t95 = t93 - t94;
+    B[7] = t95;
+    const real t96 = theta[1] * Q[6];
+    const real t97 = theta[0] * Q[7];
+    const real t98 = t96 - t97;
+    B[8] = t98;
+    const real t99 = theta[1] * f[2];
+    const real t100 = theta[2] * f[1];
+    const real t101 = t99 - t100;
+    G[0] = t101;
+    const real t102 = theta[2] * f[0];
+    const real t103 = theta[0] * f[2];
+    const real t104 = t102 - t103;
+    G[1] = t104;
+    const real t105 = theta[0] * f[1];
+    const real t106 = theta[1] * f[0];
+    const real t107 = t105 - t106;
+    G[2] = t107;
+    const real t108 = theta[1] * f[5];
+    const real t109 = theta[2] * f[4];
+    const real t110 = t108 - t109;
+    G[3] = t110;
+    const real t111 = theta[2] * f[3];
+    const real t112 = theta[0] * f[5];
+    const real t113 = t111 - t112;
+    G[4] = t113;
+    const real t114 = theta[0] * f[4];
+    const real t115 = theta[1] * f[3];
+    const real t116 = t114 - t115;
+    G[5] = t116;
+    const real t117 = d_s[0] * J[0];
+    const real t118 = t117 - laws[0];
+    row[0] = t118;
+    const real t119 = d_s[1] * J[1];
+    const real t120 = t119 - laws[1];
+    row[1] = t120;
+    const real t121 = d_s[2] * J[2];
+    const real t122 = t121 - laws[2];
+    row[2] = t122;
+    const real t123 = d_s[3] * J[3];
+    const real t124 = t123 - laws[3];
+    row[3] = t124;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 4, "", 0, 0},
+    {"d_s", 4, "", 0, 0},
+    {"J", 4, "kg*m2 or kg", 0, 0},
+    {"laws", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 4, "", 0, 0},
+};
+
 /* rows of a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -6903,6 +7099,18 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_turning,
+        .call = mstmm_sweep_generic4_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic4_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_turning_outputs,
+        .ir_hash = "2df784f48feddff4ac1876761e7f00a3d728948242146e682a2cc0788fd72a99",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic4_tangent_rows,
         .call = mstmm_sweep_generic4_tangent_rows_call,
@@ -7004,7 +7212,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "4bdf71a21e36ed2c97fcb9fba05dc0c213e8d326117f7acedea6d6e31d9ef929",
+    .hash = "5da5d6045b8899a0f45a2959d1fa269d9eb0a73421cef359be042c4c7803eb0e",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -7014,6 +7222,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -50,6 +50,10 @@ int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -5132,6 +5136,213 @@ static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
     {"row", 5, "", 0, 0},
 };
 
+/* a direction of a hinge with 5 free speeds, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6][5]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[5]
+ * in  d_s[5]
+ * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[5] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[5] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[15] * d_u[0];
+    const real t1 = H[16] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[17] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[18] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[19] * d_u[4];
+    const real t8 = t6 + t7;
+    const real t9 = theta[2] * Q[1];
+    const real t10 = theta[1] * Q[2];
+    const real t11 = t9 - t10;
+    const real t12 = t8 + t11;
+    B[0] = t12;
+    const real t13 = H[20] * d_u[0];
+    const real t14 = H[21] * d_u[1];
+    const real t15 = t13 + t14;
+    const real t16 = H[22] * d_u[2];
+    const real t17 = t15 + t16;
+    const real t18 = H[23] * d_u[3];
+    const real t19 = t17 + t18;
+    const real t20 = H[24] * d_u[4];
+    const real t21 = t19 + t20;
+    const real t22 = theta[0] * Q[2];
+    const real t23 = theta[2] * Q[0];
+    const real t24 = t22 - t23;
+    const real t25 = t21 + t24;
+    B[1] = t25;
+    const real t26 = H[25] * d_u[0];
+    const real t27 = H[26] * d_u[1];
+    const real t28 = t26 + t27;
+    const real t29 = H[27] * d_u[2];
+    const real t30 = t28 + t29;
+    const real t31 = H[28] * d_u[3];
+    const real t32 = t30 + t31;
+    const real t33 = H[29] * d_u[4];
+    const real t34 = t32 + t33;
+    const real t35 = theta[1] * Q[0];
+    const real t36 = theta[0] * Q[1];
+    const real t37 = t35 - t36;
+    const real t38 = t34 + t37;
+    B[2] = t38;
+    const real t39 = w[2] * t24;
+    const real t40 = w[1] * t37;
+    const real t41 = t39 - t40;
+    const real t42 = H[15] * d_s[0];
+    const real t43 = H[16] * d_s[1];
+    const real t44 = t42 + t43;
+    const real t45 = H[17] * d_s[2];
+    const real t46 = t44 + t45;
+    const real t47 = H[18] * d_s[3];
+    const real t48 = t46 + t47;
+    const real t49 = H[19] * d_s[4];
+    const real t50 = t48 + t49;
+    const real t51 = theta[2] * Q[4];
+    const real t52 = Q[1] * t34;
+    const real t53 = Q[2] * t21;
+    const real t54 = t52 - t53;
+    const real t55 = t51 + t54;
+    const real t56 = theta[1] * Q[5];
+    const real t57 = t55 - t56;
+    const real t58 = t50 + t57;
+    const real t59 = t41 + t58;
+    B[3] = t59;
+    const real t60 = w[0] * t37;
+    const real t61 = w[2] * t11;
+    const real t62 = t60 - t61;
+    const real t63 = H[20] * d_s[0];
+    const real t64 = H[21] * d_s[1];
+    const real t65 = t63 + t64;
+    const real t66 = H[22] * d_s[2];
+    const real t67 = t65 + t66;
+    const real t68 = H[23] * d_s[3];
+    const real t69 = t67 + t68;
+    const real t70 = H[24] * d_s[4];
+    const real t71 = t69 + t70;
+    const real t72 = theta[0] * Q[5];
+    const real t73 = Q[2] * t8;
+    const real t74 = Q[0] * t34;
+    const real t75 = t73 - t74;
+    const real t76 = theta[2] * Q[3];
+    const real t77 = t75 - t76;
+    const real t78 = t72 + t77;
+    const real t79 = t71 + t78;
+    const real t80 = t62 + t79;
+    B[4] = t80;
+    const real t81 = w[1] * t11;
+    const real t82 = w[0] * t24;
+    const real t83 = t81 - t82;
+    const real t84 = H[25] * d_s[0];
+    const real t85 = H[26] * d_s[1];
+    const real t86 = t84 + t85;
+    const real t87 = H[27] * d_s[2];
+    const real t88 = t86 + t87;
+    const real t89 = H[28] * d_s[3];
+    const real t90 = t88 + t89;
+    const real t91 = H[29] * d_s[4];
+    const real t92 = t90 + t91;
+    const real t93 = theta[1] * Q[3];
+    const real t94 = Q[0] * t21;
+    const real t95 = Q[1] * t8;
+    const real t96 = t94 - t95;
+    const real t97 = t93 + t96;
+    const real t98 = theta[0] * Q[4];
+    const real t99 = t97 - t98;
+    const real t100 = t92 + t99;
+    const real t101 = t83 + t100;
+    B[5] = t101;
+    const real t102 = theta[2] * Q[7];
+    const real t103 = theta[1] * Q[8];
+    const real t104 = t102 - t103;
+    B[6] = t104;
+    const real t105 = theta[0] * Q[8];
+    const real t106 = theta[2] * Q[6];
+    const real t107 = t105 - t106;
+    B[7] = t107;
+    const real t108 = theta[1] * Q[6];
+    const real t109 = theta[0] * Q[7];
+    const real t110 = t108 - t109;
+    B[8] = t110;
+    const real t111 = theta[1] * f[2];
+    const real t112 = theta[2] * f[1];
+    const real t113 = t111 - t112;
+    G[0] = t113;
+    const real t114 = theta[2] * f[0];
+    const real t115 = theta[0] * f[2];
+    const real t116 = t114 - t115;
+    G[1] = t116;
+    const real t117 = theta[0] * f[1];
+    const real t118 = theta[1] * f[0];
+    const real t119 = t117 - t118;
+    G[2] = t119;
+    const real t120 = theta[1] * f[5];
+    const real t121 = theta[2] * f[4];
+    const real t122 = t120 - t121;
+    G[3] = t122;
+    const real t123 = theta[2] * f[3];
+    const real t124 = theta[0] * f[5];
+    const real t125 = t123 - t124;
+    G[4] = t125;
+    const real t126 = theta[0] * f[4];
+    const real t127 = theta[1] * f[3];
+    const real t128 = t126 - t127;
+    G[5] = t128;
+    const real t129 = d_s[0] * J[0];
+    const real t130 = t129 - laws[0];
+    row[0] = t130;
+    const real t131 = d_s[1] * J[1];
+    const real t132 = t131 - laws[1];
+    row[1] = t132;
+    const real t133 = d_s[2] * J[2];
+    const real t134 = t133 - laws[2];
+    row[2] = t134;
+    const real t135 = d_s[3] * J[3];
+    const real t136 = t135 - laws[3];
+    row[3] = t136;
+    const real t137 = d_s[4] * J[4];
+    const real t138 = t137 - laws[4];
+    row[4] = t138;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 30, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 5, "", 0, 0},
+    {"d_s", 5, "", 0, 0},
+    {"J", 5, "kg*m2 or kg", 0, 0},
+    {"laws", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 5, "", 0, 0},
+};
+
 /* rows of a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -8149,6 +8360,18 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_turning,
+        .call = mstmm_sweep_generic5_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic5_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_turning_outputs,
+        .ir_hash = "4bba88778fd90adcaa024d16538d1672c918f66461ff868968bd335a8e8a2abe",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic5_tangent_rows,
         .call = mstmm_sweep_generic5_tangent_rows_call,
@@ -8250,7 +8473,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "574bbe92e6f50b4a7b2391a779486feb3fe311d4f48bab8eea2ffe512f34e2ff",
+    .hash = "aef28b4ce0d64069294f23c4581758b88e4ac3ac4450c49c45ae01922763666e",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -8260,6 +8483,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic5_kernels,
 };

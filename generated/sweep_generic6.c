@@ -50,6 +50,10 @@ int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
+int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
 int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
     const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
     real *restrict D, real *restrict one);
@@ -6076,6 +6080,228 @@ static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
     {"row", 6, "", 0, 0},
 };
 
+/* a direction of a hinge with 6 free speeds, which turns about constant axes
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  H[6][6]
+ * in  w[3]
+ * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  d_u[6]
+ * in  d_s[6]
+ * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[6] change of the laws' efforts
+ * out B[9] motion along the direction
+ * out G[6] change of the load that is carried
+ * out row[6] change of the rows by load, rotors and laws
+ */
+int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+    const real *restrict w, const real *restrict Q, const real *restrict f,
+    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
+    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+{
+    const real t0 = H[18] * d_u[0];
+    const real t1 = H[19] * d_u[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[20] * d_u[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[21] * d_u[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[22] * d_u[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[23] * d_u[5];
+    const real t10 = t8 + t9;
+    const real t11 = theta[2] * Q[1];
+    const real t12 = theta[1] * Q[2];
+    const real t13 = t11 - t12;
+    const real t14 = t10 + t13;
+    B[0] = t14;
+    const real t15 = H[24] * d_u[0];
+    const real t16 = H[25] * d_u[1];
+    const real t17 = t15 + t16;
+    const real t18 = H[26] * d_u[2];
+    const real t19 = t17 + t18;
+    const real t20 = H[27] * d_u[3];
+    const real t21 = t19 + t20;
+    const real t22 = H[28] * d_u[4];
+    const real t23 = t21 + t22;
+    const real t24 = H[29] * d_u[5];
+    const real t25 = t23 + t24;
+    const real t26 = theta[0] * Q[2];
+    const real t27 = theta[2] * Q[0];
+    const real t28 = t26 - t27;
+    const real t29 = t25 + t28;
+    B[1] = t29;
+    const real t30 = H[30] * d_u[0];
+    const real t31 = H[31] * d_u[1];
+    const real t32 = t30 + t31;
+    const real t33 = H[32] * d_u[2];
+    const real t34 = t32 + t33;
+    const real t35 = H[33] * d_u[3];
+    const real t36 = t34 + t35;
+    const real t37 = H[34] * d_u[4];
+    const real t38 = t36 + t37;
+    const real t39 = H[35] * d_u[5];
+    const real t40 = t38 + t39;
+    const real t41 = theta[1] * Q[0];
+    const real t42 = theta[0] * Q[1];
+    const real t43 = t41 - t42;
+    const real t44 = t40 + t43;
+    B[2] = t44;
+    const real t45 = w[2] * t28;
+    const real t46 = w[1] * t43;
+    const real t47 = t45 - t46;
+    const real t48 = H[18] * d_s[0];
+    const real t49 = H[19] * d_s[1];
+    const real t50 = t48 + t49;
+    const real t51 = H[20] * d_s[2];
+    const real t52 = t50 + t51;
+    const real t53 = H[21] * d_s[3];
+    const real t54 = t52 + t53;
+    const real t55 = H[22] * d_s[4];
+    const real t56 = t54 + t55;
+    const real t57 = H[23] * d_s[5];
+    const real t58 = t56 + t57;
+    const real t59 = theta[2] * Q[4];
+    const real t60 = Q[1] * t40;
+    const real t61 = Q[2] * t25;
+    const real t62 = t60 - t61;
+    const real t63 = t59 + t62;
+    const real t64 = theta[1] * Q[5];
+    const real t65 = t63 - t64;
+    const real t66 = t58 + t65;
+    const real t67 = t47 + t66;
+    B[3] = t67;
+    const real t68 = w[0] * t43;
+    const real t69 = w[2] * t13;
+    const real t70 = t68 - t69;
+    const real t71 = H[24] * d_s[0];
+    const real t72 = H[25] * d_s[1];
+    const real t73 = t71 + t72;
+    const real t74 = H[26] * d_s[2];
+    const real t75 = t73 + t74;
+    const real t76 = H[27] * d_s[3];
+    const real t77 = t75 + t76;
+    const real t78 = H[28] * d_s[4];
+    const real t79 = t77 + t78;
+    const real t80 = H[29] * d_s[5];
+    const real t81 = t79 + t80;
+    const real t82 = theta[0] * Q[5];
+    const real t83 = Q[2] * t10;
+    const real t84 = Q[0] * t40;
+    const real t85 = t83 - t84;
+    const real t86 = theta[2] * Q[3];
+    const real t87 = t85 - t86;
+    const real t88 = t82 + t87;
+    const real t89 = t81 + t88;
+    const real t90 = t70 + t89;
+    B[4] = t90;
+    const real t91 = w[1] * t13;
+    const real t92 = w[0] * t28;
+    const real t93 = t91 - t92;
+    const real t94 = H[30] * d_s[0];
+    const real t95 = H[31] * d_s[1];
+    const real t96 = t94 + t95;
+    const real t97 = H[32] * d_s[2];
+    const real t98 = t96 + t97;
+    const real t99 = H[33] * d_s[3];
+    const real t100 = t98 + t99;
+    const real t101 = H[34] * d_s[4];
+    const real t102 = t100 + t101;
+    const real t103 = H[35] * d_s[5];
+    const real t104 = t102 + t103;
+    const real t105 = theta[1] * Q[3];
+    const real t106 = Q[0] * t25;
+    const real t107 = Q[1] * t10;
+    const real t108 = t106 - t107;
+    const real t109 = t105 + t108;
+    const real t110 = theta[0] * Q[4];
+    const real t111 = t109 - t110;
+    const real t112 = t104 + t111;
+    const real t113 = t93 + t112;
+    B[5] = t113;
+    const real t114 = theta[2] * Q[7];
+    const real t115 = theta[1] * Q[8];
+    const real t116 = t114 - t115;
+    B[6] = t116;
+    const real t117 = theta[0] * Q[8];
+    const real t118 = theta[2] * Q[6];
+    const real t119 = t117 - t118;
+    B[7] = t119;
+    const real t120 = theta[1] * Q[6];
+    const real t121 = theta[0] * Q[7];
+    const real t122 = t120 - t121;
+    B[8] = t122;
+    const real t123 = theta[1] * f[2];
+    const real t124 = theta[2] * f[1];
+    const real t125 = t123 - t124;
+    G[0] = t125;
+    const real t126 = theta[2] * f[0];
+    const real t127 = theta[0] * f[2];
+    const real t128 = t126 - t127;
+    G[1] = t128;
+    const real t129 = theta[0] * f[1];
+    const real t130 = theta[1] * f[0];
+    const real t131 = t129 - t130;
+    G[2] = t131;
+    const real t132 = theta[1] * f[5];
+    const real t133 = theta[2] * f[4];
+    const real t134 = t132 - t133;
+    G[3] = t134;
+    const real t135 = theta[2] * f[3];
+    const real t136 = theta[0] * f[5];
+    const real t137 = t135 - t136;
+    G[4] = t137;
+    const real t138 = theta[0] * f[4];
+    const real t139 = theta[1] * f[3];
+    const real t140 = t138 - t139;
+    G[5] = t140;
+    const real t141 = d_s[0] * J[0];
+    const real t142 = t141 - laws[0];
+    row[0] = t142;
+    const real t143 = d_s[1] * J[1];
+    const real t144 = t143 - laws[1];
+    row[1] = t144;
+    const real t145 = d_s[2] * J[2];
+    const real t146 = t145 - laws[2];
+    row[2] = t146;
+    const real t147 = d_s[3] * J[3];
+    const real t148 = t147 - laws[3];
+    row[3] = t148;
+    const real t149 = d_s[4] * J[4];
+    const real t150 = t149 - laws[4];
+    row[4] = t150;
+    const real t151 = d_s[5] * J[5];
+    const real t152 = t151 - laws[5];
+    row[5] = t152;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_tangent_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_tangent_turning_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"H", 36, "", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"Q", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"d_u", 6, "", 0, 0},
+    {"d_s", 6, "", 0, 0},
+    {"J", 6, "kg*m2 or kg", 0, 0},
+    {"laws", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_tangent_turning_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"row", 6, "", 0, 0},
+};
+
 /* rows of a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -9539,6 +9765,18 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "tangent_turning",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_turning,
+        .call = mstmm_sweep_generic6_tangent_turning_call,
+        .n_inputs = 9,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_generic6_tangent_turning_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_turning_outputs,
+        .ir_hash = "e8c8fe220feee68925969ce249e127cc88106eb62260b0c8462daecb87063c71",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_rows",
         .function = (void (*)(void))mstmm_sweep_generic6_tangent_rows,
         .call = mstmm_sweep_generic6_tangent_rows_call,
@@ -9640,7 +9878,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "32647c5e43c4a9d8c89ba54c21adfd7ef5ebaf6e40ebae473719a96b504dafd2",
+    .hash = "4771004abbb7f80902153beff74727a65a58d867db2f53d2b5a2539d64bd0cd1",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -9650,6 +9888,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 20,
+    .n_kernels = 21,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -148,6 +148,16 @@ mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[] 
     mstmm_sweep_generic6_tangent_steady,
 };
 
+mstmm_generic_tangent_turning_kernel *const mstmm_generic_tangent_turning_table[] = {
+    NULL,
+    mstmm_sweep_generic1_tangent_turning,
+    mstmm_sweep_generic2_tangent_turning,
+    mstmm_sweep_generic3_tangent_turning,
+    mstmm_sweep_generic4_tangent_turning,
+    mstmm_sweep_generic5_tangent_turning,
+    mstmm_sweep_generic6_tangent_turning,
+};
+
 mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[] = {
     NULL,
     mstmm_sweep_generic1_tangent_rows,
@@ -1860,7 +1870,17 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                     .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
                     .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
             }
-            if (body->steady) {
+            if (body->turning) {
+                mstmm_generic_tangent_turning(nu,
+                    .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                    .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
+                    .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
+            }
+            if (body->steady && !body->turning) {
                 mstmm_generic_tangent_steady(nu,
                     .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
@@ -2334,7 +2354,19 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
             .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
     }
-    if (!body->section && speeds && body->steady) {
+    if (!body->section && speeds && body->turning) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_generic_tangent_turning(nu,
+            .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+            .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
+            .J = body->rotor, .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+    }
+    if (!body->section && speeds && body->steady && !body->turning) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;

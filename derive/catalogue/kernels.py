@@ -40,9 +40,10 @@ FRAME_DERIVATIONS = (
 #: Steps of the tangent for hinges with any number of speeds, and for those that have some.
 _ALONG_HINGES = (tangent_hinge.tangent_carrier, tangent_hinge.tangent_column)
 _OF_SPEEDS = (
-    tangent_hinge.tangent_along, tangent_hinge.tangent_steady, tangent_hinge.tangent_rows,
-    tangent_hinge.tangent_reduce, tangent_hinge.tangent_push, tangent_hinge.tangent_answer,
-    tangent_hinge.tangent_push_known, tangent_hinge.tangent_answer_known,
+    tangent_hinge.tangent_along, tangent_hinge.tangent_steady, tangent_hinge.tangent_turning,
+    tangent_hinge.tangent_rows, tangent_hinge.tangent_reduce, tangent_hinge.tangent_push,
+    tangent_hinge.tangent_answer, tangent_hinge.tangent_push_known,
+    tangent_hinge.tangent_answer_known,
 )  # fmt: skip
 
 #: Largest number of speeds of a hinge.

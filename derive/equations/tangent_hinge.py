@@ -101,11 +101,20 @@ def tangent_carrier(nu: int) -> Derivation:
     )
 
 
+_NOTHING = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
+
+
 def _along(
-    v: sp.MatrixSymbol, w: sp.MatrixSymbol, d_v: sp.Basic, d_w: sp.Basic, d_c: sp.MatrixSymbol
+    v: sp.MatrixBase,
+    w: sp.MatrixSymbol,
+    d_v: sp.MatrixBase,
+    d_w: sp.Basic,
+    d_c: tuple[sp.Basic, sp.Basic],
+    place: sp.MatrixBase | None = None,
 ) -> tuple[Equation, ...]:
     """B and G by the changes of what is across the hinge."""
-    turn, place = tilde(column(TURN.symbol)), column(PLACE.symbol)
+    turn = tilde(column(TURN.symbol))
+    place = column(PLACE.symbol) if place is None else place
     turning, rate, seen = (part(_OF_Q.symbol, 3 * k) for k in range(3))
     d_turning = symbol("dw_Q", 3)
     relative, own = tilde(column(w)), tilde(turning)
@@ -118,12 +127,12 @@ def _along(
             b,
             stack(
                 d_w + d_turning,
-                part(d_c, 3) - turn * rate - relative * d_turning + own * d_w,
-                part(d_c, 0)
+                d_c[1] - turn * rate - relative * d_turning + own * d_w,
+                d_c[0]
                 - turn * seen
                 + tilde(rate) * place
                 + own * (own * place)
-                + 2 * (own * d_v - tilde(column(v)) * d_turning),
+                + 2 * (own * d_v - tilde(v) * d_turning),
             ),
         ),
         Equation("G", g, stack(turn * force, turn * moment + tilde(place) * force)),
@@ -165,7 +174,7 @@ def tangent_column(nu: int) -> Derivation:
     more, row, rows = _row(nu, d_h.T * _LOAD.symbol)
     equations = (
         Equation("slope of the own acceleration", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
-        *_along(v, w, column(d_v), column(d_w), d_bias),
+        *_along(column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))),
     )
     return Derivation(
         f"generic{nu}",
@@ -199,11 +208,33 @@ def tangent_steady(nu: int) -> Derivation:
             Equation(
                 "slope of the own acceleration", d_bias, stack(part(own, 0) + turned, part(own, 3))
             ),
-            *_along(v, w, column(d_v), column(d_w), d_bias),
+            *_along(
+                column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))
+            ),
             rows,
         ),
         sources=SOURCES,
     )  # fmt: skip
+
+
+def tangent_turning(nu: int) -> Derivation:
+    """`tangent_steady` of a hinge that turns alone: its v, H_v and change of place are zero."""
+    h, w, d_u, d_s = symbol("H", 6, nu), symbol("w", 3), symbol("d_u", nu), symbol("d_s", nu)
+    d_w, own = symbol("d_w", 3), symbol("own", 3)
+    more, row, rows = _row(nu, None)
+    return Derivation(
+        f"generic{nu}",
+        f"a direction of a hinge with {free_speeds(nu)}, which turns about constant axes",
+        (TURN, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *more),
+        (*_COLUMN, row),
+        (
+            Equation("slope of w", d_w, h[3:, :] * d_u),
+            Equation("H_w ds", own, h[3:, :] * d_s),
+            *_along(_NOTHING, w, _NOTHING, column(d_w), (_NOTHING, column(own)), _NOTHING),
+            rows,
+        ),
+        sources=SOURCES,
+    )
 
 
 # --- the unknowns of a hinge --------------------------------------------------------------------

@@ -75,8 +75,8 @@ MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
     "forward_slope", "effort_slope", "tangent_carrier", "tangent_column", "tangent_along",
-    "tangent_steady", "tangent_rows", "tangent_reduce", "tangent_push", "tangent_answer",
-    "tangent_push_known", "tangent_answer_known",
+    "tangent_steady", "tangent_turning", "tangent_rows", "tangent_reduce", "tangent_push",
+    "tangent_answer", "tangent_push_known", "tangent_answer_known",
 )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ _TRAITS = {
     "valued": "model->n_values",
     "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
     "driving": "(!state->given || state->residual)", "curved": "!body->straight",
-    "steady": "body->steady",
+    "steady": "body->steady", "turning": "body->turning",
     "moving": "!body->section && speeds", "product": "model->product",
     "coordinate": "law->kind == 0", "effort": "force->effort",
 }  # fmt: skip

@@ -156,13 +156,15 @@ def _section(matrices: str) -> tuple[Step, ...]:
 def _along_hinge(b: str, g: str, laws: str) -> tuple[Step, ...]:
     """Where the derivatives of a hinge point; its rows in local.change."""
     column = _column(b, g, laws)
+    turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
         Do(whole=sloped(_HINGE_MOTION), when="!steady"),
         Do(whole=sloped(_HINGE_MOTION), when="steady curved"),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_TURNED),
         replace(_TURN, when="curved"),
-        call("generic{nu}.tangent_steady", when="steady", **column, d_u=D + "body.u"),
+        call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
+        call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
         call("generic{nu}.tangent_column", when="!steady", **column, **_CHANGES),
     )  # fmt: skip
 

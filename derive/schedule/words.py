@@ -257,6 +257,7 @@ TRAITS: dict[str, str] = {
     "driving": "drives give accelerations: none are given, or a residual is asked for",
     "moving": "a hinge, some speed of which is not imposed",
     "curved": "the rates of the coordinates are not the speeds",
+    "turning": "the hinge is steady and has turns alone",
     "steady": "the motions of the hinge are the same in every position, seen from the body",
     "linked": "runs of links are swept as such",
     "laws": "there are laws",

@@ -97,8 +97,8 @@ class Bodies:
         rotor, imposed = _rotor_and_imposed(hinge, slots)
         return BodyNumbers(
             ("hinge", kernel_type(hinge, self.releases)), ("body", body.type), slots.nq, slots.nu,
-            slots.straight, slots.steady, connection, link, place.height, hinge_p, body_p,
-            body_frame, rotor, imposed, self.releases.get(hinge.name, -1), modal, section,
+            slots.straight, slots.steady, slots.turning, connection, link, place.height, hinge_p,
+            body_p, body_frame, rotor, imposed, self.releases.get(hinge.name, -1), modal, section,
             body.name in self.expanded.idle,
         )  # fmt: skip
 

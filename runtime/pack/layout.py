@@ -42,6 +42,7 @@ class HingeSlots:
     quaternion: int | None  # first quaternion entry within the hinge
     straight: bool  # the speeds are the rates of the coordinates
     steady: bool  # the motions are the same in every position, seen from the outboard body
+    turning: bool  # and they are turns alone
 
     @property
     def nq(self) -> int:
@@ -146,7 +147,7 @@ class Layout:
         return HingeSlots(
             self._numbers.name(hinge), one.type, one.q + repeats * group.nq,
             one.u + repeats * group.nu, one.q_names, one.q_units, one.u_names, one.u_units,
-            one.quaternion, one.straight, one.steady,
+            one.quaternion, one.straight, one.steady, one.turning,
         )  # fmt: skip
 
     @cached_property

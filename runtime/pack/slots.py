@@ -39,8 +39,8 @@ def layout_of(expanded: Expanded, releases: Mapping[str, int], elements: Element
         rates = tuple(f"{unit}/s" for unit in units)
         speeds = tuple(f"{mode}_rate" for mode in body.modes)
         modal[name] = HingeSlots(
-            name, "modes", q, u, body.modes, units, speeds, rates, None, True, True
-        )
+            name, "modes", q, u, body.modes, units, speeds, rates, None, True, True, False
+        )  # fmt: skip
         q, u = q + n, u + n
     internal = range(len(expanded.described.hinge), len(scene.hinge))
     return Layout(scene, tuple(groups), q, u, modal, internal)
@@ -55,7 +55,7 @@ def _slots(
     assert facts is not None  # or the element would not be known
     return HingeSlots(
         hinge.name, hinge.type, q, u, *_texts(facts.coordinates), *_texts(facts.speeds),
-        facts.quaternion, facts.straight, facts.steady,
+        facts.quaternion, facts.straight, facts.steady, facts.steady and not facts.slides,
     )  # fmt: skip
 
 

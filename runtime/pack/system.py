@@ -71,7 +71,8 @@ class BodyNumbers:
     """A body with its inboard hinge, but for its place in the tree.
 
     `straight` says that the rates of the hinge's coordinates are its speeds, `steady` that its
-    motions are the same in every position, seen from the outboard body.
+    motions are the same in every position, seen from the outboard body, `turning` that they are
+    turns alone besides.
     `connection` is Rt (9) and ro (3), `link` the same as screws about x and z where it can be one
     (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
     `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
@@ -85,6 +86,7 @@ class BodyNumbers:
     nu: int
     straight: bool
     steady: bool
+    turning: bool
     connection: Numbers
     link: Numbers
     height: float

@@ -55,6 +55,7 @@ typedef struct {
     const mstmm_tape *slope_tape; /* and its derivative */
     int straight;     /* the rates of the coordinates are the speeds */
     int steady;       /* H is the same in every position */
+    int turning;      /* and has turns alone */
     int64_t tangent;  /* of its numbers in those of the tangent */
     mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
     mstmm_section *section; /* its connection is a section of a flexible body; else NULL */

@@ -69,6 +69,7 @@ class BodyRecords:
         """Numbers, and the kernels that read them."""
         record.nq, record.nu, record.held[2] = body.nq, body.nu, -body.height
         record.straight, record.steady = int(body.straight), int(body.steady)
+        record.turning = int(body.turning)
         record.release, record.idle = body.release, int(body.idle)
         record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
         self._numbers(record, body)
