@@ -596,8 +596,10 @@ int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -639,8 +641,10 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -714,8 +718,10 @@ int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic2_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic2_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -789,8 +795,10 @@ int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic3_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic3_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -864,8 +872,10 @@ int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic4_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic4_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -939,8 +949,10 @@ int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic5_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic5_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -1014,8 +1026,10 @@ int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic6_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic6_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -1226,6 +1240,10 @@ int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restric
 int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
     const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
     real *restrict work);
+int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+    const real *restrict rate, const real *restrict sq, real *restrict S_ff);
+int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict e_f);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,

@@ -904,6 +904,36 @@ static inline int mstmm_modal_answer_by(struct mstmm_modal_answer to)
 }
 #define mstmm_modal_answer(...) mstmm_modal_answer_by((struct mstmm_modal_answer){__VA_ARGS__})
 
+struct mstmm_modal_stiffened {
+    int n;
+    const real *K;
+    const real *D;
+    const real *rate;
+    const real *sq;
+    real *S_ff;
+};
+static inline int mstmm_modal_stiffened_by(struct mstmm_modal_stiffened to)
+{
+    return mstmm_sweep_modal_stiffened(
+        to.n, to.K, to.D, to.rate, to.sq, to.S_ff);
+}
+#define mstmm_modal_stiffened(...) mstmm_modal_stiffened_by((struct mstmm_modal_stiffened){__VA_ARGS__})
+
+struct mstmm_modal_strained {
+    int n;
+    const real *K;
+    const real *D;
+    const real *eta;
+    const real *etad;
+    real *e_f;
+};
+static inline int mstmm_modal_strained_by(struct mstmm_modal_strained to)
+{
+    return mstmm_sweep_modal_strained(
+        to.n, to.K, to.D, to.eta, to.etad, to.e_f);
+}
+#define mstmm_modal_strained(...) mstmm_modal_strained_by((struct mstmm_modal_strained){__VA_ARGS__})
+
 struct mstmm_modal_residual_slope {
     int n;
     const real *p;
@@ -2066,18 +2096,26 @@ static inline int mstmm_generic_project_by(int speeds, struct mstmm_generic_proj
 #define mstmm_generic_project(speeds, ...) mstmm_generic_project_by(speeds, (struct mstmm_generic_project){__VA_ARGS__})
 
 struct mstmm_generic_factor {
+    const real *Rc;
+    const real *r;
     const real *H;
     const real *J;
+    const real *W;
+    const real *floor_;
     const real *S;
     real *F;
+    real *G;
+    real *S_I;
 };
 typedef int mstmm_generic_factor_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict, real *restrict);
 extern mstmm_generic_factor_kernel *const mstmm_generic_factor_table[];
 static inline int mstmm_generic_factor_by(int speeds, struct mstmm_generic_factor to)
 {
     return mstmm_generic_factor_table[speeds](
-        to.H, to.J, to.S, to.F);
+        to.Rc, to.r, to.H, to.J, to.W, to.floor_, to.S, to.F, to.G, to.S_I);
 }
 #define mstmm_generic_factor(speeds, ...) mstmm_generic_factor_by(speeds, (struct mstmm_generic_factor){__VA_ARGS__})
 

@@ -25,8 +25,10 @@ int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -940,38 +942,396 @@ static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
     {"udot", 0, "", 0, 0},
 };
 
-/* factor of D of a hinge with no free speeds
+/* S carried across a hinge with no free speeds, and the factor of D
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
  * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  W[0][0] change of the efforts of laws, a row a speed
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[0][0] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out G[0][6] D^-1 H^T S
+ * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic0_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F)
+int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I)
 {
     (void)H;
     (void)J;
-    (void)S;
+    (void)W;
+    (void)floor_;
     (void)F;
+    (void)G;
+    const real t0 = Rc[0] * S[0];
+    const real t1 = Rc[1] * S[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[2] * S[2];
+    const real t4 = t2 + t3;
+    const real t5 = Rc[0] * t4;
+    const real t6 = Rc[0] * S[1];
+    const real t7 = Rc[1] * S[6];
+    const real t8 = t6 + t7;
+    const real t9 = Rc[2] * S[7];
+    const real t10 = t8 + t9;
+    const real t11 = Rc[1] * t10;
+    const real t12 = t5 + t11;
+    const real t13 = Rc[0] * S[2];
+    const real t14 = Rc[1] * S[7];
+    const real t15 = t13 + t14;
+    const real t16 = Rc[2] * S[11];
+    const real t17 = t15 + t16;
+    const real t18 = Rc[2] * t17;
+    const real t19 = t12 + t18;
+    S_I[0] += t19;
+    const real t20 = Rc[3] * t4;
+    const real t21 = Rc[4] * t10;
+    const real t22 = t20 + t21;
+    const real t23 = Rc[5] * t17;
+    const real t24 = t22 + t23;
+    S_I[1] += t24;
+    const real t25 = Rc[6] * t4;
+    const real t26 = Rc[7] * t10;
+    const real t27 = t25 + t26;
+    const real t28 = Rc[8] * t17;
+    const real t29 = t27 + t28;
+    S_I[2] += t29;
+    const real t30 = Rc[0] * S[3];
+    const real t31 = Rc[1] * S[8];
+    const real t32 = t30 + t31;
+    const real t33 = Rc[2] * S[12];
+    const real t34 = t32 + t33;
+    const real t35 = Rc[0] * t34;
+    const real t36 = Rc[0] * S[4];
+    const real t37 = Rc[1] * S[9];
+    const real t38 = t36 + t37;
+    const real t39 = Rc[2] * S[13];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[1] * t40;
+    const real t42 = t35 + t41;
+    const real t43 = Rc[0] * S[5];
+    const real t44 = Rc[1] * S[10];
+    const real t45 = t43 + t44;
+    const real t46 = Rc[2] * S[14];
+    const real t47 = t45 + t46;
+    const real t48 = Rc[2] * t47;
+    const real t49 = t42 + t48;
+    const real t50 = r[1] * t29;
+    const real t51 = r[2] * t24;
+    const real t52 = t50 - t51;
+    const real t53 = t49 + t52;
+    S_I[3] += t53;
+    const real t54 = Rc[3] * t34;
+    const real t55 = Rc[4] * t40;
+    const real t56 = t54 + t55;
+    const real t57 = Rc[5] * t47;
+    const real t58 = t56 + t57;
+    const real t59 = r[2] * t19;
+    const real t60 = r[0] * t29;
+    const real t61 = t59 - t60;
+    const real t62 = t58 + t61;
+    S_I[4] += t62;
+    const real t63 = Rc[6] * t34;
+    const real t64 = Rc[7] * t40;
+    const real t65 = t63 + t64;
+    const real t66 = Rc[8] * t47;
+    const real t67 = t65 + t66;
+    const real t68 = r[0] * t24;
+    const real t69 = r[1] * t19;
+    const real t70 = t68 - t69;
+    const real t71 = t67 + t70;
+    S_I[5] += t71;
+    const real t72 = Rc[3] * S[0];
+    const real t73 = Rc[4] * S[1];
+    const real t74 = t72 + t73;
+    const real t75 = Rc[5] * S[2];
+    const real t76 = t74 + t75;
+    const real t77 = Rc[3] * t76;
+    const real t78 = Rc[3] * S[1];
+    const real t79 = Rc[4] * S[6];
+    const real t80 = t78 + t79;
+    const real t81 = Rc[5] * S[7];
+    const real t82 = t80 + t81;
+    const real t83 = Rc[4] * t82;
+    const real t84 = t77 + t83;
+    const real t85 = Rc[3] * S[2];
+    const real t86 = Rc[4] * S[7];
+    const real t87 = t85 + t86;
+    const real t88 = Rc[5] * S[11];
+    const real t89 = t87 + t88;
+    const real t90 = Rc[5] * t89;
+    const real t91 = t84 + t90;
+    S_I[6] += t91;
+    const real t92 = Rc[6] * t76;
+    const real t93 = Rc[7] * t82;
+    const real t94 = t92 + t93;
+    const real t95 = Rc[8] * t89;
+    const real t96 = t94 + t95;
+    S_I[7] += t96;
+    const real t97 = Rc[3] * S[3];
+    const real t98 = Rc[4] * S[8];
+    const real t99 = t97 + t98;
+    const real t100 = Rc[5] * S[12];
+    const real t101 = t99 + t100;
+    const real t102 = Rc[0] * t101;
+    const real t103 = Rc[3] * S[4];
+    const real t104 = Rc[4] * S[9];
+    const real t105 = t103 + t104;
+    const real t106 = Rc[5] * S[13];
+    const real t107 = t105 + t106;
+    const real t108 = Rc[1] * t107;
+    const real t109 = t102 + t108;
+    const real t110 = Rc[3] * S[5];
+    const real t111 = Rc[4] * S[10];
+    const real t112 = t110 + t111;
+    const real t113 = Rc[5] * S[14];
+    const real t114 = t112 + t113;
+    const real t115 = Rc[2] * t114;
+    const real t116 = t109 + t115;
+    const real t117 = r[1] * t96;
+    const real t118 = r[2] * t91;
+    const real t119 = t117 - t118;
+    const real t120 = t116 + t119;
+    S_I[8] += t120;
+    const real t121 = Rc[3] * t101;
+    const real t122 = Rc[4] * t107;
+    const real t123 = t121 + t122;
+    const real t124 = Rc[5] * t114;
+    const real t125 = t123 + t124;
+    const real t126 = r[0] * t96;
+    const real t127 = t51 - t126;
+    const real t128 = t125 + t127;
+    S_I[9] += t128;
+    const real t129 = Rc[6] * t101;
+    const real t130 = Rc[7] * t107;
+    const real t131 = t129 + t130;
+    const real t132 = Rc[8] * t114;
+    const real t133 = t131 + t132;
+    const real t134 = r[0] * t91;
+    const real t135 = r[1] * t24;
+    const real t136 = t134 - t135;
+    const real t137 = t133 + t136;
+    S_I[10] += t137;
+    const real t138 = Rc[6] * S[0];
+    const real t139 = Rc[7] * S[1];
+    const real t140 = t138 + t139;
+    const real t141 = Rc[8] * S[2];
+    const real t142 = t140 + t141;
+    const real t143 = Rc[6] * t142;
+    const real t144 = Rc[6] * S[1];
+    const real t145 = Rc[7] * S[6];
+    const real t146 = t144 + t145;
+    const real t147 = Rc[8] * S[7];
+    const real t148 = t146 + t147;
+    const real t149 = Rc[7] * t148;
+    const real t150 = t143 + t149;
+    const real t151 = Rc[6] * S[2];
+    const real t152 = Rc[7] * S[7];
+    const real t153 = t151 + t152;
+    const real t154 = Rc[8] * S[11];
+    const real t155 = t153 + t154;
+    const real t156 = Rc[8] * t155;
+    const real t157 = t150 + t156;
+    S_I[11] += t157;
+    const real t158 = Rc[6] * S[3];
+    const real t159 = Rc[7] * S[8];
+    const real t160 = t158 + t159;
+    const real t161 = Rc[8] * S[12];
+    const real t162 = t160 + t161;
+    const real t163 = Rc[0] * t162;
+    const real t164 = Rc[6] * S[4];
+    const real t165 = Rc[7] * S[9];
+    const real t166 = t164 + t165;
+    const real t167 = Rc[8] * S[13];
+    const real t168 = t166 + t167;
+    const real t169 = Rc[1] * t168;
+    const real t170 = t163 + t169;
+    const real t171 = Rc[6] * S[5];
+    const real t172 = Rc[7] * S[10];
+    const real t173 = t171 + t172;
+    const real t174 = Rc[8] * S[14];
+    const real t175 = t173 + t174;
+    const real t176 = Rc[2] * t175;
+    const real t177 = t170 + t176;
+    const real t178 = r[1] * t157;
+    const real t179 = r[2] * t96;
+    const real t180 = t178 - t179;
+    const real t181 = t177 + t180;
+    S_I[12] += t181;
+    const real t182 = Rc[3] * t162;
+    const real t183 = Rc[4] * t168;
+    const real t184 = t182 + t183;
+    const real t185 = Rc[5] * t175;
+    const real t186 = t184 + t185;
+    const real t187 = r[2] * t29;
+    const real t188 = r[0] * t157;
+    const real t189 = t187 - t188;
+    const real t190 = t186 + t189;
+    S_I[13] += t190;
+    const real t191 = Rc[6] * t162;
+    const real t192 = Rc[7] * t168;
+    const real t193 = t191 + t192;
+    const real t194 = Rc[8] * t175;
+    const real t195 = t193 + t194;
+    const real t196 = t126 - t50;
+    const real t197 = t195 + t196;
+    S_I[14] += t197;
+    const real t198 = Rc[0] * S[15];
+    const real t199 = Rc[1] * S[16];
+    const real t200 = t198 + t199;
+    const real t201 = Rc[2] * S[17];
+    const real t202 = t200 + t201;
+    const real t203 = Rc[0] * t202;
+    const real t204 = Rc[0] * S[16];
+    const real t205 = Rc[1] * S[18];
+    const real t206 = t204 + t205;
+    const real t207 = Rc[2] * S[19];
+    const real t208 = t206 + t207;
+    const real t209 = Rc[1] * t208;
+    const real t210 = t203 + t209;
+    const real t211 = Rc[0] * S[17];
+    const real t212 = Rc[1] * S[19];
+    const real t213 = t211 + t212;
+    const real t214 = Rc[2] * S[20];
+    const real t215 = t213 + t214;
+    const real t216 = Rc[2] * t215;
+    const real t217 = t210 + t216;
+    const real t218 = r[1] * t181;
+    const real t219 = r[2] * t120;
+    const real t220 = t218 - t219;
+    const real t221 = r[1] * t177;
+    const real t222 = r[2] * t116;
+    const real t223 = t221 - t222;
+    const real t224 = t220 + t223;
+    const real t225 = t217 + t224;
+    S_I[15] += t225;
+    const real t226 = Rc[3] * t202;
+    const real t227 = Rc[4] * t208;
+    const real t228 = t226 + t227;
+    const real t229 = Rc[5] * t215;
+    const real t230 = t228 + t229;
+    const real t231 = r[1] * t190;
+    const real t232 = r[2] * t128;
+    const real t233 = t231 - t232;
+    const real t234 = r[2] * t49;
+    const real t235 = r[0] * t177;
+    const real t236 = t234 - t235;
+    const real t237 = t233 + t236;
+    const real t238 = t230 + t237;
+    S_I[16] += t238;
+    const real t239 = Rc[6] * t202;
+    const real t240 = Rc[7] * t208;
+    const real t241 = t239 + t240;
+    const real t242 = Rc[8] * t215;
+    const real t243 = t241 + t242;
+    const real t244 = r[1] * t197;
+    const real t245 = r[2] * t137;
+    const real t246 = t244 - t245;
+    const real t247 = r[0] * t116;
+    const real t248 = r[1] * t49;
+    const real t249 = t247 - t248;
+    const real t250 = t246 + t249;
+    const real t251 = t243 + t250;
+    S_I[17] += t251;
+    const real t252 = Rc[3] * S[15];
+    const real t253 = Rc[4] * S[16];
+    const real t254 = t252 + t253;
+    const real t255 = Rc[5] * S[17];
+    const real t256 = t254 + t255;
+    const real t257 = Rc[3] * t256;
+    const real t258 = Rc[3] * S[16];
+    const real t259 = Rc[4] * S[18];
+    const real t260 = t258 + t259;
+    const real t261 = Rc[5] * S[19];
+    const real t262 = t260 + t261;
+    const real t263 = Rc[4] * t262;
+    const real t264 = t257 + t263;
+    const real t265 = Rc[3] * S[17];
+    const real t266 = Rc[4] * S[19];
+    const real t267 = t265 + t266;
+    const real t268 = Rc[5] * S[20];
+    const real t269 = t267 + t268;
+    const real t270 = Rc[5] * t269;
+    const real t271 = t264 + t270;
+    const real t272 = r[2] * t62;
+    const real t273 = r[0] * t190;
+    const real t274 = t272 - t273;
+    const real t275 = r[2] * t58;
+    const real t276 = r[0] * t186;
+    const real t277 = t275 - t276;
+    const real t278 = t274 + t277;
+    const real t279 = t271 + t278;
+    S_I[18] += t279;
+    const real t280 = Rc[6] * t256;
+    const real t281 = Rc[7] * t262;
+    const real t282 = t280 + t281;
+    const real t283 = Rc[8] * t269;
+    const real t284 = t282 + t283;
+    const real t285 = r[2] * t71;
+    const real t286 = r[0] * t197;
+    const real t287 = t285 - t286;
+    const real t288 = r[0] * t125;
+    const real t289 = r[1] * t58;
+    const real t290 = t288 - t289;
+    const real t291 = t287 + t290;
+    const real t292 = t284 + t291;
+    S_I[19] += t292;
+    const real t293 = Rc[6] * S[15];
+    const real t294 = Rc[7] * S[16];
+    const real t295 = t293 + t294;
+    const real t296 = Rc[8] * S[17];
+    const real t297 = t295 + t296;
+    const real t298 = Rc[6] * t297;
+    const real t299 = Rc[6] * S[16];
+    const real t300 = Rc[7] * S[18];
+    const real t301 = t299 + t300;
+    const real t302 = Rc[8] * S[19];
+    const real t303 = t301 + t302;
+    const real t304 = Rc[7] * t303;
+    const real t305 = t298 + t304;
+    const real t306 = Rc[6] * S[17];
+    const real t307 = Rc[7] * S[19];
+    const real t308 = t306 + t307;
+    const real t309 = Rc[8] * S[20];
+    const real t310 = t308 + t309;
+    const real t311 = Rc[8] * t310;
+    const real t312 = t305 + t311;
+    const real t313 = r[0] * t137;
+    const real t314 = r[1] * t71;
+    const real t315 = t313 - t314;
+    const real t316 = r[0] * t133;
+    const real t317 = r[1] * t67;
+    const real t318 = t316 - t317;
+    const real t319 = t315 + t318;
+    const real t320 = t312 + t319;
+    S_I[20] += t320;
     return 0;
 }
 
 static int mstmm_sweep_generic0_factor_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic0_factor(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic0_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
 }
 
 static const mstmm_port mstmm_sweep_generic0_factor_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
     {"H", 0, "", 0, 0},
     {"J", 0, "kg*m2 or kg", 0, 0},
+    {"W", 0, "", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
     {"S", 21, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
     {"F", 0, "", 0, 0},
+    {"G", 0, "", 0, 0},
+    {"S_I", 21, "", 1, 0},
 };
 
 /* load of a column carried across a hinge with no free speeds
@@ -2107,11 +2467,11 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .name = "factor",
         .function = (void (*)(void))mstmm_sweep_generic0_factor,
         .call = mstmm_sweep_generic0_factor_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
+        .n_inputs = 7,
+        .n_outputs = 3,
         .inputs = mstmm_sweep_generic0_factor_inputs,
         .outputs = mstmm_sweep_generic0_factor_outputs,
-        .ir_hash = "2e2aad8771362e82c47380b1a427a889180ff28e7895c86871c49bc066a65dd9",
+        .ir_hash = "35f2cb333bc02b3b9496907f0fcde6bb2ad7e87e810fdf5e0aacb2f2eb0ff5bc",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2193,7 +2553,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "8674a131d5d3e5b7c85cc09ed9c60d33fe5f4a5a1e03b7214a83b8531cd4323f",
+    .hash = "a7605df0819bb5deb87a5eaa7ddb5e6abc2c1fa919f72176d85da565ba3b7058",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -26,8 +26,10 @@ int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, 
 int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict delta, const real *restrict delta_I,
     real *restrict udot);
-int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F);
+int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I);
 int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
@@ -1290,16 +1292,24 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
-/* factor of D of a hinge with 1 free speed
+/* S carried across a hinge with 1 free speed, and the factor of D
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  W[1] change of the efforts of laws, a row a speed
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * out G[1][6] D^-1 H^T S
+ * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
-    const real *restrict S, real *restrict F)
+int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict J, const real *restrict W,
+    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
+    real *restrict S_I)
 {
     const real t0 = H[0] * S[0];
     const real t1 = H[1] * S[1];
@@ -1378,32 +1388,461 @@ int mstmm_sweep_generic1_factor(const real *restrict H, const real *restrict J,
     const real t74 = t72 + t73;
     const real t75 = H[5] * t74;
     const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t79 = 1.0 / t77;
-    F[0] = t79;
+    const real t77 = J[0] - W[0];
+    const real t78 = t76 + t77;
+    const real t79 = 0.0 < t78;
+    if (!(t79 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t80 = H[2] * H[2];
+    const real t81 = H[0] * H[0];
+    const real t82 = H[1] * H[1];
+    const real t83 = t81 + t82;
+    const real t84 = t80 + t83;
+    const real t85 = 0.0 < floor_[0];
+    const real t86 = S[0] + S[6];
+    const real t87 = S[11] + t86;
+    const real t88 = ((real)1 / (real)300000000000000) * t87;
+    const real t89 = t85 != 0 ? floor_[0] : t88;
+    const real t90 = t84 * t89;
+    const real t91 = H[5] * H[5];
+    const real t92 = H[3] * H[3];
+    const real t93 = H[4] * H[4];
+    const real t94 = t92 + t93;
+    const real t95 = t91 + t94;
+    const real t96 = 0.0 < floor_[1];
+    const real t97 = S[15] + S[18];
+    const real t98 = S[20] + t97;
+    const real t99 = ((real)1 / (real)300000000000000) * t98;
+    const real t100 = t96 != 0 ? floor_[1] : t99;
+    const real t101 = t95 * t100;
+    const real t102 = t90 + t101;
+    const real t103 = t102 < t78;
+    if (!(t103 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+    const real t104 = 1.0 / t78;
+    F[0] = t104;
+    const real t105 = t10 * t104;
+    G[0] = t105;
+    const real t106 = t22 * t104;
+    G[1] = t106;
+    const real t107 = t35 * t104;
+    G[2] = t107;
+    const real t108 = t48 * t104;
+    G[3] = t108;
+    const real t109 = t61 * t104;
+    G[4] = t109;
+    const real t110 = t74 * t104;
+    G[5] = t110;
+    const real t111 = t10 * t105;
+    const real t112 = S[0] - t111;
+    const real t113 = Rc[0] * t112;
+    const real t114 = t10 * t106;
+    const real t115 = S[1] - t114;
+    const real t116 = Rc[1] * t115;
+    const real t117 = t113 + t116;
+    const real t118 = t10 * t107;
+    const real t119 = S[2] - t118;
+    const real t120 = Rc[2] * t119;
+    const real t121 = t117 + t120;
+    const real t122 = Rc[0] * t121;
+    const real t123 = Rc[0] * t115;
+    const real t124 = t22 * t106;
+    const real t125 = S[6] - t124;
+    const real t126 = Rc[1] * t125;
+    const real t127 = t123 + t126;
+    const real t128 = t22 * t107;
+    const real t129 = S[7] - t128;
+    const real t130 = Rc[2] * t129;
+    const real t131 = t127 + t130;
+    const real t132 = Rc[1] * t131;
+    const real t133 = t122 + t132;
+    const real t134 = Rc[0] * t119;
+    const real t135 = Rc[1] * t129;
+    const real t136 = t134 + t135;
+    const real t137 = t35 * t107;
+    const real t138 = S[11] - t137;
+    const real t139 = Rc[2] * t138;
+    const real t140 = t136 + t139;
+    const real t141 = Rc[2] * t140;
+    const real t142 = t133 + t141;
+    S_I[0] += t142;
+    const real t143 = Rc[3] * t121;
+    const real t144 = Rc[4] * t131;
+    const real t145 = t143 + t144;
+    const real t146 = Rc[5] * t140;
+    const real t147 = t145 + t146;
+    S_I[1] += t147;
+    const real t148 = Rc[6] * t121;
+    const real t149 = Rc[7] * t131;
+    const real t150 = t148 + t149;
+    const real t151 = Rc[8] * t140;
+    const real t152 = t150 + t151;
+    S_I[2] += t152;
+    const real t153 = t10 * t108;
+    const real t154 = S[3] - t153;
+    const real t155 = Rc[0] * t154;
+    const real t156 = t22 * t108;
+    const real t157 = S[8] - t156;
+    const real t158 = Rc[1] * t157;
+    const real t159 = t155 + t158;
+    const real t160 = t35 * t108;
+    const real t161 = S[12] - t160;
+    const real t162 = Rc[2] * t161;
+    const real t163 = t159 + t162;
+    const real t164 = Rc[0] * t163;
+    const real t165 = t10 * t109;
+    const real t166 = S[4] - t165;
+    const real t167 = Rc[0] * t166;
+    const real t168 = t22 * t109;
+    const real t169 = S[9] - t168;
+    const real t170 = Rc[1] * t169;
+    const real t171 = t167 + t170;
+    const real t172 = t35 * t109;
+    const real t173 = S[13] - t172;
+    const real t174 = Rc[2] * t173;
+    const real t175 = t171 + t174;
+    const real t176 = Rc[1] * t175;
+    const real t177 = t164 + t176;
+    const real t178 = t10 * t110;
+    const real t179 = S[5] - t178;
+    const real t180 = Rc[0] * t179;
+    const real t181 = t22 * t110;
+    const real t182 = S[10] - t181;
+    const real t183 = Rc[1] * t182;
+    const real t184 = t180 + t183;
+    const real t185 = t35 * t110;
+    const real t186 = S[14] - t185;
+    const real t187 = Rc[2] * t186;
+    const real t188 = t184 + t187;
+    const real t189 = Rc[2] * t188;
+    const real t190 = t177 + t189;
+    const real t191 = r[1] * t152;
+    const real t192 = r[2] * t147;
+    const real t193 = t191 - t192;
+    const real t194 = t190 + t193;
+    S_I[3] += t194;
+    const real t195 = Rc[3] * t163;
+    const real t196 = Rc[4] * t175;
+    const real t197 = t195 + t196;
+    const real t198 = Rc[5] * t188;
+    const real t199 = t197 + t198;
+    const real t200 = r[2] * t142;
+    const real t201 = r[0] * t152;
+    const real t202 = t200 - t201;
+    const real t203 = t199 + t202;
+    S_I[4] += t203;
+    const real t204 = Rc[6] * t163;
+    const real t205 = Rc[7] * t175;
+    const real t206 = t204 + t205;
+    const real t207 = Rc[8] * t188;
+    const real t208 = t206 + t207;
+    const real t209 = r[0] * t147;
+    const real t210 = r[1] * t142;
+    const real t211 = t209 - t210;
+    const real t212 = t208 + t211;
+    S_I[5] += t212;
+    const real t213 = Rc[3] * t112;
+    const real t214 = Rc[4] * t115;
+    const real t215 = t213 + t214;
+    const real t216 = Rc[5] * t119;
+    const real t217 = t215 + t216;
+    const real t218 = Rc[3] * t217;
+    const real t219 = Rc[3] * t115;
+    const real t220 = Rc[4] * t125;
+    const real t221 = t219 + t220;
+    const real t222 = Rc[5] * t129;
+    const real t223 = t221 + t222;
+    const real t224 = Rc[4] * t223;
+    const real t225 = t218 + t224;
+    const real t226 = Rc[3] * t119;
+    const real t227 = Rc[4] * t129;
+    const real t228 = t226 + t227;
+    const real t229 = Rc[5] * t138;
+    const real t230 = t228 + t229;
+    const real t231 = Rc[5] * t230;
+    const real t232 = t225 + t231;
+    S_I[6] += t232;
+    const real t233 = Rc[6] * t217;
+    const real t234 = Rc[7] * t223;
+    const real t235 = t233 + t234;
+    const real t236 = Rc[8] * t230;
+    const real t237 = t235 + t236;
+    S_I[7] += t237;
+    const real t238 = Rc[3] * t154;
+    const real t239 = Rc[4] * t157;
+    const real t240 = t238 + t239;
+    const real t241 = Rc[5] * t161;
+    const real t242 = t240 + t241;
+    const real t243 = Rc[0] * t242;
+    const real t244 = Rc[3] * t166;
+    const real t245 = Rc[4] * t169;
+    const real t246 = t244 + t245;
+    const real t247 = Rc[5] * t173;
+    const real t248 = t246 + t247;
+    const real t249 = Rc[1] * t248;
+    const real t250 = t243 + t249;
+    const real t251 = Rc[3] * t179;
+    const real t252 = Rc[4] * t182;
+    const real t253 = t251 + t252;
+    const real t254 = Rc[5] * t186;
+    const real t255 = t253 + t254;
+    const real t256 = Rc[2] * t255;
+    const real t257 = t250 + t256;
+    const real t258 = r[1] * t237;
+    const real t259 = r[2] * t232;
+    const real t260 = t258 - t259;
+    const real t261 = t257 + t260;
+    S_I[8] += t261;
+    const real t262 = Rc[3] * t242;
+    const real t263 = Rc[4] * t248;
+    const real t264 = t262 + t263;
+    const real t265 = Rc[5] * t255;
+    const real t266 = t264 + t265;
+    const real t267 = r[0] * t237;
+    const real t268 = t192 - t267;
+    const real t269 = t266 + t268;
+    S_I[9] += t269;
+    const real t270 = Rc[6] * t242;
+    const real t271 = Rc[7] * t248;
+    const real t272 = t270 + t271;
+    const real t273 = Rc[8] * t255;
+    const real t274 = t272 + t273;
+    const real t275 = r[0] * t232;
+    const real t276 = r[1] * t147;
+    const real t277 = t275 - t276;
+    const real t278 = t274 + t277;
+    S_I[10] += t278;
+    const real t279 = Rc[6] * t112;
+    const real t280 = Rc[7] * t115;
+    const real t281 = t279 + t280;
+    const real t282 = Rc[8] * t119;
+    const real t283 = t281 + t282;
+    const real t284 = Rc[6] * t283;
+    const real t285 = Rc[6] * t115;
+    const real t286 = Rc[7] * t125;
+    const real t287 = t285 + t286;
+    const real t288 = Rc[8] * t129;
+    const real t289 = t287 + t288;
+    const real t290 = Rc[7] * t289;
+    const real t291 = t284 + t290;
+    const real t292 = Rc[6] * t119;
+    const real t293 = Rc[7] * t129;
+    const real t294 = t292 + t293;
+    const real t295 = Rc[8] * t138;
+    const real t296 = t294 + t295;
+    const real t297 = Rc[8] * t296;
+    const real t298 = t291 + t297;
+    S_I[11] += t298;
+    const real t299 = Rc[6] * t154;
+    const real t300 = Rc[7] * t157;
+    const real t301 = t299 + t300;
+    const real t302 = Rc[8] * t161;
+    const real t303 = t301 + t302;
+    const real t304 = Rc[0] * t303;
+    const real t305 = Rc[6] * t166;
+    const real t306 = Rc[7] * t169;
+    const real t307 = t305 + t306;
+    const real t308 = Rc[8] * t173;
+    const real t309 = t307 + t308;
+    const real t310 = Rc[1] * t309;
+    const real t311 = t304 + t310;
+    const real t312 = Rc[6] * t179;
+    const real t313 = Rc[7] * t182;
+    const real t314 = t312 + t313;
+    const real t315 = Rc[8] * t186;
+    const real t316 = t314 + t315;
+    const real t317 = Rc[2] * t316;
+    const real t318 = t311 + t317;
+    const real t319 = r[1] * t298;
+    const real t320 = r[2] * t237;
+    const real t321 = t319 - t320;
+    const real t322 = t318 + t321;
+    S_I[12] += t322;
+    const real t323 = Rc[3] * t303;
+    const real t324 = Rc[4] * t309;
+    const real t325 = t323 + t324;
+    const real t326 = Rc[5] * t316;
+    const real t327 = t325 + t326;
+    const real t328 = r[2] * t152;
+    const real t329 = r[0] * t298;
+    const real t330 = t328 - t329;
+    const real t331 = t327 + t330;
+    S_I[13] += t331;
+    const real t332 = Rc[6] * t303;
+    const real t333 = Rc[7] * t309;
+    const real t334 = t332 + t333;
+    const real t335 = Rc[8] * t316;
+    const real t336 = t334 + t335;
+    const real t337 = t267 - t191;
+    const real t338 = t336 + t337;
+    S_I[14] += t338;
+    const real t339 = t48 * t108;
+    const real t340 = S[15] - t339;
+    const real t341 = Rc[0] * t340;
+    const real t342 = t48 * t109;
+    const real t343 = S[16] - t342;
+    const real t344 = Rc[1] * t343;
+    const real t345 = t341 + t344;
+    const real t346 = t48 * t110;
+    const real t347 = S[17] - t346;
+    const real t348 = Rc[2] * t347;
+    const real t349 = t345 + t348;
+    const real t350 = Rc[0] * t349;
+    const real t351 = Rc[0] * t343;
+    const real t352 = t61 * t109;
+    const real t353 = S[18] - t352;
+    const real t354 = Rc[1] * t353;
+    const real t355 = t351 + t354;
+    const real t356 = t61 * t110;
+    const real t357 = S[19] - t356;
+    const real t358 = Rc[2] * t357;
+    const real t359 = t355 + t358;
+    const real t360 = Rc[1] * t359;
+    const real t361 = t350 + t360;
+    const real t362 = Rc[0] * t347;
+    const real t363 = Rc[1] * t357;
+    const real t364 = t362 + t363;
+    const real t365 = t74 * t110;
+    const real t366 = S[20] - t365;
+    const real t367 = Rc[2] * t366;
+    const real t368 = t364 + t367;
+    const real t369 = Rc[2] * t368;
+    const real t370 = t361 + t369;
+    const real t371 = r[1] * t322;
+    const real t372 = r[2] * t261;
+    const real t373 = t371 - t372;
+    const real t374 = r[1] * t318;
+    const real t375 = r[2] * t257;
+    const real t376 = t374 - t375;
+    const real t377 = t373 + t376;
+    const real t378 = t370 + t377;
+    S_I[15] += t378;
+    const real t379 = Rc[3] * t349;
+    const real t380 = Rc[4] * t359;
+    const real t381 = t379 + t380;
+    const real t382 = Rc[5] * t368;
+    const real t383 = t381 + t382;
+    const real t384 = r[1] * t331;
+    const real t385 = r[2] * t269;
+    const real t386 = t384 - t385;
+    const real t387 = r[2] * t190;
+    const real t388 = r[0] * t318;
+    const real t389 = t387 - t388;
+    const real t390 = t386 + t389;
+    const real t391 = t383 + t390;
+    S_I[16] += t391;
+    const real t392 = Rc[6] * t349;
+    const real t393 = Rc[7] * t359;
+    const real t394 = t392 + t393;
+    const real t395 = Rc[8] * t368;
+    const real t396 = t394 + t395;
+    const real t397 = r[1] * t338;
+    const real t398 = r[2] * t278;
+    const real t399 = t397 - t398;
+    const real t400 = r[0] * t257;
+    const real t401 = r[1] * t190;
+    const real t402 = t400 - t401;
+    const real t403 = t399 + t402;
+    const real t404 = t396 + t403;
+    S_I[17] += t404;
+    const real t405 = Rc[3] * t340;
+    const real t406 = Rc[4] * t343;
+    const real t407 = t405 + t406;
+    const real t408 = Rc[5] * t347;
+    const real t409 = t407 + t408;
+    const real t410 = Rc[3] * t409;
+    const real t411 = Rc[3] * t343;
+    const real t412 = Rc[4] * t353;
+    const real t413 = t411 + t412;
+    const real t414 = Rc[5] * t357;
+    const real t415 = t413 + t414;
+    const real t416 = Rc[4] * t415;
+    const real t417 = t410 + t416;
+    const real t418 = Rc[3] * t347;
+    const real t419 = Rc[4] * t357;
+    const real t420 = t418 + t419;
+    const real t421 = Rc[5] * t366;
+    const real t422 = t420 + t421;
+    const real t423 = Rc[5] * t422;
+    const real t424 = t417 + t423;
+    const real t425 = r[2] * t203;
+    const real t426 = r[0] * t331;
+    const real t427 = t425 - t426;
+    const real t428 = r[2] * t199;
+    const real t429 = r[0] * t327;
+    const real t430 = t428 - t429;
+    const real t431 = t427 + t430;
+    const real t432 = t424 + t431;
+    S_I[18] += t432;
+    const real t433 = Rc[6] * t409;
+    const real t434 = Rc[7] * t415;
+    const real t435 = t433 + t434;
+    const real t436 = Rc[8] * t422;
+    const real t437 = t435 + t436;
+    const real t438 = r[2] * t212;
+    const real t439 = r[0] * t338;
+    const real t440 = t438 - t439;
+    const real t441 = r[0] * t266;
+    const real t442 = r[1] * t199;
+    const real t443 = t441 - t442;
+    const real t444 = t440 + t443;
+    const real t445 = t437 + t444;
+    S_I[19] += t445;
+    const real t446 = Rc[6] * t340;
+    const real t447 = Rc[7] * t343;
+    const real t448 = t446 + t447;
+    const real t449 = Rc[8] * t347;
+    const real t450 = t448 + t449;
+    const real t451 = Rc[6] * t450;
+    const real t452 = Rc[6] * t343;
+    const real t453 = Rc[7] * t353;
+    const real t454 = t452 + t453;
+    const real t455 = Rc[8] * t357;
+    const real t456 = t454 + t455;
+    const real t457 = Rc[7] * t456;
+    const real t458 = t451 + t457;
+    const real t459 = Rc[6] * t347;
+    const real t460 = Rc[7] * t357;
+    const real t461 = t459 + t460;
+    const real t462 = Rc[8] * t366;
+    const real t463 = t461 + t462;
+    const real t464 = Rc[8] * t463;
+    const real t465 = t458 + t464;
+    const real t466 = r[0] * t278;
+    const real t467 = r[1] * t212;
+    const real t468 = t466 - t467;
+    const real t469 = r[0] * t274;
+    const real t470 = r[1] * t208;
+    const real t471 = t469 - t470;
+    const real t472 = t468 + t471;
+    const real t473 = t465 + t472;
+    S_I[20] += t473;
     return 0;
 }
 
 static int mstmm_sweep_generic1_factor_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_factor(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic1_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
 }
 
 static const mstmm_port mstmm_sweep_generic1_factor_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
     {"J", 1, "kg*m2 or kg", 0, 0},
+    {"W", 1, "", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
     {"S", 21, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_generic1_factor_outputs[] = {
     {"F", 1, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"S_I", 21, "", 1, 0},
 };
 
 static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
     {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
 /* load of a column carried across a hinge with 1 free speed
@@ -4039,12 +4478,12 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .name = "factor",
         .function = (void (*)(void))mstmm_sweep_generic1_factor,
         .call = mstmm_sweep_generic1_factor_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
+        .n_inputs = 7,
+        .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_factor_inputs,
         .outputs = mstmm_sweep_generic1_factor_outputs,
-        .ir_hash = "eab1eab078beb3f24b6ec49d1cc6034df8fe3f548e5c87625e9e510cc46542ae",
-        .n_guards = 1,
+        .ir_hash = "358fef5cfd361a5fa196900a2ef14d1eec558c645c571069b2e9fad989d3ad00",
+        .n_guards = 2,
         .guards = mstmm_sweep_generic1_factor_guards,
     },
     {
@@ -4233,7 +4672,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "9b960ddb486a61146c071a6fe123a60300ff027c6b8cda8a46679b79e7ba831c",
+    .hash = "1dd52e582793fff4b2500b4b2719cc9f17237adc7923c4e029d5309620e1c167",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -69,6 +69,10 @@ int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restric
 int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
     const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
     real *restrict work);
+int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+    const real *restrict rate, const real *restrict sq, real *restrict S_ff);
+int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict e_f);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
@@ -4153,6 +4157,117 @@ static const mstmm_port mstmm_sweep_modal_answer_outputs[] = {
 
 static const mstmm_guard mstmm_sweep_modal_answer_guards[] = {
     {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
+};
+
+/* modal rows within a step
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  K[n][n] stiffness
+ * in  D[n][n] damping
+ * in  rate[1] (s) change of the rates by the accelerations
+ * in  sq[1] (1/s2) accelerations by the change of the coordinates
+ * out S_ff[n][n] rows and columns of the modes, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_stiffened_sized(int n, const real *restrict K, const real *restrict D,
+    const real *restrict rate, const real *restrict sq, real *restrict S_ff)
+{
+    const real t1 = 1.0 / sq[0];
+    for (int k = 0; k < n; ++k) {
+        for (int l = 0; l < n; ++l) {
+            const real t0 = rate[0] * D[n * k + l];
+            const real t2 = t1 * K[n * k + l];
+            const real t3 = t0 + t2;
+            S_ff[n * k + l] += t3;
+        }
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+    const real *restrict rate, const real *restrict sq, real *restrict S_ff)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_stiffened_sized(1, K, D, rate, sq, S_ff);
+    case 2: return mstmm_sweep_modal_stiffened_sized(2, K, D, rate, sq, S_ff);
+    case 3: return mstmm_sweep_modal_stiffened_sized(3, K, D, rate, sq, S_ff);
+    case 4: return mstmm_sweep_modal_stiffened_sized(4, K, D, rate, sq, S_ff);
+    default: return mstmm_sweep_modal_stiffened_sized(n, K, D, rate, sq, S_ff);
+    }
+}
+
+static int mstmm_sweep_modal_stiffened_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_stiffened(n, in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_stiffened_inputs[] = {
+    {"K", 1, "", 0, 2},
+    {"D", 1, "", 0, 2},
+    {"rate", 1, "s", 0, 0},
+    {"sq", 1, "1/s2", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_stiffened_outputs[] = {
+    {"S_ff", 1, "", 1, 2},
+};
+
+/* load of a change of the modes
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  K[n][n] stiffness
+ * in  D[n][n] damping
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * out e_f[n] load that the modes need, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_strained_sized(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict e_f)
+{
+    for (int k = 0; k < n; ++k) {
+        real t1 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t0 = D[n * k + l] * etad[l];
+            t1 += t0;
+        }
+        real t3 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t2 = K[n * k + l] * eta[l];
+            t3 += t2;
+        }
+        const real t4 = t1 + t3;
+        e_f[k] += t4;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+    const real *restrict eta, const real *restrict etad, real *restrict e_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_strained_sized(1, K, D, eta, etad, e_f);
+    case 2: return mstmm_sweep_modal_strained_sized(2, K, D, eta, etad, e_f);
+    case 3: return mstmm_sweep_modal_strained_sized(3, K, D, eta, etad, e_f);
+    case 4: return mstmm_sweep_modal_strained_sized(4, K, D, eta, etad, e_f);
+    default: return mstmm_sweep_modal_strained_sized(n, K, D, eta, etad, e_f);
+    }
+}
+
+static int mstmm_sweep_modal_strained_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_strained(n, in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_strained_inputs[] = {
+    {"K", 1, "", 0, 2},
+    {"D", 1, "", 0, 2},
+    {"eta", 1, "", 0, 1},
+    {"etad", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_strained_outputs[] = {
+    {"e_f", 1, "", 1, 1},
 };
 
 /* residual and its derivative along a direction
@@ -9208,6 +9323,30 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = mstmm_sweep_modal_answer_guards,
     },
     {
+        .name = "stiffened",
+        .function = (void (*)(void))mstmm_sweep_modal_stiffened,
+        .call = mstmm_sweep_modal_stiffened_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_stiffened_inputs,
+        .outputs = mstmm_sweep_modal_stiffened_outputs,
+        .ir_hash = "14a6d4a80ba7e9b4a04b93af160632cbcf1ef8320cfc99855577d8cf74a51f17",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "strained",
+        .function = (void (*)(void))mstmm_sweep_modal_strained,
+        .call = mstmm_sweep_modal_strained_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_strained_inputs,
+        .outputs = mstmm_sweep_modal_strained_outputs,
+        .ir_hash = "28da54245a2ef8ed75d781dc6d3a8f3ba01997cfc28b5cee35bd3b135642282d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "residual_slope",
         .function = (void (*)(void))mstmm_sweep_modal_residual_slope,
         .call = mstmm_sweep_modal_residual_slope_call,
@@ -9321,7 +9460,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "2f0e8a187e2edb314d3e611abbbf75dae45fcc05a7abc6169dde88be68c3d132",
+    .hash = "0cac7ee782685417e686854e78213ffc56a61f5ea666f7efe4eae1fe26d961a3",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -9331,6 +9470,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 26,
+    .n_kernels = 28,
     .kernels = mstmm_sweep_modal_kernels,
 };

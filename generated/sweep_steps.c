@@ -945,17 +945,12 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
     for (int k = 0; k < speeds; k++)
         hinge_J_free[k] = body->rotor[columns[k]];
-    mstmm_generic_factor(speeds,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free,
-        .S = block + MSTMM_BLOCK_S, .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H));
-    code = mstmm_generic_condense(speeds,
+    code = mstmm_generic_factor(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free, .W = mstmm_zeros,
         .floor_ = block + MSTMM_BLOCK_FLOOR, .S = block + MSTMM_BLOCK_S,
-        .e = block + MSTMM_BLOCK_E, .tau = mstmm_zeros,
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
-        .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .S_I = parent + MSTMM_BLOCK_S,
-        .e_I = parent + MSTMM_BLOCK_E);
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     return 0;
 }
@@ -1717,7 +1712,6 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
 /* Slopes of a law along the unknowns of its hinge. */
 static int mstmm_at_law_slopes(mstmm_state *state, int index)
 {
-    real effort[6];
     real d_tau[6];
     const mstmm_law *law = &state->model->laws[index];
     const mstmm_body *body = &state->model->bodies[law->body];
@@ -1730,7 +1724,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
         if (law->kind == 0) {
             mstmm_law_coordinate_slope(law->evaluate_slope,
                 .p = law->p, .q = state->q + body->q + law->coordinate,
-                .u = state->u + body->u + law->speed, .effort = effort,
+                .u = state->u + body->u + law->speed, .effort = mstmm_zeros,
                 .d_q = state->slope->q + body->q + law->coordinate,
                 .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
                 .d_tau = d_tau);
@@ -1738,7 +1732,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
         if (!(law->kind == 0)) {
             mstmm_law_quaternion_slope(law->evaluate_slope,
                 .p = law->p, .q = state->q + body->q + law->coordinate,
-                .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+                .u = state->u + body->u + law->speed, .B = law->axes, .effort = mstmm_zeros,
                 .twist_ref = state->memory + law->twist,
                 .d_q = state->slope->q + body->q + law->coordinate,
                 .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
@@ -2184,7 +2178,6 @@ static int mstmm_at_known_column(mstmm_state *state, int index)
 /* Change of a law's efforts by what is known of its hinge. */
 static int mstmm_at_known_laws(mstmm_state *state, int index)
 {
-    real effort[6];
     real d_tau[6];
     const mstmm_law *law = &state->model->laws[index];
     const mstmm_body *body = &state->model->bodies[law->body];
@@ -2192,14 +2185,14 @@ static int mstmm_at_known_laws(mstmm_state *state, int index)
     if (law->kind == 0) {
         mstmm_law_coordinate_slope(law->evaluate_slope,
             .p = law->p, .q = state->q + body->q + law->coordinate,
-            .u = state->u + body->u + law->speed, .effort = effort,
+            .u = state->u + body->u + law->speed, .effort = mstmm_zeros,
             .d_q = state->slope->q + body->q + law->coordinate,
             .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
             .d_tau = d_tau);
     } else {
         mstmm_law_quaternion_slope(law->evaluate_slope,
             .p = law->p, .q = state->q + body->q + law->coordinate,
-            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = mstmm_zeros,
             .twist_ref = state->memory + law->twist,
             .d_q = state->slope->q + body->q + law->coordinate,
             .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
@@ -2495,6 +2488,339 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     return 0;
 }
 
+/* Inertia of a body, and its modes within a step. */
+static int mstmm_at_laws_own(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    real *tangent = state->tangents->numbers + body->tangent;
+    if (mstmm_idle(state, body)) return 0;
+    memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), block + MSTMM_BLOCK_S, 21 * sizeof(real));
+    for (int j = 0; j < nu * nu; j++)
+        (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        for (int j = 0; j < 6 * n; j++)
+            (bend + MSTMM_BEND_V(n))[j] = (modes + MSTMM_MODES_S_RF(n))[j];
+        for (int j = 0; j < n * n; j++)
+            (bend + MSTMM_BEND_D(n))[j] = (modes + MSTMM_MODES_S_FF(n))[j];
+        mstmm_modal_stiffened(
+            .n = modal->n, .K = modal->stiffness, .D = modal->damping,
+            .rate = &state->tangents->rate, .sq = &state->tangents->sq,
+            .S_ff = bend + MSTMM_BEND_D(n));
+    }
+    return 0;
+}
+
+/* Rates of the coordinates by each of the speeds. */
+static int mstmm_at_laws_rates(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    const int nq = body->nq;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int code;
+    if (body->straight) return 0;
+    for (int c = 0; c < nu; c++) {
+        mstmm_aim_rate(state, body, c);
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+        memcpy(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * c, state->slope->qdot + body->q, (size_t)(nq) * sizeof(real));
+    }
+    mstmm_aim_nowhere(state, body);
+    return 0;
+}
+
+/* Slopes of a law along the unknowns of its speeds. */
+static int mstmm_at_laws_own_slopes(mstmm_state *state, int index)
+{
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *tangent = state->tangents->numbers + body->tangent;
+    for (int c = 0; c < law->n; c++) {
+        mstmm_aim_unknown(state, body, law->speed + c);
+        if (law->kind == 0) {
+            mstmm_law_coordinate_slope(law->evaluate_slope,
+                .p = law->p, .q = state->q + body->q + law->coordinate,
+                .u = state->u + body->u + law->speed, .effort = mstmm_zeros,
+                .d_q = state->slope->q + body->q + law->coordinate,
+                .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+                .d_tau = d_tau);
+        }
+        if (!(law->kind == 0)) {
+            mstmm_law_quaternion_slope(law->evaluate_slope,
+                .p = law->p, .q = state->q + body->q + law->coordinate,
+                .u = state->u + body->u + law->speed, .B = law->axes, .effort = mstmm_zeros,
+                .twist_ref = state->memory + law->twist,
+                .d_q = state->slope->q + body->q + law->coordinate,
+                .d_u = state->slope->u + body->u + law->speed, .d_effort = mstmm_zeros,
+                .d_tau = d_tau);
+        }
+        for (int j = 0; j < law->n; j++)
+            (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * (law->speed + c) + law->speed)[j] += d_tau[j];
+    }
+    mstmm_aim_nowhere(state, body);
+    return 0;
+}
+
+/* Modes eliminated from S and e of a flexible body. */
+static int mstmm_at_laws_modal_condense(mstmm_state *state, int index)
+{
+    real S_c[21];
+    real e_c[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *tangent = state->tangents->numbers + body->tangent;
+    real *d_block = state->slope->workspace + body->block;
+    int code;
+    if (state->efforts) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] -= (state->efforts + modal->u)[j];
+    }
+    if (body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_rebase(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
+            .S_rf = bend + MSTMM_BEND_V(n), .S_rf_I = bend + MSTMM_BEND_G(n),
+            .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n));
+        code = mstmm_modal_condense(
+            .n = modal->n, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .e = d_block + MSTMM_BLOCK_E, .S_rf = bend + MSTMM_BEND_G(n),
+            .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .Gg = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_MODES, index, code);
+    } else {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        code = mstmm_modal_condense(
+            .n = modal->n, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .e = d_block + MSTMM_BLOCK_E, .S_rf = bend + MSTMM_BEND_V(n),
+            .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .Gg = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_MODES, index, code);
+    }
+    memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 21 * sizeof(real));
+    memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    return 0;
+}
+
+/* Mass matrices with laws carried to the root. */
+static int mstmm_at_laws_factorise(mstmm_state *state, int index)
+{
+    real hinge_J_free[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    for (int k = 0; k < speeds; k++)
+        for (int row = 0; row < speeds; row++)
+            (tangent + MSTMM_TANGENT_W(body->nu, body->nq))[row * speeds + k] = (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[columns[row] * nu + columns[k]];
+    if (body->modal) {
+        code = mstmm_at_laws_modal_condense(state, index);
+        if (code) return code;
+    }
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_absorb(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .H = laid + MSTMM_SECTION_H(n), .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .e = d_block + MSTMM_BLOCK_E, .U = port + MSTMM_PORT_K(n),
+            .S_rf = bend + MSTMM_BEND_V(n), .S_ff = bend + MSTMM_BEND_D(n),
+            .e_f = d_modes + MSTMM_MODES_E_F(n));
+    }
+    for (int k = 0; k < speeds; k++)
+        for (int row = 0; row < 6; row++)
+            (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+    for (int k = 0; k < speeds; k++)
+        hinge_J_free[k] = body->rotor[columns[k]];
+    code = mstmm_generic_factor(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq), .J = hinge_J_free,
+        .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq), .floor_ = block + MSTMM_BLOCK_FLOOR,
+        .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+        .F = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+        .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+        .S_I = mstmm_tangent_at(state, body->parent));
+    if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
+    return 0;
+}
+
+/* One column as efforts, and no load yet. */
+static int mstmm_at_laws_column(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nu = body->nu;
+    real *d_block = state->slope->workspace + body->block;
+    memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+    for (int j = 0; j < nu; j++)
+        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] -= (state->column + modal->u)[j];
+    }
+    return 0;
+}
+
+/* Change of the modes' load by increments that are known. */
+static int mstmm_at_modes_change(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const mstmm_modal *modal = mstmm_modal_of(body);
+    const int n = mstmm_modes_of(modal);
+    real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+    if (!body->modal) return 0;
+    mstmm_modal_strained(
+        .n = modal->n, .K = modal->stiffness, .D = modal->damping,
+        .eta = state->slope->q + modal->q, .etad = state->slope->u + modal->u,
+        .e_f = d_modes + MSTMM_MODES_E_F(n));
+    return 0;
+}
+
+/* The column's load carried across the hinge to the parent. */
+static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
+{
+    real e_c[6];
+    real hinge_tau_free[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    if (mstmm_idle(state, body)) return 0;
+    if (body->modal && body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_modal_effort(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    }
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_pushed(
+            .n = modal->n, .Gg = bend + MSTMM_BEND_GAIN(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .e_c = e_c);
+        memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
+    }
+    if (body->section && !body->section->inward) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_modal_effort(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
+            .e_f = d_modes + MSTMM_MODES_E_F(n), .tau = d_modes + MSTMM_MODES_RIGHT(n));
+        for (int j = 0; j < n; j++)
+            (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
+    }
+    for (int k = 0; k < speeds; k++)
+        hinge_tau_free[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
+    mstmm_generic_push(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+        .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
+        .tau = hinge_tau_free, .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq),
+        .e_I = d_parent + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Accelerations that answer the column. */
+static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
+{
+    real delta[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    real *tangent = state->tangents->numbers + body->tangent;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    if (mstmm_idle(state, body)) return 0;
+    mstmm_generic_answer(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+        .F = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+        .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+        .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq),
+        .delta_I = d_parent + MSTMM_BLOCK_DELTA,
+        .udot = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_RATES),
+        .delta = d_block + MSTMM_BLOCK_DELTA);
+    for (int j = 0, k = 0; j < nu; j++)
+        (state->answer + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_RATES))[k++]
+                     : 0;
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_answer(
+            .n = modal->n, .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
+            .Gg = bend + MSTMM_BEND_GAIN(n), .delta_I = d_block + MSTMM_BLOCK_DELTA,
+            .y = d_modes + MSTMM_MODES_RIGHT(n), .etadd = d_modes + MSTMM_MODES_ETADD(n),
+            .work = bend + MSTMM_BEND_WORK(n));
+        for (int j = 0; j < n; j++)
+            (state->answer + modal->u)[j] = (d_modes + MSTMM_MODES_ETADD(n))[j];
+    }
+    if (body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_displaced(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n),
+            .etadd = d_modes + MSTMM_MODES_ETADD(n), .delta_I = d_block + MSTMM_BLOCK_DELTA,
+            .delta = delta);
+        memcpy(d_block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
+    }
+    return 0;
+}
+
 /* Mass matrix of the frame, momentum and energy of a flexible body. */
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T)
 {
@@ -2530,6 +2856,21 @@ int mstmm_at_lagged(mstmm_state *state, int index)
     mstmm_tangent_lagged(
         .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
         .rate = state->slope->qdot + body->q, .dq = state->tangents->change + body->q);
+    return 0;
+}
+
+/* Change of a hinge's rates by that of its coordinates and speeds. */
+int mstmm_at_rates_change(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    const int nq = body->nq;
+    int code;
+    code = mstmm_at_hinge_motion_slope(state, index);
+    if (code) return code;
+    for (int j = 0; j < nq; j++)
+        (state->tangents->change + body->q)[j] = (state->slope->qdot + body->q)[j];
+    for (int j = 0; j < nq; j++)
+        (state->tangents->change + body->q)[j] += (state->tangents->rho + body->q)[j];
     return 0;
 }
 
@@ -2949,6 +3290,86 @@ static int mstmm_pass_known_answered(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_laws_own(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_laws_own(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_rates(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_laws_rates(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_own_slopes(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_laws_own_slopes(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_factorise(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_laws_factorise(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_column(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_laws_column(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_modes_change(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_modes_change(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_column_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const int code = mstmm_at_laws_column_carried(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_column_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_laws_column_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 /* Driven coordinates, and the values of the scene's expressions. */
 int mstmm_run_given(mstmm_state *state)
 {
@@ -3301,6 +3722,48 @@ int mstmm_run_tangent_beyond(mstmm_state *state)
     code = mstmm_pass_known_carried(state);
     if (code) return code;
     code = mstmm_pass_known_answered(state);
+    if (code) return code;
+    return 0;
+}
+
+/* The mass matrix and the slopes of laws factored, behind inverse dynamics. */
+int mstmm_run_laws_alone(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    code = mstmm_pass_laws_own(state);
+    if (code) return code;
+    if (model->n_laws) {
+        code = mstmm_pass_laws_rates(state);
+        if (code) return code;
+    }
+    if (model->n_laws) {
+        code = mstmm_pass_laws_own_slopes(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_laws_factorise(state);
+    if (code) return code;
+    return 0;
+}
+
+/* One right-hand side through the mass matrix with laws. */
+int mstmm_run_laws_solution(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    code = mstmm_pass_laws_column(state);
+    if (code) return code;
+    if (state->tangents->shifted && model->n_laws) {
+        code = mstmm_pass_known_laws(state);
+        if (code) return code;
+    }
+    if (state->tangents->shifted && model->n_flexible) {
+        code = mstmm_pass_modes_change(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_laws_column_carried(state);
+    if (code) return code;
+    code = mstmm_pass_laws_column_answered(state);
     if (code) return code;
     return 0;
 }

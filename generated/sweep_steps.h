@@ -11,6 +11,7 @@ int mstmm_at_condense(mstmm_state *state, int index);
 int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta);
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T);
 int mstmm_at_lagged(mstmm_state *state, int index);
+int mstmm_at_rates_change(mstmm_state *state, int index);
 int mstmm_run_given(mstmm_state *state);
 int mstmm_run_accelerations(mstmm_state *state);
 int mstmm_run_inverse_dynamics(mstmm_state *state);
@@ -23,6 +24,8 @@ int mstmm_run_applied_slope(mstmm_state *state);
 int mstmm_run_tangent(mstmm_state *state);
 int mstmm_run_tangent_solution(mstmm_state *state);
 int mstmm_run_tangent_beyond(mstmm_state *state);
+int mstmm_run_laws_alone(mstmm_state *state);
+int mstmm_run_laws_solution(mstmm_state *state);
 
 /* Pieces of the engine's own. */
 int mstmm_hook_drive_slopes(mstmm_state *state);

@@ -3,8 +3,9 @@
     python -m benchmarks.stiff.steps [--quick]
 
 By the looped engine: residual R, tangent T with its elimination, solution S and product P of chains
-from 10 to 100 000 bodies.  By code of a scene's own: whole steps of an arm of six pins.  All of a
-row alternate in one process; CPU times, the minimum of the rounds counts.
+from 10 to 100 000 bodies; tangent L and solution X by laws alone.  By code of a scene's own: whole
+steps of an arm of six pins.  All of a row alternate in one process; CPU times, the minimum of the
+rounds counts.
 """
 
 from __future__ import annotations
@@ -56,12 +57,17 @@ def chain(name: str, n: int, rounds: int) -> dict[str, Any]:
     right, memory = random.normal(size=engine.nu), engine.start_memory()[None]
     tangent.residual(0.0, q, u, a)
     tangent.factor(SHARP, SHARP)
+    laws = Tangent(model.looped)
+    laws.residual(0.0, q, u, a)
+    laws.factor_laws(SHARP, SHARP)
     calls: dict[str, Callable[[], object]] = {
         "E": lambda: engine.accelerations(0.0, q[None], u[None], memory),
         "R": lambda: tangent.residual(0.0, q, u, a),
         "T": lambda: tangent.factor(SHARP, SHARP),
         "S": lambda: tangent.solve(right),
         "P": lambda: tangent.slope(0.0, q, u, right),
+        "L": lambda: laws.factor_laws(SHARP, SHARP),
+        "X": lambda: laws.solve(right),
     }
     repeats = max(1, 20_000 // n)
     many = {k: (lambda f=f: [f() for _ in range(repeats)]) for k, f in calls.items()}
@@ -86,11 +92,11 @@ def fused(rounds: int) -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     """The result as Markdown."""
     lines = [
-        "| chain | bodies | E, ns a body | R/E | T/E | S/E | P/E |",
-        "|---|---|---|---|---|---|---|",
+        "| chain | bodies | E, ns a body | R/E | T/E | S/E | P/E | L/E | X/E |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for row in result["looped"]:
-        ratios = " | ".join(f"{row[k] / row['E']:.2f}" for k in "RTSP")
+        ratios = " | ".join(f"{row[k] / row['E']:.2f}" for k in "RTSPLX")
         lines.append(f"| {row['chain']} | {row['bodies']} | {row['E']:.0f} | {ratios} |")
     arm = result["fused"]
     lines += ["", f"Arm of six pins by its own code, one evaluation {arm['E']:.3f} us:", ""]

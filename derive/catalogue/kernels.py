@@ -121,7 +121,7 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("recover", sweep.recover(nu)),
         Kernel("effort", sweep.effort(nu)),
         Kernel("project", sweep.project(nu)),
-        Kernel("factor", columns.factor(nu)),
+        Kernel("factor", columns.factor(nu), sweep.pivot_guards(nu)),
         Kernel("push", columns.push(nu)),
         Kernel("answer", columns.answer(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),

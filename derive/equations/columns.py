@@ -1,8 +1,9 @@
 """Further right-hand sides through a factored tree: M^-1 times columns.
 
 S is carried to the root once, as for accelerations; of each elimination the factor of D and
-G = D^-1 H^T S stay.  A column of efforts tau then travels alone, with no bias motion and no load
-but its own:
+G = D^-1 H^T S stay.  What else the rows change by with the accelerations, as laws do within a step,
+goes into D.  A column of efforts tau then travels alone, with no bias motion and no load but its
+own:
 
     y = tau - H^T e,  e_Q = e + G^T y          tips to root
     udot = D^-1 y - G a_Q,  a = a_Q + H udot   root to tips
@@ -17,13 +18,16 @@ from .algebra import column, symbol
 from .factored import divided
 from .sweep import (
     DELTA,
+    FLOOR,
     PARENT_DELTA,
     PARENT_E,
+    PARENT_S,
     SHIFT,
     SOURCES,
     E,
     R,
     S,
+    congruence,
     free_speeds,
     outboard_deviation,
     transport,
@@ -41,23 +45,58 @@ def _hinge(nu: int) -> tuple[Quantity, Quantity, Quantity, Quantity]:
 
 
 def factor(nu: int) -> Derivation:
-    """F of a hinge; G comes with S, as for accelerations (`sweep.condense`)."""
-    h, factored, _, _ = _hinge(nu)
+    """F and G of a hinge, and S carried to the parent.
+
+    Of W, what the rows change by besides inertia, D takes the symmetric part.
+    """
+    h, factored, gain, _ = _hinge(nu)
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    pivot = symbol("D", nu, nu)
-    rotors = sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
-    equations = (
-        Equation("D = H^T S H + J", pivot, h.symbol.T * (S.symbol * h.symbol) + rotors),
-        Equation("L and 1 / d of D = L diag(d) L^T", factored.symbol, Factor(pivot)),
-    )
+    laws = Quantity(symbol("W", nu, nu), "", "change of the efforts of laws, a row a speed")
+    push, pivot, below = symbol("U", 6, nu), symbol("D", nu, nu), symbol("Y", nu, 6)
+    scaled, reduced = symbol("Z", nu, 6), symbol("S_Q", 6, 6)
+    equations: tuple[Equation, ...] = (Equation("S_Q = S", reduced, S.symbol),)
+    if nu:
+        rotors = sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
+        equations = (
+            Equation("U = S H", push, S.symbol * h.symbol),
+            Equation(
+                "D = H^T U + J - (W + W^T) / 2",
+                pivot,
+                h.symbol.T * push + rotors - _symmetric(laws.symbol),
+            ),
+            Equation("L and 1 / d of D = L diag(d) L^T", factored.symbol, Factor(pivot)),
+            Equation("Y = L^-1 U^T", below, Triangular(factored.symbol, push.T)),
+            Equation("diag(d)^-1 Y", scaled, divided(below, factored.symbol)),
+            Equation(
+                "G = L^-T diag(d)^-1 Y",
+                gain.symbol,
+                Triangular(factored.symbol, scaled, transposed=True),
+            ),
+            Equation(
+                "S_Q = S - Y^T diag(d)^-1 Y",
+                reduced,
+                S.symbol - below.T * scaled,
+                symmetric=True,
+            ),
+        )
+    steps, transported = congruence("S_Q")
     return Derivation(
         f"generic{nu}",
-        f"factor of D of a hinge with {free_speeds(nu)}",
-        (h, rotor, S),
-        (factored,),
-        equations if nu else (),
+        f"S carried across a hinge with {free_speeds(nu)}, and the factor of D",
+        (R, SHIFT, h, rotor, laws, FLOOR, S),
+        (factored, gain, PARENT_S),
+        (*equations, *steps, Equation("X^T S_Q X", PARENT_S.symbol, transported)),
         sources=SOURCES,
     )
+
+
+def _symmetric(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+    """(A + A^T) / 2."""
+    size = int(matrix.rows)
+    return sp.ImmutableDenseMatrix(
+        size, size,
+        lambda i, j: matrix[i, i] if i == j else sp.Rational(1, 2) * (matrix[i, j] + matrix[j, i]),
+    )  # fmt: skip
 
 
 def push(nu: int) -> Derivation:

@@ -154,7 +154,7 @@ def transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
     return stack(push, R.symbol * part(force, 3) + tilde(column(SHIFT.symbol)) * push)
 
 
-def _congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
+def congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
     """X^T S X by blocks: rotate to parent axes, then shift to the parent's P."""
     reduced = symbol(name, 6, 6)
     a, b, c = (
@@ -251,7 +251,7 @@ def condense(
             Equation("S_Q = S", reduced, S.symbol),
             Equation("e_Q = e", load, E.symbol),
         ]
-    steps, transported = _congruence("S_Q")
+    steps, transported = congruence("S_Q")
     equations += [
         *steps,
         Equation("X^T S_Q X", PARENT_S.symbol, transported),

@@ -15,7 +15,7 @@ import sympy as sp
 from ..equations.sweep import DELTA, SHIFT, SOURCES, E, R, S
 from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from .modal import E_F, S_FF, S_RF
-from .symbols import N, column, modal, part, stack
+from .symbols import DAMPING, ETA, ETAD, STIFFNESS, N, column, modal, part, stack
 
 H = modal("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
 WORK = modal("U", 6, "S H")
@@ -184,6 +184,45 @@ def answer() -> Derivation:
     )
 
 
+def stiffened() -> Derivation:
+    """Modal rows by accelerations with which coordinates and rates change in proportion."""
+    rate = Quantity(vector("rate", 1), "s", "change of the rates by the accelerations")
+    inverse = Quantity(vector("sq", 1), "1/s2", "accelerations by the change of the coordinates")
+    return Derivation(
+        "modal",
+        "modal rows within a step",
+        (STIFFNESS, DAMPING, rate, inverse),
+        (_grow(S_FF),),
+        (
+            Equation(
+                "rate D + K / sq",
+                S_FF.symbol,
+                rate.symbol[0, 0] * DAMPING.symbol + 1 / inverse.symbol[0, 0] * STIFFNESS.symbol,
+            ),
+        ),
+        sources=SOURCES,
+    )
+
+
+def strained() -> Derivation:
+    """Load that the modes need for changes of their coordinates and rates."""
+    return Derivation(
+        "modal",
+        "load of a change of the modes",
+        (STIFFNESS, DAMPING, ETA, ETAD),
+        (_grow(E_F),),
+        (
+            Equation(
+                "K eta + D etad",
+                E_F.symbol,
+                STIFFNESS.symbol * ETA.symbol + DAMPING.symbol * ETAD.symbol,
+            ),
+        ),
+        sources=SOURCES,
+    )
+
+
 STEPS = (
     absorb, rebase, condense, recover, displaced, prescribed, modal_effort, pushed, answer,
+    stiffened, strained,
 )  # fmt: skip

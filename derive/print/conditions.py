@@ -17,7 +17,8 @@ _TRAITS = {
     "driving": "(!state->given || state->residual)", "curved": "!body->straight",
     "steady": "body->steady", "turning": "body->turning",
     "moving": "!body->section && speeds", "product": "model->product",
-    "coordinate": "law->kind == 0", "effort": "force->effort",
+    "shifted": "state->tangents->shifted", "coordinate": "law->kind == 0",
+    "effort": "force->effort",
 }  # fmt: skip
 
 

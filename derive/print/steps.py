@@ -44,13 +44,16 @@ _ALONG = {
     "rates": ("nu", "mstmm_aim_rate(state, body, c)", ("nu", "body")),
     "coordinates": ("nq", "mstmm_aim_coordinate(state, body, c)", ("nq", "body")),
     "modes": ("n", "mstmm_aim_mode(state, modal, c)", ("n", "modal")),
+    "law": ("law->n", "mstmm_aim_unknown(state, body, law->speed + c)", ("law", "body")),
     "motion": (
         "9", "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c)", ("d_block",),
     ),
 }  # fmt: skip
 #: What points them nowhere again.
 _RESTS = {
-    **dict.fromkeys(("free", "felt", "rates", "coordinates"), "mstmm_aim_nowhere(state, body)"),
+    **dict.fromkeys(
+        ("free", "felt", "rates", "coordinates", "law"), "mstmm_aim_nowhere(state, body)"
+    ),
     "modes": "mstmm_aim_no_mode(state, modal)",
     "motion": "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)",
 }
@@ -115,8 +118,9 @@ class StepText:
                 slot = ports.get(port.name, f"local.unused_{port.name}")
                 yield slot, port.length(most)
         elif isinstance(step, Pick):
-            yield step.to, step.rows * MOST_SPEEDS
-            yield step.source, step.rows * MOST_SPEEDS
+            rows = step.rows or MOST_SPEEDS
+            yield step.to, rows * MOST_SPEEDS
+            yield step.source, rows * MOST_SPEEDS
 
     def _callee(self, step: Call) -> Callee:
         return self.kernels[step.kernel.replace("{nu}", "").replace("{free}", "")]
@@ -273,10 +277,11 @@ class StepText:
         if step.rows == 1:
             return [f"{indent}for (int k = 0; k < speeds; k++)",
                     f"{indent}    {_entry(to, 'k')} = {_entry(source, 'columns[k]')};"]  # fmt: skip
+        rows, row = (str(step.rows), "row") if step.rows else ("speeds", "columns[row]")
         return [f"{indent}for (int k = 0; k < speeds; k++)",
-                f"{indent}    for (int row = 0; row < {step.rows}; row++)",
+                f"{indent}    for (int row = 0; row < {rows}; row++)",
                 f"{indent}        {_entry(to, 'row * speeds + k')} = "
-                f"{_entry(source, 'row * nu + columns[k]')};"]  # fmt: skip
+                f"{_entry(source, f'{row} * nu + columns[k]')};"]  # fmt: skip
 
     def _spread(self, step: Spread, indent: str) -> list[str]:
         to, free = self._place(step.to).text, self._place(step.free).text

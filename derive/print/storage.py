@@ -54,7 +54,13 @@ BEND = {
 }  # fmt: skip
 PORT = {"port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0)}
 #: Slots that lie where another does, which is not wanted any more by then.
-SHARED = {"hinge.F": "hinge.H", "modes.felt": "modes.right"}
+SHARED = {
+    "hinge.F": "hinge.H", "modes.felt": "modes.right",
+    # One of the two tangents is held at a time.
+    "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
+    "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",
+    "shapes.right": "bend.right", "shapes.gain": "bend.gain",
+}  # fmt: skip
 
 _MOMENTS = {
     "p": "rigid", "C": "c", "P": "p", "B": "b",
@@ -98,7 +104,11 @@ _PLACES = {
     "force.offset_F": "force->offset_f", "force.offset_T": "force->offset_t",
     "force.axes_F": "force->axes_f", "force.axes_T": "force->axes_t",
     "law.slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed",
+    "law.own_slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq)"
+    " + body->nu * (law->speed + c) + law->speed",
     "inboard.S": "mstmm_tangent_at(state, body->parent)",
+    "inboard.mass": "mstmm_tangent_at(state, body->parent)",
+    "step.rate": "&state->tangents->rate",
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",

@@ -11,14 +11,13 @@ FACTORISE = Pass(
     "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
     (
         Do(whole=HINGE_MOTION, when="own"),
+        # Loads are carried along unread: columns start from none.
         Do(whole=MODAL_CONDENSE, when="modal"),
         *only("outward", ABSORBED),
         *FREE,
-        call("generic{free}.factor", H="hinge.H_free", J="hinge.J_free", S="body.S", F="hinge.F"),
-        # Loads are carried along unread: columns start from none.
-        call("generic{free}.condense", fails="undetermined", **BODY, H="hinge.H_free",
-             J="hinge.J_free", floor="body.floor", S="body.S", e="body.e", tau="zero",
-             G="hinge.G", g="hinge.g", S_I="parent.S", e_I="parent.e"),
+        call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
+             J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
+             G="hinge.G", S_I="parent.S"),
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip

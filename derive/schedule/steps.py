@@ -6,11 +6,13 @@ A step is done where its condition `when` holds: traits separated by spaces, all
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 #: Orders in which a pass meets what it is for.
 ROOT_TO_TIPS, TIPS_TO_ROOT = "root to tips", "tips to root"
+#: Fields of what moves numbers that name slots.
+_NAMED = ("to", "source", "free", "imposed")
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ class Add(Step):
 
 @dataclass(frozen=True)
 class Pick(Step):
-    """to = the columns of `source` (rows x nu) that belong to free speeds."""
+    """to = the columns of `source` (rows x nu) that belong to free speeds; rows = 0: of a row for
+    each speed those of free speeds, too."""
 
     to: str = ""
     source: str = ""
@@ -116,7 +119,7 @@ class Along(Step):
 
     `of`: "free", the unknowns of a hinge; "felt", those that a law feels; "rates", its speeds
     alone; "coordinates", its coordinates alone; "modes", the unknowns of a flexible body; "motion",
-    the nine numbers of a motion.
+    the nine numbers of a motion; "law", the unknowns that go with the speeds that a law acts on.
     """
 
     of: str = ""
@@ -226,3 +229,19 @@ def inner(step: Step) -> Iterator[Step]:
         parts = step.whole.steps
     for part in parts:
         yield from inner(part)
+
+
+def elsewhere(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
+    """The same steps over other slots; `name` goes before the pass's own."""
+
+    def renamed(step: Step) -> Step:
+        if isinstance(step, Do):
+            assert step.whole is not None
+            return replace(step, whole=elsewhere(step.whole, name, slots))
+        if isinstance(step, Call):
+            ports = ((port, slots.get(slot, slot)) for port, slot in step.ports)
+            return replace(step, ports=tuple(ports))
+        found = {key: slots.get(slot, slot) for key, slot in vars(step).items() if key in _NAMED}
+        return replace(step, **found)
+
+    return replace(whole, name=f"{name}_{whole.name}", steps=tuple(map(renamed, whole.steps)))

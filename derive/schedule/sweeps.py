@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .inverse import REQUIRED
+from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
 from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
 from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
@@ -88,11 +89,11 @@ SOLUTION = Sweep(
 
 SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, MOTION, POSED, FACTORISATION, SOLUTION,
           DIRECTIONAL, APPLIED_SLOPE, TANGENT, TANGENT_SOLUTION,
-          TANGENT_BEYOND)  # fmt: skip
+          TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between
 #: their runs, observations.
 SINGLY: tuple[Pass, ...] = (
-    FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, LAGGED,
+    FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, LAGGED, RATES_CHANGE,
     LINK_ANGLE, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,
 )  # fmt: skip

@@ -39,6 +39,8 @@ _HINGE_MOTION = Pass(
     "hinge_motion", "body", "Relative motion across the hinge.",
     (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
 )  # fmt: skip
+#: Its derivative, as other sweeps do it too.
+HINGE_CHANGE = sloped(_HINGE_MOTION)
 _ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
                motion_I="parent.motion", **BODY)  # fmt: skip
 _FORWARD = Pass(
@@ -158,8 +160,8 @@ def _along_hinge(b: str, g: str, laws: str) -> tuple[Step, ...]:
     column = _column(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
-        Do(whole=sloped(_HINGE_MOTION), when="!steady"),
-        Do(whole=sloped(_HINGE_MOTION), when="steady curved"),
+        Do(whole=HINGE_CHANGE, when="!steady"),
+        Do(whole=HINGE_CHANGE, when="steady curved"),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_TURNED),
         replace(_TURN, when="curved"),
@@ -204,7 +206,7 @@ LAG = Pass(
 LAGGED = Pass(
     "lagged", "body", "Change of the coordinates of a hinge by that of its speeds.",
     (
-        Do(whole=sloped(_HINGE_MOTION)),
+        Do(whole=HINGE_CHANGE),
         Add(to=D + "body.qdot", source="body.rho"),
         call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot", dq="body.change"),
     ),
@@ -213,17 +215,20 @@ LAGGED = Pass(
 
 # --- factored -----------------------------------------------------------------------------------
 
-#: Change of a law's efforts by its hinge alone: what expressions say of its effort reaches further.
-_LAW_CHANGE = tuple(
-    Sloped(step.when, step.kernel + SLOPE, step.ports, still=("effort",))
+#: Change of a law's efforts by its hinge alone: what expressions add to them reaches further.
+LAW_CHANGE = tuple(
+    Sloped(
+        step.when, step.kernel + SLOPE, tuple({**dict(step.ports), "effort": "none"}.items()),
+        still=("effort",),
+    )
     for step in LAWS.steps
     if isinstance(step, Call)
-)
+)  # fmt: skip
 
 LAW_SLOPES = Pass(
     "law_slopes", "law", "Slopes of a law along the unknowns of its hinge.",
     (
-        Along(of="felt", steps=(*_LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))),
+        Along(of="felt", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))),
     ),
 )  # fmt: skip
 
@@ -416,7 +421,7 @@ KNOWN_COLUMN = Pass(
 
 KNOWN_LAWS = Pass(
     "known_laws", "law", "Change of a law's efforts by what is known of its hinge.",
-    (*_LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
+    (*LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
 )  # fmt: skip
 
 _KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",

@@ -205,8 +205,19 @@ port.B | 9 n | as bend.B, of an end that follows the modes
 port.G | 6 n | as bend.G
 port.W | n n | as bend.W
 port.K | 6 n | S B of what hangs on the end
+law.own_slopes | nu | the same along a speed of the law's own
+mass.S | 21 | S of what hangs on the parent, the laws' slopes in it
+mass.F | nu nu | D = L diag(d) L^T: L, and 1 / d on the diagonal
+mass.G | 6 nu | D^-1 H^T S
+inboard.mass | 21 | mass.S of the parent
+shapes.S_rf | 6 n | frame rows, modal columns, of the mass matrix
+shapes.based | 6 n | the same seen from the section that is held
+shapes.S_ff | n n | modal rows and columns, stiffness and damping in them
+shapes.right | 7 n | right-hand sides of the modal elimination
+shapes.gain | 7 n | etadd = g - G a: columns of G, then -g
 law.slopes | nu | change of the law's efforts along the speed at hand
 inboard.S | 54 | tangent.S of the parent
+step.rate | 1 | change of the speeds along the unknowns
 step.q | 1 | inverse time by which coordinates follow speeds
 step.kappa | 1 | whether the rates' own slopes count
 body.rho | nq | what the rates lack
@@ -265,5 +276,6 @@ TRAITS: dict[str, str] = {
     "valued": "efforts or loads are expressions",
     "flexible": "there are flexible bodies",
     "posed": "loads or force elements need poses",
+    "shifted": "some increments of a right-hand side are known",
     "product": "the product of classical matrices is asked for too",
 }

@@ -178,6 +178,7 @@ _DIRECTIONS = {
     "free": "every free speed c of the hinge, and what changes with it in a step",
     "rates": "every speed c of the hinge alone",
     "coordinates": "every coordinate c of the hinge alone",
+    "law": "every unknown c that goes with a speed of the law",
     "modes": "every mode c, and what changes with it in a step",
     "motion": "every entry c of the body's motion",
 }
@@ -197,7 +198,10 @@ _TOLD: dict[type, Callable[..., str]] = {
     Do: _do,
     Add: _add,
     Copy: lambda s: f"{s.to} = {s.source or '0'}",
-    Pick: lambda s: f"{s.to} = columns of {s.source} that belong to free speeds",
+    Pick: lambda s: (
+        f"{s.to} = {'columns' if s.rows else 'rows and columns'} of {s.source} that belong to free "
+        "speeds"
+    ),
     Spread: lambda s: f"{s.to} = {s.free} on free speeds, {s.imposed or '0'} on the others",
     Move: lambda s: f"{s.to} = {s.source}",
     Gather: lambda s: f"{s.to} = expression values at {s.places}",

@@ -66,6 +66,7 @@ class Plan:
     radius: float | None = None
     scheme: str = ""
     iterations: int = 1
+    tangent: str = "auto"
 
     @property
     def resumable(self) -> bool:
@@ -170,6 +171,11 @@ def simulate(
         typer.Option("--iterations", metavar="N", help="Of dttmm-classical: linear solutions that "
                      "a step may take."),
     ] = 1,
+    tangent: Annotated[
+        str,
+        typer.Option("--tangent", metavar="NAME", help="Of implicit methods: auto, exact, or laws, "
+                     "the slopes of hinges' laws alone, for those that allow it."),
+    ] = "auto",
     accuracy: Annotated[
         float | None,
         typer.Option("--accuracy", metavar="X", parser=positive, help="Error up to which the "
@@ -183,7 +189,7 @@ def simulate(
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
-        max_step or 0.0, radius, scheme, iterations,
+        max_step or 0.0, radius, scheme, iterations, tangent,
     )  # fmt: skip
     _refuse_endless(plan)
     from . import report
@@ -294,7 +300,7 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
         max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
-        iterations=plan.iterations, progress=progress, resume=plan.resume,
+        iterations=plan.iterations, tangent=plan.tangent, progress=progress, resume=plan.resume,
         checkpoint=str(plan.checkpoint) if plan.resumable else None,
     )  # fmt: skip
 

@@ -68,6 +68,11 @@ class Tangent:
         slopes by the coordinates."""
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
 
+    def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
+        """The same with inertia and the slopes of laws and modes alone, of these no more than their
+        symmetric part: cheap, and an approximation."""
+        self._call("laws_factor", float(rate), float(s), float(sq), float(kappa))
+
     def solve(self, r: Array, d_q: Array | None = None, d_a: Array | None = None) -> Array:
         """x (nu,) along which, beside known changes of coordinates (nq,) and accelerations (nu,),
         R changes by r (nu,); what is known must be zero where somebody imposes."""

@@ -20,7 +20,7 @@ from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 
 from .settings import Settings
-from .steppers import Tableau, check_size
+from .steppers import TANGENTS, Tableau, check_size
 from .tableau_in_c import c_tableau
 
 _SAMPLE_DOUBLES = 2**19  # of one buffer, about 4 MB
@@ -110,6 +110,7 @@ class Statistics:
         crossings: how often a step ended where an expression of the state switches.
         residuals, tangents, solves, iterations: what implicit methods asked of the system, and
             iterations of Newton's method.
+        laws_tangents: how many of the tangents were made of inertia and laws alone.
     """
 
     steps: int
@@ -129,6 +130,7 @@ class Statistics:
     tangents: int = 0
     solves: int = 0
     iterations: int = 0
+    laws_tangents: int = 0
 
 
 class Run:
@@ -168,6 +170,8 @@ class Run:
     ) -> None:
         self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
         self._refuse_unsuited(tableau)
+        if settings.tangent == "laws" and not system.implicit.laws:
+            raise SceneError('tangent = "laws": this system has none by laws alone')
         self._kept: list[Any] = [system]
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
@@ -178,6 +182,7 @@ class Run:
         run.fixed_step = 0.0 if settings.step is None else settings.step
         run.first_step, run.min_step = settings.first_step, settings.min_step
         run.max_step, run.max_steps = settings.max_step, settings.max_steps
+        run.tangents = TANGENTS.index(settings.tangent)
         if settings.step is not None and not settings.step > 0.0:
             raise SceneError(
                 f"step = {settings.step!r}: a fixed step is a time above zero, in seconds"
@@ -385,6 +390,7 @@ class Run:
             tangents=int(c.tangents),
             solves=int(c.solves),
             iterations=int(c.iterations),
+            laws_tangents=int(c.laws_tangents),
         )
 
     @property

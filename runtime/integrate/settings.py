@@ -12,7 +12,7 @@ from mstmm.arrays import numbers, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
-from .steppers import AUTO, AUTO_EXPLICIT, check_radius
+from .steppers import AUTO, AUTO_EXPLICIT, TANGENTS, check_radius, check_tangent
 
 #: Absolute tolerances below this are this: squares of errors against them must not overflow.
 _LEAST = 1e-100
@@ -25,7 +25,8 @@ class Settings:
     `first_step`, `min_step` and `max_step` (s) are chosen by the loop where they are 0, and
     `max_steps` is 0 for as many as it takes.  `radius` is the spectral radius, 0 to 1, that
     generalised alpha leaves to infinitely fast motion, None for its usual one.  `scheme` and
-    `iterations` (most linear solutions a step) are for the methods dttmm-classical.
+    `iterations` (most linear solutions a step) are for the methods dttmm-classical.  `tangent` is
+    what implicit methods linearise by, one of `steppers.TANGENTS`.
     """
 
     t_end: float
@@ -42,6 +43,7 @@ class Settings:
     radius: float | None = None
     scheme: str = ""
     iterations: int = 1
+    tangent: str = TANGENTS[0]
 
     @property
     def first_method(self) -> str:
@@ -98,11 +100,17 @@ def checked(settings: Settings) -> Settings:
         max_steps=whole(
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
+        tangent=_tangent(settings),
         radius=None if settings.radius is None else _radius(settings.method, settings.radius),
         iterations=whole(
             "iterations", settings.iterations, 1, "a whole number of iterations, 1 or more"
         ),
     )  # fmt: skip
+
+
+def _tangent(settings: Settings) -> str:
+    check_tangent(settings.method, settings.tangent)
+    return settings.tangent
 
 
 def _radius(method: str, value: float) -> float:

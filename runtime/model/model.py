@@ -203,6 +203,7 @@ class Model(Compiled):
         radius: float | None = None,
         scheme: str = "",
         iterations: int = 1,
+        tangent: str = "auto",
         certify: bool = False,
         progress: Callable[[float, float], None] | None = None,
         checkpoint: str | Path | None = None,
@@ -227,6 +228,10 @@ class Model(Compiled):
                 (0.8).
             scheme, iterations: of dttmm-classical; generalised-alpha, hht, newmark or wilson, with
                 a number as in "hht:0.3", and how many linear solutions a step may take.
+            tangent: of the equations of motion, for implicit methods: exact; laws, inertia and the
+                slopes of hinges' laws alone, for those that do without the exact one (ros34pw2,
+                rodas4pw, and methods that iterate); auto, exact but where iterations may begin
+                with laws.
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
             progress: called with (t, t_end) about every 0.1 s.
@@ -243,6 +248,7 @@ class Model(Compiled):
             Settings(
                 t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
                 max_steps, radius=radius, scheme=scheme, iterations=iterations,
+                tangent=tangent,
             )
         )  # fmt: skip
         q, u = self.initial_state() if initial is None else pair("initial", initial)
@@ -268,6 +274,7 @@ class Model(Compiled):
         max_step: float = 0.0,
         max_steps: int = 0,
         radius: float | None = None,
+        tangent: str = "auto",
         threads: int | None = None,
     ) -> BatchResult:
         """Integrate n independent trajectories to `t_end` (s).
@@ -277,8 +284,8 @@ class Model(Compiled):
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
             threads: as many as the machine has processors if not given.
-            method, step, rtol, atol, t_start, max_step, max_steps, radius: as in `simulate`; auto
-                chooses for each trajectory.
+            method, step, rtol, atol, t_start, max_step, max_steps, radius, tangent: as in
+                `simulate`; the method auto chooses for each trajectory.
 
         Trajectories run side by side in the lanes of vectors, by explicit methods, where the scene
         has neither events, releases, twist springs nor drives, and over threads.  The numbers of
@@ -292,7 +299,7 @@ class Model(Compiled):
 
         settings = Settings(
             t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps,
-            radius=radius,
+            radius=radius, tangent=tangent,
         )  # fmt: skip
         settings, q, u = prepared(self, settings, initial_states)
         return simulate_batch(

@@ -46,6 +46,11 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 SYSTEMS = {"bouncing": (bouncing, (1.0, 0.0)), "hanging": (hanging, (0.0, 0.4, 0, 0, 0))}
 
 
+def test_a_tangent_by_laws_is_asked_of_systems_that_have_one(lab: Lab) -> None:
+    with pytest.raises(SceneError, match="has none by laws alone"):
+        hanging(lab).run("ros34pw2", 1.0, (0.0, 0.4, 0, 0, 0), tangent="laws")
+
+
 def equal(a: Samples, b: Samples) -> bool:
     pairs = ((a.t, b.t), (a.y, b.y), (a.memory, b.memory), (a.event, b.event))
     return all(same_bits(x, y) for x, y in pairs)

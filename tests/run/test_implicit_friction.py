@@ -83,7 +83,7 @@ def test_iterated_methods_see_where_a_sharp_friction_breaks_away(method: str) ->
     model = pulled(1e-6)
     run = model.simulate(2.0, method, rtol=1e-4, atol=1e-6)
     assert run.success, run.message
-    assert run.q[-1] == pytest.approx(place(pulled(1e-3), 2.0), abs=2e-3)
+    assert run.q[-1] == pytest.approx(place(pulled(1e-3), 2.0), abs=1e-2)
     assert run.statistics is not None
     assert run.statistics.steps < 100
 
@@ -95,7 +95,7 @@ def test_an_arm_with_friction_meets_its_stops(method: str, damping: float) -> No
     run = model.simulate(1.0, method, rtol=1e-6, atol=1e-8)
     assert run.success, run.message
     second = get(method).order == 2
-    assert run.q[-1] == pytest.approx(place(model, 1.0), abs=2e-2 if second else 2e-3)
+    assert run.q[-1] == pytest.approx(place(model, 1.0), abs=2e-2 if second else 1e-2)
 
 
 @pytest.mark.parametrize("method", ["esdirk436", "kvaerno5", "genalpha", "hht", "newmark"])

@@ -42,7 +42,8 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     } else {
         const real *along = step->numbers + body->tangent
                             + MSTMM_TANGENT_ALONG(body->nu, body->nq) + j * body->nq;
-        for (int i = 0; i < body->nq; i++) q[i] = along[i];
+        const real share = step->laws_alone ? 1 / step->sq : 1;
+        for (int i = 0; i < body->nq; i++) q[i] = share * along[i];
     }
 }
 

@@ -93,6 +93,15 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     return failed ? run->implicit_code.looped.tangent(run, t, y, a, s, sq, kappa) : 0;
 }
 
+/* Laws alone gain nothing where the tangent is a few lines: the looped engine has them, for who asks. */
+static int laws(void *context, double t, const double *y, const double *a, double s, double sq,
+                int kappa)
+{
+    mstmm_scene_run *run = context;
+    run->implicit_code.looped_tangent = 1;
+    return run->implicit_code.looped.laws(run, t, y, a, s, sq, kappa);
+}
+
 static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const real *x,
                        const real *rho, real *dq)
 {
@@ -148,5 +157,7 @@ void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, cons
     run->implicit.residual_rate = residual_rate;
     if (run->implicit.rates) run->implicit.rates = rates;
     run->implicit.tangent = tangent;
+    run->implicit.laws = laws;
+    run->implicit.laws_spare = 0;
     run->implicit.solve = solve;
 }

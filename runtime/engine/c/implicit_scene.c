@@ -70,6 +70,32 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, 1, s, sq, kappa));
 }
 
+static int laws(void *context, double t, const double *y, const double *a, double s, double sq,
+                int kappa)
+{
+    mstmm_scene_run *run = context;
+    const int code = at_base(run, t, y, a);
+    return code ? code : failed(run, run->base, mstmm_laws_factor(run->base, 1, s, sq, kappa));
+}
+
+/* With laws alone what is known of the increments is pushed through the laws alone, too: methods that
+ * take any matrix for the tangent take the same one everywhere. */
+static int solve_by_laws(mstmm_scene_run *run, const double *r, const double *rho_q,
+                         const double *rho_u, double *dq, double *du, double *da)
+{
+    const int nu = run->model->nu, known = rho_q || rho_u;
+    mstmm_tangent *base = run->base;
+    real *known_q = run->known, *known_u = known_q + run->model->nq;
+    int code = 0;
+    for (int j = 0; j < nu; j++) known_u[j] = rho_u ? rho_u[j] / base->s : 0;
+    mstmm_tangent_free(base, known_u);
+    if (known) code = mstmm_tangent_coordinates(base, known_u, rho_q, known_q);
+    if (!code) code = mstmm_laws_solve(base, r, known ? known_q : NULL, known_u, da);
+    for (int j = 0; !code && j < nu; j++) du[j] = da[j] / base->s + known_u[j];
+    if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
+    return failed(run, base, code);
+}
+
 /* Known increments: the coordinates' of rho_q, -rho_u of the accelerations. */
 static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
                  double *dq, double *du, double *da)
@@ -77,6 +103,7 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     mstmm_scene_run *run = context;
     const int nq = run->model->nq, nu = run->model->nu;
     mstmm_tangent *base = run->base;
+    if (base->laws_alone) return solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
     real *known_q = run->known, *still = known_q + nq, *known_a = still + nu;
     const mstmm_known known = {.q = known_q, .a = known_a};
     const int some = rho_q || rho_u;
@@ -146,7 +173,7 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     run->implicit = (mstmm_implicit){
         .n_q = model->nq, .n_u = model->nu, .coordinates = run->coordinates, .residual = residual,
         .residual_rate = residual_rate, .rates = is_straight(model) ? NULL : rates,
-        .tangent = tangent, .solve = solve, .slope = slope,
+        .tangent = tangent, .laws = laws, .laws_spare = 1, .solve = solve, .slope = slope,
         .impose = somebody_imposes(model) ? impose : NULL,
     };
     system->implicit = &run->implicit;

@@ -212,6 +212,8 @@ typedef struct mstmm_tangents {
     real *numbers;        /* see mstmm_tangent_lay */
     /* Along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x */
     real rate, s, sq, kappa;
+    int laws_alone;       /* kappa counts for nothing: see mstmm_laws_factor */
+    int shifted;          /* some increments of a right-hand side are known */
     int *negative;        /* whether the determinant is so far; NULL: one of a body's is a failure */
     const real *rho;      /* nq: what the rates lack */
     real *change;         /* nq: change of the coordinates */

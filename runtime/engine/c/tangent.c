@@ -336,6 +336,14 @@ static int close_couplings(mstmm_tangent *at, int negative)
                       code == 1 ? 1 : MSTMM_NEGATIVE);
 }
 
+static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
+{
+    at->rate = rate;
+    at->s = s;
+    at->sq = sq;
+    at->kappa = kappa;
+}
+
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     const mstmm_model *model = at->model;
@@ -344,10 +352,8 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
-    at->rate = rate;
-    at->s = s;
-    at->sq = sq;
-    at->kappa = kappa;
+    take_steps(at, rate, s, sq, kappa);
+    at->laws_alone = 0;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
@@ -358,8 +364,57 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     return code || !at->n_coupled ? code : close_couplings(at, negative);
 }
 
+/* Unknown are accelerations: of the increments they are what carries the others along. */
+static mstmm_tangents steps_of_laws(const mstmm_tangent *at)
+{
+    return (mstmm_tangents){.numbers = at->numbers, .rate = at->rate / at->s, .s = 1,
+                            .sq = at->s * at->sq, .laws_alone = 1};
+}
+
+int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
+{
+    const mstmm_model *model = at->model;
+    const mstmm_parts parts = parts_of(at);
+    take_steps(at, rate, s, sq, kappa);
+    at->laws_alone = 1;
+    mstmm_tangents step = steps_of_laws(at);
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    state.slope = &slope;
+    state.tangents = &step;
+    memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
+    memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
+    memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    return mstmm_run_laws_alone(&state);
+}
+
+int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a)
+{
+    const mstmm_parts parts = parts_of(at);
+    mstmm_tangents step = steps_of_laws(at);
+    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    state.slope = &slope;
+    state.tangents = &step;
+    state.column = r;
+    state.answer = a;
+    step.shifted = dq && du;
+    if (step.shifted) {
+        slope.q = dq;
+        slope.u = du;
+    }
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
+    return mstmm_run_laws_solution(&state);
+}
+
+static int solve_by_laws(mstmm_tangent *at, const real *r, real *du)
+{
+    const int code = mstmm_laws_solve(at, r, NULL, NULL, du);
+    for (int j = 0; j < at->model->nu; j++) du[j] /= at->s;
+    return code;
+}
+
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x)
 {
+    if (at->laws_alone) return solve_by_laws(at, r, x);
     const int m = at->n_coupled, nu = at->model->nu;
     int code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
@@ -415,6 +470,20 @@ int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *d
     return 0;
 }
 
+/* dq of a hinge whose rates go by its coordinates, with laws alone: what it changes the rates by is
+ * taken from itself once. */
+static int once_around(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body, int i)
+{
+    real *d_q = mstmm_aimed(state->slope->q) + body->q, *dq = state->tangents->change + body->q;
+    int code = 0;
+    for (int round = 0; !code && round < (at->kappa > 0 ? 2 : 1); round++) {
+        code = mstmm_at_rates_change(state, i);
+        for (int j = 0; j < body->nq; j++) d_q[j] = dq[j] /= at->sq;
+    }
+    memset(d_q, 0, (size_t)body->nq * sizeof(real));
+    return code;
+}
+
 int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq)
 {
     const mstmm_model *model = at->model;
@@ -432,7 +501,8 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
             for (int j = 0; j < body->nu; j++)
                 dq[body->q + j] = (du[body->u + j] + step.rho[body->q + j]) / at->sq;
         } else {
-            const int code = mstmm_at_lagged(&state, i);
+            const int code = at->laws_alone ? once_around(&state, at, body, i)
+                                            : mstmm_at_lagged(&state, i);
             if (code) return code;
         }
         if (!body->modal) continue;

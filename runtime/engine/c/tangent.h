@@ -26,6 +26,7 @@ typedef struct {
     real *answers;        /* n_coupled x nu: to one of each */
     real *closure;        /* n_coupled x (2 n_coupled + 3) */
     int known;            /* there has been a residual since the memory changed */
+    int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;
@@ -57,8 +58,14 @@ typedef struct {
     const real *q, *a;
 } mstmm_known;
 /* x (nu) that makes the change of R equal to r, beside what is known (NULL: nothing), which must be
- * zero where somebody imposes. */
+ * zero where somebody imposes.  By laws alone nothing is known. */
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x);
+/* In place of the tangent: inertia with the slopes of laws and modes alone, no more than their
+ * symmetric part.  s and sq above zero. */
+int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
+/* Accelerations a (nu) that make the change of R equal to r, with coordinates and speeds that change
+ * besides by dq and du; both NULL: none do. */
+int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a);
 /* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
  * residual, whose workspace this writes to. */
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);

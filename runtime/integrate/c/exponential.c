@@ -27,7 +27,7 @@ static int unknowns(const mstmm_work *work) { return work->implicit->n_q + work-
 
 static int invert_mass(const mstmm_work *work, double t) {
   const int n_u = work->implicit->n_u;
-  int status = mstmm_step_tangent(work, t, work->y, ALL_MASS, 1.0, 0);
+  int status = mstmm_step_tangent(work, t, work->y, ALL_MASS, 1.0, 0, 0);
   for (int j = 0; j < n_u && !status; j++) {
     for (int i = 0; i < n_u; i++) work->residual[i] = i == j;
     status = mstmm_step_solve(work, t, NULL, NULL);

@@ -35,10 +35,12 @@ int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const do
 }
 
 int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
-                  int kappa) {
+                  int kappa, int laws) {
+  const mstmm_implicit *at = work->implicit;
   work->run->count.tangents++;
-  const int code = work->implicit->tangent(work->system->context, t, row,
-                                           row + work->system->n_state, s, sq, kappa);
+  work->run->count.laws_tangents += laws;
+  const int code = (laws ? at->laws : at->tangent)(work->system->context, t, row,
+                                                   row + work->system->n_state, s, sq, kappa);
   return code ? mstmm_note(work->run, MSTMM_TANGENT_FAILED, code, -1, t) : 0;
 }
 

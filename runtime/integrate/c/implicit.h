@@ -24,7 +24,12 @@ typedef struct mstmm_implicit {
    * 0 solutions are asked for without rho. */
   int (*tangent)(void *context, double t, const double *y, const double *a, double s, double sq,
                  int kappa);
-  /* K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,  s du = da + rho_u, at the base
+  /* The same with slopes of laws in place of K and C, which costs about as much as a solution: an
+   * approximation.  NULL: there is none. */
+  int (*laws)(void *context, double t, const double *y, const double *a, double s, double sq,
+              int kappa);
+  int laws_spare; /* it costs so much less than the tangent that iterations should try it */
+  /* With the last of both: K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,  s du = da + rho_u, at the base
    * point; rho may be NULL (zeros).  Entries of imposed speeds come back as zeros. */
   int (*solve)(void *context, const double *r, const double *rho_q, const double *rho_u,
                double *dq, double *du, double *da);

@@ -32,8 +32,9 @@ void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y);
 int mstmm_step_impose(const mstmm_work *work, double t, double *row);
 int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq);
+/* `laws`: that of laws alone */
 int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
-                  int kappa);
+                  int kappa, int laws);
 /* For the right-hand side in work->residual, to work->dq, du and da. */
 int mstmm_step_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
 /* A slope row at a state row: rates, accelerations, and rates of the quadratures. */

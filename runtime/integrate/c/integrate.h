@@ -112,6 +112,9 @@ enum {
   MSTMM_NOT_CONVERGED = -11   /* Newton's iteration, at `fail_time`, least of all in `component` */
 };
 
+/* Which tangent implicit methods take: each what suits it, the exact one, or that of laws alone. */
+enum { MSTMM_ANY_TANGENT = 0, MSTMM_EXACT_TANGENT = 1, MSTMM_LAWS_TANGENT = 2 };
+
 /* The changing part of a run, only doubles and only 64-bit integers, so that it can be saved. */
 typedef struct mstmm_run_real {
   double t;      /* time of the current good state */
@@ -155,6 +158,9 @@ typedef struct mstmm_run_count {
   int64_t stability_limited_steps, stability_limited;
   /* implicit methods */
   int64_t residuals, tangents, solves, iterations;
+  int64_t laws_tangents; /* how many of the tangents were those of laws alone */
+  /* Newton: the last one is; stages still to be solved by exact ones, and how many in a row last */
+  int64_t by_laws, exact_left, exact_row;
   int64_t tangent_valid; /* the workspace holds where it was taken */
   int64_t tangent_held;  /* and the system has it factored */
   /* Rosenbrock: steps still to be made by evaluated accelerations, and how many in a row last time */
@@ -171,6 +177,7 @@ typedef struct mstmm_run {
   const mstmm_tableau *tableau;
   double t_start, t_end;
   double fixed_step; /* > 0: fixed steps t_start + i fixed_step; 0: adaptive */
+  int tangents; /* implicit methods: which tangent, see above */
   double rtol;
   const double *atol; /* n_error; may be NULL with fixed steps */
   double first_step, min_step, max_step; /* 0: chosen */

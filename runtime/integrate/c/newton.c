@@ -1,6 +1,10 @@
 /* Newton's iteration for a stage of an implicit method, with a tangent that is kept from step to step
  * as long as it serves.
  *
+ * Where the tangent by laws alone is much cheaper it comes first: what it leaves out, slopes of inertia
+ * and loads, contracts an iteration like (h w)^2, w the fastest motion that they cause.  Where that
+ * contraction turns out slow, some stages are solved with exact tangents before it is tried again.
+ *
  * Where it was taken is part of the run's state, so that a run that is continued elsewhere factors
  * the same tangent again and goes on bit for bit. */
 #include "implicit_step.h"
@@ -17,20 +21,33 @@ static const double SURE = 1e-2;    /* no contraction is trusted to be better */
 static const double FORGET = 2.0;   /* how fast one that is not measured again grows */
 static const double ROUNDING = 1e-10; /* of the first increment: no iteration makes it smaller */
 static const double NOTHING = 1e-4;   /* of the tolerance: rounding, by which nothing is measured */
-enum { MOST_ITERATIONS = 10 };
+/* The same of laws alone, which cost less to renew than an iteration */
+static const double SLOW_BY_LAWS = 0.1, CHANGED_BY_LAWS = 0.01;
+static const double TOO_SLOW = 0.25; /* contraction by new laws from which on an exact tangent pays */
+static const double HOPELESS = 0.5;  /* and at once, in the midst of an iteration */
+enum { MOST_ITERATIONS = 10, FIRST_EXACT = 8, MOST_EXACT = 256 };
 
 /* How hard to try: with the tangent in hand, with a new one, with a new one in every iteration */
 enum { KEPT, RENEWED, EACH };
 
-static int take(const mstmm_work *work, const mstmm_newton_equations *stage) {
+/* Which of the two tangents to take */
+static int wants_laws(const mstmm_work *work) {
+  const mstmm_run *run = work->run;
+  if (!work->implicit->laws || work->tableau->one_iteration) return 0;
+  if (run->tangents != MSTMM_ANY_TANGENT) return run->tangents == MSTMM_LAWS_TANGENT;
+  return work->implicit->laws_spare && run->count.exact_left == 0;
+}
+
+static int take(const mstmm_work *work, const mstmm_newton_equations *stage, int laws) {
   mstmm_run *run = work->run;
   memcpy(work->base, work->y_stage, (size_t)work->row * sizeof(double));
+  run->real.contraction = -1.0;
   run->real.tangent_t = stage->t;
   run->real.tangent_s = stage->s;
   run->real.tangent_sq = stage->sq;
-  run->real.contraction = -1.0;
+  run->count.by_laws = laws;
   const int status =
-      mstmm_step_tangent(work, stage->t, work->base, stage->s, stage->sq, stage->kappa);
+      mstmm_step_tangent(work, stage->t, work->base, stage->s, stage->sq, stage->kappa, laws);
   run->count.tangent_valid = run->count.tangent_held = !status;
   return status;
 }
@@ -38,15 +55,17 @@ static int take(const mstmm_work *work, const mstmm_newton_equations *stage) {
 /* Does the tangent in hand serve this stage? */
 static int serves(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_run *run = work->run;
-  return run->count.tangent_valid && run->real.contraction <= SLOW &&
-         fabs(stage->s / run->real.tangent_s - 1.0) <= CHANGED;
+  const int laws = (int)run->count.by_laws;
+  return run->count.tangent_valid && run->real.contraction <= (laws ? SLOW_BY_LAWS : SLOW) &&
+         fabs(stage->s / run->real.tangent_s - 1.0) <= (laws ? CHANGED_BY_LAWS : CHANGED);
 }
 
 /* Factors the kept tangent again where somebody else may have used the system since. */
 static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
+  const mstmm_implicit *at = work->implicit;
   if (run->count.tangent_held) return 0;
-  const int code = work->implicit->tangent(
+  const int code = (run->count.by_laws && at->laws ? at->laws : at->tangent)(
       work->system->context, run->real.tangent_t, work->base, mstmm_row_a(work, work->base),
       run->real.tangent_s, run->real.tangent_sq, stage->kappa);
   run->count.tangent_held = !code;
@@ -80,6 +99,11 @@ static double enough(const mstmm_work *work) {
   return fmax(ENOUGH, part * run->real.error_previous);
 }
 
+/* Is there a better tangent than the one in hand? */
+static int may_go_exact(const mstmm_work *work) {
+  return work->run->count.by_laws && work->run->tangents == MSTMM_ANY_TANGENT;
+}
+
 /* What is left of the error after an increment of this size */
 static double left(double contraction, double size) {
   const double rate = fmax(contraction, SURE);
@@ -88,9 +112,9 @@ static double left(double contraction, double size) {
 
 static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, int effort) {
   double *contraction = &work->run->real.contraction, size = 0.0, before = 0.0, first = 0.0;
-  const double limit = enough(work);
+  const double limit = enough(work), most = may_go_exact(work) ? HOPELESS : 1.0;
   for (int i = 0; i < MOST_ITERATIONS; i++) {
-    int status = i && effort == EACH ? take(work, stage) : 0;
+    int status = i && effort == EACH ? take(work, stage, 0) : 0;
     if (!status) status = improve(work, stage, &size);
     if (status) return status;
     if (work->tableau->one_iteration) return 0;
@@ -100,7 +124,7 @@ static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, 
     const int measured = i > 0 && before > 0.0;
     if (measured) {
       *contraction = size / before;
-      if (*contraction >= 1.0 && effort != EACH && left(SURE, size) >= limit) break;
+      if (*contraction >= most && effort != EACH && left(SURE, size) >= limit) break;
     }
     const double known = effort == EACH ? fmin(*contraction, 0.5) : *contraction;
     if (known >= 0.0 && known < 1.0 && left(known, size) < limit) {
@@ -112,15 +136,36 @@ static int iterate(const mstmm_work *work, const mstmm_newton_equations *stage, 
   return not_converged(work, stage->t);
 }
 
+/* As often as new tangents of laws alone are too slow, twice as many stages are solved without. */
+static void learn(const mstmm_work *work, int effort, int solved) {
+  mstmm_run_count *count = &work->run->count;
+  if (!may_go_exact(work)) {
+    if (count->exact_left > 0) count->exact_left--;
+  } else if (effort == RENEWED && (!solved || work->run->real.contraction > TOO_SLOW)) {
+    count->exact_row = count->exact_row ? 2 * count->exact_row : FIRST_EXACT;
+    if (count->exact_row > MOST_EXACT) count->exact_row = MOST_EXACT;
+    count->exact_left = count->exact_row;
+  } else if (solved) {
+    count->exact_row /= 2;
+  }
+}
+
 int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage) {
+  mstmm_run_count *count = &work->run->count;
   int effort = serves(work, stage) && !work->tableau->one_iteration ? KEPT : RENEWED;
+  int laws = wants_laws(work);
   memcpy(work->y_first, work->y_stage, (size_t)work->row * sizeof(double));
-  for (;; effort++) {
-    int status = effort == KEPT ? hold(work, stage) : take(work, stage);
+  for (;;) {
+    int status = effort == KEPT ? hold(work, stage) : take(work, stage, laws);
     if (!status) status = iterate(work, stage, effort);
+    learn(work, effort, !status);
     if (!status) return 0;
-    work->run->count.tangent_valid = 0;
+    count->tangent_valid = 0;
     if (effort == EACH) return status;
+    if (effort == RENEWED && laws)
+      laws = 0; /* once more with an exact one */
+    else
+      effort++;
     memcpy(work->y_stage, work->y_first, (size_t)work->row * sizeof(double));
   }
 }

@@ -94,6 +94,9 @@ static int stage(const mstmm_work *work, int i, form *prepare) {
   return status ? status : solve_stage(work, i, t);
 }
 
+/* Methods of order whatever the tangent have it in the second form alone. */
+static int by_laws(const mstmm_work *work) { return work->run->tangents == MSTMM_LAWS_TANGENT; }
+
 /* The tangent, and the first stage, which is the same in both forms */
 static int begin(const mstmm_work *work, double t) {
   const double s = 1.0 / (work->tableau->gamma * work->run->real.h);
@@ -101,7 +104,7 @@ static int begin(const mstmm_work *work, double t) {
       work->implicit->residual_rate(work->system->context, t, work->y,
                                     mstmm_row_a(work, work->y), work->residual_rate);
   if (code) return mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t);
-  const int status = mstmm_step_tangent(work, t, work->y, s, s, 1);
+  const int status = mstmm_step_tangent(work, t, work->y, s, s, 1, by_laws(work));
   if (status) return status;
   take_slope(work, work->k);
   return solve_stage(work, 1, t);
@@ -158,6 +161,7 @@ static int carried_well(const mstmm_work *work) {
  * are made in the second. */
 static int choose(const mstmm_work *work) {
   mstmm_run_count *count = &work->run->count;
+  if (by_laws(work)) return make(work, evaluated);
   if (count->evaluated_left > 0) {
     count->evaluated_left--;
     return make(work, evaluated);

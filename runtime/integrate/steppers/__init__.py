@@ -21,10 +21,12 @@ __all__ = [
     "BUILT_IN",
     "EXPLICIT",
     "IMPLICIT",
+    "TANGENTS",
     "WITH_RADIUS",
     "Tableau",
     "check_radius",
     "check_size",
+    "check_tangent",
     "from_monomials",
     "frozen",
     "get",
@@ -42,6 +44,14 @@ BUILT_IN = EXPLICIT + IMPLICIT
 
 #: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
 WITH_RADIUS = ("genalpha", "dttmm")
+
+#: Tangents of the equations of motion that implicit methods may take, in the order of the C loop's
+#: numbers: auto is the exact one for Rosenbrock methods, while iterations try that of laws alone.
+TANGENTS = ("auto", "exact", "laws")
+
+#: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
+WITHOUT_EXACT = ("ros34pw2", "rodas4pw")
+ITERATED = ("esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt")
 
 #: The name of the choice that a run makes among methods, and the one by which it begins.
 AUTO, AUTO_EXPLICIT = "auto", "dop853"
@@ -93,6 +103,26 @@ def check_size(tableau: Tableau, unknowns: int) -> None:
             f"speeds, at most {tableau.most_unknowns}; here there are {unknowns}: take rodas5p or, "
             "for vibration that is to stay, dop853, or bend bodies by fewer shapes"
         )
+
+
+def check_tangent(name: str, tangent: str) -> None:
+    """SceneError for a tangent that there is not, or with which a method loses what it is for."""
+    if tangent not in TANGENTS:
+        raise SceneError(f"tangent = {tangent!r}: expected one of {', '.join(TANGENTS)}")
+    if tangent == TANGENTS[0] or (tangent == "exact" and name in IMPLICIT):
+        return
+    able = (*WITHOUT_EXACT, *ITERATED)
+    if name in able:
+        return
+    if name in IMPLICIT:
+        raise SceneError(
+            f'tangent = "{tangent}": {name} falls to a low order without the exact tangent (rodas4 '
+            f"to the first); those that do without are {', '.join(able)}"
+        )
+    raise SceneError(
+        f'tangent = "{tangent}": method {name!r} takes none that could be chosen; those that do '
+        f"are {', '.join(IMPLICIT)}"
+    )
 
 
 def get(name: str, radius: float | None = None) -> Tableau:

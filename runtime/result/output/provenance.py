@@ -151,7 +151,7 @@ def _number(value: Any) -> Any:
 def _settings(found: dict[str, Any]) -> Settings:
     """Settings of values that are of the kind that settings have."""
     for name, value in found.items():
-        if name not in ("method", "output_times", "scheme"):
+        if name not in ("method", "output_times", "scheme", "tangent"):
             _number(value)
     method = found["method"]
     if method not in (AUTO, *second_opinion.METHODS, *classical.METHODS):
@@ -171,7 +171,8 @@ def trajectory(data: Any) -> Trajectory:
     settings = _settings(json.loads(a["settings"]) | {"output_times": times})
     statistics = json.loads(a["statistics"])
     if statistics is not None:
-        later = ("crossings", "residuals", "tangents", "solves", "iterations")
+        later = ("crossings", "residuals", "tangents", "solves", "iterations",
+                 "laws_tangents")  # fmt: skip
         known = dict.fromkeys(later, 0) | statistics  # older files do not tell of them
         statistics = Statistics(**{f.name: _number(known[f.name]) for f in fields(Statistics)})
     status = None if a["status"] == "INTERRUPTED" else Status[a["status"]]
