@@ -88,6 +88,11 @@ def checked(settings: Settings) -> Settings:
         )
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
+    if settings.step is not None and longest and longest != np.inf:
+        raise SceneError(
+            f"max_step = {longest!r}: bounds steps that the method chooses, but step = "
+            f"{settings.step!r} fixes them all; leave one of the two out"
+        )
     return replace(
         settings,
         t_start=t_start, t_end=t_end,

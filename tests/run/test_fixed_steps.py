@@ -85,3 +85,9 @@ def test_what_rests_is_not_said_to_be_missed() -> None:
     )
     assert result.success
     assert not told(result)
+
+
+def test_a_longest_step_beside_a_fixed_one_is_refused() -> None:
+    with pytest.raises(mstmm.SceneError, match=r"max_step = 0\.1: .* step = 0\.01 fixes them all"):
+        swung(0.01, "genalpha", max_step=0.1)
+    assert swung(0.01, "genalpha", max_step=np.inf).success

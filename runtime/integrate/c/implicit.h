@@ -29,8 +29,9 @@ typedef struct mstmm_implicit {
   int (*laws)(void *context, double t, const double *y, const double *a, double s, double sq,
               int kappa);
   int laws_spare; /* it costs so much less than the tangent that iterations should try it */
-  /* With the last of both: K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,  s du = da + rho_u, at the base
-   * point; rho may be NULL (zeros).  Entries of imposed speeds come back as zeros. */
+  /* With the last of both, K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,
+   * s du = da + rho_u, at the base point; rho may be NULL (zeros).  Entries of imposed speeds come
+   * back as zeros. */
   int (*solve)(void *context, const double *r, const double *rho_q, const double *rho_u,
                double *dq, double *du, double *da);
   /* Changes of the rates of the coordinates (n_q) and of R (n_u) along (dq, du) at (t, y, a), zeros
