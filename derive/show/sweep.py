@@ -176,6 +176,7 @@ class _Steps:
 #: Directions, each with its number c.
 _DIRECTIONS = {
     "free": "every free speed c of the hinge, and what changes with it in a step",
+    "felt": "every free speed c of the hinge that the law feels",
     "rates": "every speed c of the hinge alone",
     "coordinates": "every coordinate c of the hinge alone",
     "law": "every unknown c that goes with a speed of the law",
