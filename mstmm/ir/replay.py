@@ -272,8 +272,9 @@ class _Numbers(Counted):
         """LU with row exchange; right-hand sides are eliminated alongside."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         m = len(b) // n if n else 0
-        limit = self.arithmetic.number(solve.relative_pivot)
+        limit, one = (self.arithmetic.number(x) for x in (solve.relative_pivot, 1.0))
         divide, less = self.operations["div"], self.operations["lt"]
+        scales = list[Any]()
         rows = [[*a[n * i : n * i + n], *b[m * i : m * i + m]] for i in range(n)]
         sizes = [sum((abs(a[n * k + i]) for k in range(n)), self.zero) for i in range(n)]
         for i in range(n):
@@ -283,15 +284,16 @@ class _Numbers(Counted):
                     best = k
             rows[i], rows[best] = rows[best], rows[i]
             self.judge(less(limit * sizes[i], abs(rows[i][i])), solve)
+            scales.append(divide(one, rows[i][i]))
             for k in range(i + 1, n):
-                factor = divide(rows[k][i], rows[i][i])
+                factor = rows[k][i] * scales[i]
                 for j in range(i + 1, n + m):
                     rows[k][j] = rows[k][j] - factor * rows[i][j]
         for i in reversed(range(n)):
             for j in range(n, n + m):
                 for k in range(i + 1, n):
                     rows[i][j] = rows[i][j] - rows[i][k] * rows[k][j]
-                rows[i][j] = divide(rows[i][j], rows[i][i])
+                rows[i][j] = rows[i][j] * scales[i]
         return [x for row in rows for x in row[n:]]
 
     def _by_diagonal(self, solve: Solve) -> list[Any]:
