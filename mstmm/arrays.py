@@ -21,9 +21,13 @@ def real(name: str, value: Any, expected: str = "a finite number") -> float:
     number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
         raise SceneError(f"{name} = {_short(value)}: expected {expected}")
-    if not math.isfinite(number):
-        raise SceneError(f"{name} = {float(number)}: expected {expected}")
-    return float(number)
+    try:
+        found = float(number)
+    except OverflowError:  # a whole number beyond all floats, which may not even have a text
+        raise SceneError(f"{name} is beyond 1.8e308: expected {expected}") from None
+    if not math.isfinite(found):
+        raise SceneError(f"{name} = {found}: expected {expected}")
+    return found
 
 
 def whole(name: str, value: Any, least: int, expected: str) -> int:

@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 _EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED)
 
 
+#: What a run may end with where an expression stops being a number.
+_BY_EXPRESSIONS = (
+    Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED, Status.TANGENT_FAILED,
+    Status.NOT_CONVERGED,
+)  # fmt: skip
 #: States looked at past the last good one lie this many times farther ahead each, up to this part
 #: of the time: a run ends within rounding of the place where an expression stops being a number.
 _FARTHER, _FARTHEST = 4.0, 1e-9
@@ -50,7 +55,7 @@ def message_of(system: SceneSystem, run: Run) -> str:
 
 def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at: float) -> str:
     """The expression that stopped a run whose last good state is (t, y); empty if none did."""
-    if status not in (Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED):
+    if status not in _BY_EXPRESSIONS:
         return ""
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]

@@ -152,3 +152,9 @@ def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
     run = model.simulate(np.float32(0.5), rtol=np.float64(1e-6), max_steps=np.int64(1000),
                          output_times=np.array([0, 0.5], np.float32), max_step=np.inf)  # fmt: skip
     assert run.success and list(run.t) == [0.0, 0.5]
+
+
+@pytest.mark.parametrize("name", ["step", "rtol", "t_end"])
+def test_a_number_beyond_all_floats_is_refused(model: Any, name: str) -> None:
+    with pytest.raises(mstmm.SceneError, match=f"{name} is beyond 1.8e308: expected"):
+        model.simulate(**{"t_end": 0.1, name: 10**5000})

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from run.test_failures import check_remains, singular
 from stiff import motions
+from support.result_scenes import pins
 
 import mstmm
 from mstmm.errors import SceneError
@@ -50,6 +51,15 @@ def test_a_run_into_a_state_in_which_a_motion_is_undetermined(method: str) -> No
     assert "inertia (law.inertia)" in run.message
     assert run.last_state[0] == pytest.approx(0.5, abs=0.011)
     check_remains(run)
+
+
+@pytest.mark.parametrize("effort", ["sqrt(0.05 - t)", "log(0.06 + q)"])
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_an_expression_that_is_no_number_is_named(method: str, effort: str) -> None:
+    model = mstmm.compile(pins(1, [0.0], effort=[effort]), engine="looped")
+    run = model.simulate(1.0, method, **steps(method, 1e-3))
+    assert not run.success
+    assert f'hinge "pin0": law.effort[0] = "{effort}" is nan at t = 0.' in run.message
 
 
 # --- what topples ---------------------------------------------------------------------------------
