@@ -543,6 +543,18 @@ int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restri
     const real *restrict d_d, real *restrict theta, real *restrict x);
 int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b);
+int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict z_I, const real *restrict p_I, real *restrict p);
+int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
+    real *restrict d_A, real *restrict d_x, real *restrict d_v);
+int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
+    const real *restrict v_P, const real *restrict v, const real *restrict d_v,
+    const real *restrict Q, real *restrict B_p);
+int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
+    real *restrict S_wI);
+int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+    real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -1322,5 +1334,19 @@ int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict
     real *restrict work);
 int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
     real *restrict dq);
+int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
+    real *restrict Z_p);
+int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict Z_p, real *restrict K, real *restrict Z_x);
+int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
+    const real *restrict V, real *restrict gain, real *restrict S_p);
+int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
+    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
+    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
+int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x);
+int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+    real *restrict y);
 
 #endif

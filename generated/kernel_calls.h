@@ -384,6 +384,79 @@ static inline int mstmm_frames_tangent_known_by(struct mstmm_frames_tangent_know
 }
 #define mstmm_frames_tangent_known(...) mstmm_frames_tangent_known_by((struct mstmm_frames_tangent_known){__VA_ARGS__})
 
+struct mstmm_frames_placed_moved {
+    const real *Rc;
+    const real *r;
+    const real *z_I;
+    const real *p_I;
+    real *p;
+};
+static inline int mstmm_frames_placed_moved_by(struct mstmm_frames_placed_moved to)
+{
+    return mstmm_sweep_frames_placed_moved(
+        to.Rc, to.r, to.z_I, to.p_I, to.p);
+}
+#define mstmm_frames_placed_moved(...) mstmm_frames_placed_moved_by((struct mstmm_frames_placed_moved){__VA_ARGS__})
+
+struct mstmm_frames_placed_pose {
+    const real *A;
+    const real *p;
+    real *d_A;
+    real *d_x;
+    real *d_v;
+};
+static inline int mstmm_frames_placed_pose_by(struct mstmm_frames_placed_pose to)
+{
+    return mstmm_sweep_frames_placed_pose(
+        to.A, to.p, to.d_A, to.d_x, to.d_v);
+}
+#define mstmm_frames_placed_pose(...) mstmm_frames_placed_pose_by((struct mstmm_frames_placed_pose){__VA_ARGS__})
+
+struct mstmm_frames_placed_column {
+    const real *theta;
+    const real *x;
+    const real *v_P;
+    const real *v;
+    const real *d_v;
+    const real *Q;
+    real *B_p;
+};
+static inline int mstmm_frames_placed_column_by(struct mstmm_frames_placed_column to)
+{
+    return mstmm_sweep_frames_placed_column(
+        to.theta, to.x, to.v_P, to.v, to.d_v, to.Q, to.B_p);
+}
+#define mstmm_frames_placed_column(...) mstmm_frames_placed_column_by((struct mstmm_frames_placed_column){__VA_ARGS__})
+
+struct mstmm_frames_placed_carry {
+    const real *Rc;
+    const real *r;
+    const real *S_p;
+    real *T_p;
+    real *T_w;
+    real *S_pI;
+    real *S_wI;
+};
+static inline int mstmm_frames_placed_carry_by(struct mstmm_frames_placed_carry to)
+{
+    return mstmm_sweep_frames_placed_carry(
+        to.Rc, to.r, to.S_p, to.T_p, to.T_w, to.S_pI, to.S_wI);
+}
+#define mstmm_frames_placed_carry(...) mstmm_frames_placed_carry_by((struct mstmm_frames_placed_carry){__VA_ARGS__})
+
+struct mstmm_frames_placed_known {
+    const real *S_p;
+    const real *b_p;
+    real *e_S;
+    real *e_b;
+};
+static inline int mstmm_frames_placed_known_by(struct mstmm_frames_placed_known to)
+{
+    return mstmm_sweep_frames_placed_known(
+        to.S_p, to.b_p, to.e_S, to.e_b);
+}
+#define mstmm_frames_placed_known(...) mstmm_frames_placed_known_by((struct mstmm_frames_placed_known){__VA_ARGS__})
+
 struct mstmm_frames_pose_slope {
     const real *A_I;
     const real *x_I;
@@ -1319,6 +1392,100 @@ static inline int mstmm_tangent_lagged_by(struct mstmm_tangent_lagged to)
         to.n, to.Q, to.rate, to.dq);
 }
 #define mstmm_tangent_lagged(...) mstmm_tangent_lagged_by((struct mstmm_tangent_lagged){__VA_ARGS__})
+
+struct mstmm_tangent_placed_rows {
+    int n;
+    const real *H;
+    const real *S_p;
+    real *Z_p;
+};
+static inline int mstmm_tangent_placed_rows_by(struct mstmm_tangent_placed_rows to)
+{
+    return mstmm_sweep_tangent_placed_rows(
+        to.n, to.H, to.S_p, to.Z_p);
+}
+#define mstmm_tangent_placed_rows(...) mstmm_tangent_placed_rows_by((struct mstmm_tangent_placed_rows){__VA_ARGS__})
+
+struct mstmm_tangent_placed_own {
+    int n;
+    const real *B_p;
+    const real *S_p;
+    const real *Z_p;
+    real *K;
+    real *Z_x;
+};
+static inline int mstmm_tangent_placed_own_by(struct mstmm_tangent_placed_own to)
+{
+    return mstmm_sweep_tangent_placed_own(
+        to.n, to.B_p, to.S_p, to.Z_p, to.K, to.Z_x);
+}
+#define mstmm_tangent_placed_own(...) mstmm_tangent_placed_own_by((struct mstmm_tangent_placed_own){__VA_ARGS__})
+
+struct mstmm_tangent_placed_reduce {
+    int n;
+    const real *inverse;
+    const real *Z_p;
+    const real *V;
+    real *gain;
+    real *S_p;
+};
+static inline int mstmm_tangent_placed_reduce_by(struct mstmm_tangent_placed_reduce to)
+{
+    return mstmm_sweep_tangent_placed_reduce(
+        to.n, to.inverse, to.Z_p, to.V, to.gain, to.S_p);
+}
+#define mstmm_tangent_placed_reduce(...) mstmm_tangent_placed_reduce_by((struct mstmm_tangent_placed_reduce){__VA_ARGS__})
+
+struct mstmm_tangent_placed_node {
+    int n;
+    const real *H;
+    const real *V;
+    const real *D;
+    const real *S_p;
+    const real *Z_p;
+    real *right;
+    real *gain;
+    real *S_c;
+    real *work;
+};
+static inline int mstmm_tangent_placed_node_by(struct mstmm_tangent_placed_node to)
+{
+    return mstmm_sweep_tangent_placed_node(
+        to.n, to.H, to.V, to.D, to.S_p, to.Z_p, to.right, to.gain, to.S_c, to.work);
+}
+#define mstmm_tangent_placed_node(...) mstmm_tangent_placed_node_by((struct mstmm_tangent_placed_node){__VA_ARGS__})
+
+struct mstmm_tangent_placed_absorb {
+    int n;
+    const real *Rc;
+    const real *r;
+    const real *H;
+    const real *B_p;
+    const real *S_p;
+    const real *T_p;
+    real *K;
+    real *Z_p;
+    real *Z_x;
+};
+static inline int mstmm_tangent_placed_absorb_by(struct mstmm_tangent_placed_absorb to)
+{
+    return mstmm_sweep_tangent_placed_absorb(
+        to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K, to.Z_p, to.Z_x);
+}
+#define mstmm_tangent_placed_absorb(...) mstmm_tangent_placed_absorb_by((struct mstmm_tangent_placed_absorb){__VA_ARGS__})
+
+struct mstmm_tangent_placed_left {
+    int n;
+    const real *gain;
+    const real *p;
+    real *y;
+};
+static inline int mstmm_tangent_placed_left_by(struct mstmm_tangent_placed_left to)
+{
+    return mstmm_sweep_tangent_placed_left(
+        to.n, to.gain, to.p, to.y);
+}
+#define mstmm_tangent_placed_left(...) mstmm_tangent_placed_left_by((struct mstmm_tangent_placed_left){__VA_ARGS__})
 
 struct mstmm_classical_body_transfer {
     const real *M;

@@ -66,6 +66,18 @@ int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restri
     const real *restrict d_d, real *restrict theta, real *restrict x);
 int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b);
+int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict z_I, const real *restrict p_I, real *restrict p);
+int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
+    real *restrict d_A, real *restrict d_x, real *restrict d_v);
+int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
+    const real *restrict v_P, const real *restrict v, const real *restrict d_v,
+    const real *restrict Q, real *restrict B_p);
+int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
+    real *restrict S_wI);
+int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+    real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
     const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
@@ -2553,6 +2565,1503 @@ static const mstmm_port mstmm_sweep_frames_tangent_known_outputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
+/* change of a body's place by the motion of its parent
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  p_I[9] change of the parent's place, parent axes
+ * out p[9] change of place: turn, place and velocity of P, own axes
+ */
+int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+    const real *restrict z_I, const real *restrict p_I, real *restrict p)
+{
+    const real t0 = Rc[0] * p_I[0];
+    const real t1 = Rc[3] * p_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[6] * p_I[2];
+    const real t4 = t2 + t3;
+    p[0] = t4;
+    const real t5 = Rc[1] * p_I[0];
+    const real t6 = Rc[4] * p_I[1];
+    const real t7 = t5 + t6;
+    const real t8 = Rc[7] * p_I[2];
+    const real t9 = t7 + t8;
+    p[1] = t9;
+    const real t10 = Rc[2] * p_I[0];
+    const real t11 = Rc[5] * p_I[1];
+    const real t12 = t10 + t11;
+    const real t13 = Rc[8] * p_I[2];
+    const real t14 = t12 + t13;
+    p[2] = t14;
+    const real t15 = r[2] * p_I[1];
+    const real t16 = r[1] * p_I[2];
+    const real t17 = t15 - t16;
+    const real t18 = p_I[3] + t17;
+    const real t19 = Rc[0] * t18;
+    const real t20 = r[0] * p_I[2];
+    const real t21 = r[2] * p_I[0];
+    const real t22 = t20 - t21;
+    const real t23 = p_I[4] + t22;
+    const real t24 = Rc[3] * t23;
+    const real t25 = t19 + t24;
+    const real t26 = r[1] * p_I[0];
+    const real t27 = r[0] * p_I[1];
+    const real t28 = t26 - t27;
+    const real t29 = p_I[5] + t28;
+    const real t30 = Rc[6] * t29;
+    const real t31 = t25 + t30;
+    p[3] = t31;
+    const real t32 = Rc[1] * t18;
+    const real t33 = Rc[4] * t23;
+    const real t34 = t32 + t33;
+    const real t35 = Rc[7] * t29;
+    const real t36 = t34 + t35;
+    p[4] = t36;
+    const real t37 = Rc[2] * t18;
+    const real t38 = Rc[5] * t23;
+    const real t39 = t37 + t38;
+    const real t40 = Rc[8] * t29;
+    const real t41 = t39 + t40;
+    p[5] = t41;
+    const real t42 = r[2] * z_I[1];
+    const real t43 = r[1] * z_I[2];
+    const real t44 = t42 - t43;
+    const real t45 = p_I[6] + t44;
+    const real t46 = Rc[0] * t45;
+    const real t47 = r[0] * z_I[2];
+    const real t48 = r[2] * z_I[0];
+    const real t49 = t47 - t48;
+    const real t50 = p_I[7] + t49;
+    const real t51 = Rc[3] * t50;
+    const real t52 = t46 + t51;
+    const real t53 = r[1] * z_I[0];
+    const real t54 = r[0] * z_I[1];
+    const real t55 = t53 - t54;
+    const real t56 = p_I[8] + t55;
+    const real t57 = Rc[6] * t56;
+    const real t58 = t52 + t57;
+    p[6] = t58;
+    const real t59 = Rc[1] * t45;
+    const real t60 = Rc[4] * t50;
+    const real t61 = t59 + t60;
+    const real t62 = Rc[7] * t56;
+    const real t63 = t61 + t62;
+    p[7] = t63;
+    const real t64 = Rc[2] * t45;
+    const real t65 = Rc[5] * t50;
+    const real t66 = t64 + t65;
+    const real t67 = Rc[8] * t56;
+    const real t68 = t66 + t67;
+    p[8] = t68;
+    return 0;
+}
+
+static int mstmm_sweep_frames_placed_moved_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_placed_moved(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_placed_moved_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"z_I", 9, "", 0, 0},
+    {"p_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_placed_moved_outputs[] = {
+    {"p", 9, "", 0, 0},
+};
+
+/* pose and velocity by a change of place
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  A[3][3] axes, body to inertial
+ * in  p[9] change of place: turn, place and velocity of P, own axes
+ * out d_A[3][3] their change
+ * out d_x[3] (m) change of place of P, inertial axes
+ * out d_v[3] (m/s) change of velocity of P, own axes
+ */
+int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
+    real *restrict d_A, real *restrict d_x, real *restrict d_v)
+{
+    const real t0 = A[1] * p[2];
+    const real t1 = A[2] * p[1];
+    const real t2 = t0 - t1;
+    d_A[0] = t2;
+    const real t3 = A[2] * p[0];
+    const real t4 = A[0] * p[2];
+    const real t5 = t3 - t4;
+    d_A[1] = t5;
+    const real t6 = A[0] * p[1];
+    const real t7 = A[1] * p[0];
+    const real t8 = t6 - t7;
+    d_A[2] = t8;
+    const real t9 = A[4] * p[2];
+    const real t10 = A[5] * p[1];
+    const real t11 = t9 - t10;
+    d_A[3] = t11;
+    const real t12 = A[5] * p[0];
+    const real t13 = A[3] * p[2];
+    const real t14 = t12 - t13;
+    d_A[4] = t14;
+    const real t15 = A[3] * p[1];
+    const real t16 = A[4] * p[0];
+    const real t17 = t15 - t16;
+    d_A[5] = t17;
+    const real t18 = A[7] * p[2];
+    const real t19 = A[8] * p[1];
+    const real t20 = t18 - t19;
+    d_A[6] = t20;
+    const real t21 = A[8] * p[0];
+    const real t22 = A[6] * p[2];
+    const real t23 = t21 - t22;
+    d_A[7] = t23;
+    const real t24 = A[6] * p[1];
+    const real t25 = A[7] * p[0];
+    const real t26 = t24 - t25;
+    d_A[8] = t26;
+    const real t27 = A[0] * p[3];
+    const real t28 = A[1] * p[4];
+    const real t29 = t27 + t28;
+    const real t30 = A[2] * p[5];
+    const real t31 = t29 + t30;
+    d_x[0] = t31;
+    const real t32 = A[3] * p[3];
+    const real t33 = A[4] * p[4];
+    const real t34 = t32 + t33;
+    const real t35 = A[5] * p[5];
+    const real t36 = t34 + t35;
+    d_x[1] = t36;
+    const real t37 = A[6] * p[3];
+    const real t38 = A[7] * p[4];
+    const real t39 = t37 + t38;
+    const real t40 = A[8] * p[5];
+    const real t41 = t39 + t40;
+    d_x[2] = t41;
+    d_v[0] = p[6];
+    d_v[1] = p[7];
+    d_v[2] = p[8];
+    return 0;
+}
+
+static int mstmm_sweep_frames_placed_pose_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_placed_pose(in[0], in[1], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_frames_placed_pose_inputs[] = {
+    {"A", 9, "", 0, 0},
+    {"p", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_placed_pose_outputs[] = {
+    {"d_A", 9, "", 0, 0},
+    {"d_x", 3, "m", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+};
+
+/* change of place along a direction
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  theta[3] turn of the body along the direction, body axes
+ * in  x[3] change of place of P along the direction, body axes
+ * in  v_P[3] (m/s) velocity of P, own axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  d_v[3] (m/s) change of the relative velocity
+ * in  Q[9] motion of Q in body axes: w first
+ * out B_p[9] change of place along the direction
+ */
+int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
+    const real *restrict v_P, const real *restrict v, const real *restrict d_v,
+    const real *restrict Q, real *restrict B_p)
+{
+    B_p[0] = theta[0];
+    B_p[1] = theta[1];
+    B_p[2] = theta[2];
+    B_p[3] = x[0];
+    B_p[4] = x[1];
+    B_p[5] = x[2];
+    const real t0 = x[2] * Q[1];
+    const real t1 = v_P[1] - v[1];
+    const real t2 = theta[2] * t1;
+    const real t3 = v_P[2] - v[2];
+    const real t4 = theta[1] * t3;
+    const real t5 = t2 - t4;
+    const real t6 = t0 + t5;
+    const real t7 = x[1] * Q[2];
+    const real t8 = t6 - t7;
+    const real t9 = d_v[0] + t8;
+    B_p[6] = t9;
+    const real t10 = x[0] * Q[2];
+    const real t11 = theta[0] * t3;
+    const real t12 = v_P[0] - v[0];
+    const real t13 = theta[2] * t12;
+    const real t14 = t11 - t13;
+    const real t15 = x[2] * Q[0];
+    const real t16 = t14 - t15;
+    const real t17 = t10 + t16;
+    const real t18 = d_v[1] + t17;
+    B_p[7] = t18;
+    const real t19 = x[1] * Q[0];
+    const real t20 = theta[1] * t12;
+    const real t21 = theta[0] * t1;
+    const real t22 = t20 - t21;
+    const real t23 = t19 + t22;
+    const real t24 = x[0] * Q[1];
+    const real t25 = t23 - t24;
+    const real t26 = d_v[2] + t25;
+    B_p[8] = t26;
+    return 0;
+}
+
+static int mstmm_sweep_frames_placed_column_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_placed_column(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_frames_placed_column_inputs[] = {
+    {"theta", 3, "", 0, 0},
+    {"x", 3, "", 0, 0},
+    {"v_P", 3, "m/s", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"d_v", 3, "m/s", 0, 0},
+    {"Q", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_placed_column_outputs[] = {
+    {"B_p", 9, "", 0, 0},
+};
+
+/* change of a load by place carried to the parent
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * out T_p[9][6] S_p Th_p, a row an entry
+ * out T_w[3][6] S_p Th_z by angular velocity, added to what is there
+ * out S_pI[9][6] that of the parent, added to what is there
+ * out S_wI[3][6] the parent's S, of it that, added to what is there
+ */
+int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
+    const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
+    real *restrict S_wI)
+{
+    const real t0 = Rc[0] * S_p[0];
+    const real t1 = Rc[1] * S_p[6];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[2] * S_p[12];
+    const real t4 = t2 + t3;
+    const real t5 = Rc[6] * S_p[18];
+    const real t6 = Rc[7] * S_p[24];
+    const real t7 = t5 + t6;
+    const real t8 = Rc[8] * S_p[30];
+    const real t9 = t7 + t8;
+    const real t10 = r[1] * t9;
+    const real t11 = Rc[3] * S_p[18];
+    const real t12 = Rc[4] * S_p[24];
+    const real t13 = t11 + t12;
+    const real t14 = Rc[5] * S_p[30];
+    const real t15 = t13 + t14;
+    const real t16 = r[2] * t15;
+    const real t17 = t10 - t16;
+    const real t18 = t4 + t17;
+    T_p[0] = t18;
+    const real t19 = Rc[0] * S_p[1];
+    const real t20 = Rc[1] * S_p[7];
+    const real t21 = t19 + t20;
+    const real t22 = Rc[2] * S_p[13];
+    const real t23 = t21 + t22;
+    const real t24 = Rc[6] * S_p[19];
+    const real t25 = Rc[7] * S_p[25];
+    const real t26 = t24 + t25;
+    const real t27 = Rc[8] * S_p[31];
+    const real t28 = t26 + t27;
+    const real t29 = r[1] * t28;
+    const real t30 = Rc[3] * S_p[19];
+    const real t31 = Rc[4] * S_p[25];
+    const real t32 = t30 + t31;
+    const real t33 = Rc[5] * S_p[31];
+    const real t34 = t32 + t33;
+    const real t35 = r[2] * t34;
+    const real t36 = t29 - t35;
+    const real t37 = t23 + t36;
+    T_p[1] = t37;
+    const real t38 = Rc[0] * S_p[2];
+    const real t39 = Rc[1] * S_p[8];
+    const real t40 = t38 + t39;
+    const real t41 = Rc[2] * S_p[14];
+    const real t42 = t40 + t41;
+    const real t43 = Rc[6] * S_p[20];
+    const real t44 = Rc[7] * S_p[26];
+    const real t45 = t43 + t44;
+    const real t46 = Rc[8] * S_p[32];
+    const real t47 = t45 + t46;
+    const real t48 = r[1] * t47;
+    const real t49 = Rc[3] * S_p[20];
+    const real t50 = Rc[4] * S_p[26];
+    const real t51 = t49 + t50;
+    const real t52 = Rc[5] * S_p[32];
+    const real t53 = t51 + t52;
+    const real t54 = r[2] * t53;
+    const real t55 = t48 - t54;
+    const real t56 = t42 + t55;
+    T_p[2] = t56;
+    const real t57 = Rc[0] * S_p[3];
+    const real t58 = Rc[1] * S_p[9];
+    const real t59 = t57 + t58;
+    const real t60 = Rc[2] * S_p[15];
+    const real t61 = t59 + t60;
+    const real t62 = Rc[6] * S_p[21];
+    const real t63 = Rc[7] * S_p[27];
+    const real t64 = t62 + t63;
+    const real t65 = Rc[8] * S_p[33];
+    const real t66 = t64 + t65;
+    const real t67 = r[1] * t66;
+    const real t68 = Rc[3] * S_p[21];
+    const real t69 = Rc[4] * S_p[27];
+    const real t70 = t68 + t69;
+    const real t71 = Rc[5] * S_p[33];
+    const real t72 = t70 + t71;
+    const real t73 = r[2] * t72;
+    const real t74 = t67 - t73;
+    const real t75 = t61 + t74;
+    T_p[3] = t75;
+    const real t76 = Rc[0] * S_p[4];
+    const real t77 = Rc[1] * S_p[10];
+    const real t78 = t76 + t77;
+    const real t79 = Rc[2] * S_p[16];
+    const real t80 = t78 + t79;
+    const real t81 = Rc[6] * S_p[22];
+    const real t82 = Rc[7] * S_p[28];
+    const real t83 = t81 + t82;
+    const real t84 = Rc[8] * S_p[34];
+    const real t85 = t83 + t84;
+    const real t86 = r[1] * t85;
+    const real t87 = Rc[3] * S_p[22];
+    const real t88 = Rc[4] * S_p[28];
+    const real t89 = t87 + t88;
+    const real t90 = Rc[5] * S_p[34];
+    const real t91 = t89 + t90;
+    const real t92 = r[2] * t91;
+    const real t93 = t86 - t92;
+    const real t94 = t80 + t93;
+    T_p[4] = t94;
+    const real t95 = Rc[0] * S_p[5];
+    const real t96 = Rc[1] * S_p[11];
+    const real t97 = t95 + t96;
+    const real t98 = Rc[2] * S_p[17];
+    const real t99 = t97 + t98;
+    const real t100 = Rc[6] * S_p[23];
+    const real t101 = Rc[7] * S_p[29];
+    const real t102 = t100 + t101;
+    const real t103 = Rc[8] * S_p[35];
+    const real t104 = t102 + t103;
+    const real t105 = r[1] * t104;
+    const real t106 = Rc[3] * S_p[23];
+    const real t107 = Rc[4] * S_p[29];
+    const real t108 = t106 + t107;
+    const real t109 = Rc[5] * S_p[35];
+    const real t110 = t108 + t109;
+    const real t111 = r[2] * t110;
+    const real t112 = t105 - t111;
+    const real t113 = t99 + t112;
+    T_p[5] = t113;
+    const real t114 = Rc[3] * S_p[0];
+    const real t115 = Rc[4] * S_p[6];
+    const real t116 = t114 + t115;
+    const real t117 = Rc[5] * S_p[12];
+    const real t118 = t116 + t117;
+    const real t119 = Rc[0] * S_p[18];
+    const real t120 = Rc[1] * S_p[24];
+    const real t121 = t119 + t120;
+    const real t122 = Rc[2] * S_p[30];
+    const real t123 = t121 + t122;
+    const real t124 = r[2] * t123;
+    const real t125 = r[0] * t9;
+    const real t126 = t124 - t125;
+    const real t127 = t118 + t126;
+    T_p[6] = t127;
+    const real t128 = Rc[3] * S_p[1];
+    const real t129 = Rc[4] * S_p[7];
+    const real t130 = t128 + t129;
+    const real t131 = Rc[5] * S_p[13];
+    const real t132 = t130 + t131;
+    const real t133 = Rc[0] * S_p[19];
+    const real t134 = Rc[1] * S_p[25];
+    const real t135 = t133 + t134;
+    const real t136 = Rc[2] * S_p[31];
+    const real t137 = t135 + t136;
+    const real t138 = r[2] * t137;
+    const real t139 = r[0] * t28;
+    const real t140 = t138 - t139;
+    const real t141 = t132 + t140;
+    T_p[7] = t141;
+    const real t142 = Rc[3] * S_p[2];
+    const real t143 = Rc[4] * S_p[8];
+    const real t144 = t142 + t143;
+    const real t145 = Rc[5] * S_p[14];
+    const real t146 = t144 + t145;
+    const real t147 = Rc[0] * S_p[20];
+    const real t148 = Rc[1] * S_p[26];
+    const real t149 = t147 + t148;
+    const real t150 = Rc[2] * S_p[32];
+    const real t151 = t149 + t150;
+    const real t152 = r[2] * t151;
+    const real t153 = r[0] * t47;
+    const real t154 = t152 - t153;
+    const real t155 = t146 + t154;
+    T_p[8] = t155;
+    const real t156 = Rc[3] * S_p[3];
+    const real t157 = Rc[4] * S_p[9];
+    const real t158 = t156 + t157;
+    const real t159 = Rc[5] * S_p[15];
+    const real t160 = t158 + t159;
+    const real t161 = Rc[0] * S_p[21];
+    const real t162 = Rc[1] * S_p[27];
+    const real t163 = t161 + t162;
+    const real t164 = Rc[2] * S_p[33];
+    const real t165 = t163 + t164;
+    const real t166 = r[2] * t165;
+    const real t167 = r[0] * t66;
+    const real t168 = t166 - t167;
+    const real t169 = t160 + t168;
+    T_p[9] = t169;
+    const real t170 = Rc[3] * S_p[4];
+    const real t171 = Rc[4] * S_p[10];
+    const real t172 = t170 + t171;
+    const real t173 = Rc[5] * S_p[16];
+    const real t174 = t172 + t173;
+    const real t175 = Rc[0] * S_p[22];
+    const real t176 = Rc[1] * S_p[28];
+    const real t177 = t175 + t176;
+    const real t178 = Rc[2] * S_p[34];
+    const real t179 = t177 + t178;
+    const real t180 = r[2] * t179;
+    const real t181 = r[0] * t85;
+    const real t182 = t180 - t181;
+    const real t183 = t174 + t182;
+    T_p[10] = t183;
+    const real t184 = Rc[3] * S_p[5];
+    const real t185 = Rc[4] * S_p[11];
+    const real t186 = t184 + t185;
+    const real t187 = Rc[5] * S_p[17];
+    const real t188 = t186 + t187;
+    const real t189 = Rc[0] * S_p[23];
+    const real t190 = Rc[1] * S_p[29];
+    const real t191 = t189 + t190;
+    const real t192 = Rc[2] * S_p[35];
+    const real t193 = t191 + t192;
+    const real t194 = r[2] * t193;
+    const real t195 = r[0] * t104;
+    const real t196 = t194 - t195;
+    const real t197 = t188 + t196;
+    T_p[11] = t197;
+    const real t198 = Rc[6] * S_p[0];
+    const real t199 = Rc[7] * S_p[6];
+    const real t200 = t198 + t199;
+    const real t201 = Rc[8] * S_p[12];
+    const real t202 = t200 + t201;
+    const real t203 = r[0] * t15;
+    const real t204 = r[1] * t123;
+    const real t205 = t203 - t204;
+    const real t206 = t202 + t205;
+    T_p[12] = t206;
+    const real t207 = Rc[6] * S_p[1];
+    const real t208 = Rc[7] * S_p[7];
+    const real t209 = t207 + t208;
+    const real t210 = Rc[8] * S_p[13];
+    const real t211 = t209 + t210;
+    const real t212 = r[0] * t34;
+    const real t213 = r[1] * t137;
+    const real t214 = t212 - t213;
+    const real t215 = t211 + t214;
+    T_p[13] = t215;
+    const real t216 = Rc[6] * S_p[2];
+    const real t217 = Rc[7] * S_p[8];
+    const real t218 = t216 + t217;
+    const real t219 = Rc[8] * S_p[14];
+    const real t220 = t218 + t219;
+    const real t221 = r[0] * t53;
+    const real t222 = r[1] * t151;
+    const real t223 = t221 - t222;
+    const real t224 = t220 + t223;
+    T_p[14] = t224;
+    const real t225 = Rc[6] * S_p[3];
+    const real t226 = Rc[7] * S_p[9];
+    const real t227 = t225 + t226;
+    const real t228 = Rc[8] * S_p[15];
+    const real t229 = t227 + t228;
+    const real t230 = r[0] * t72;
+    const real t231 = r[1] * t165;
+    const real t232 = t230 - t231;
+    const real t233 = t229 + t232;
+    T_p[15] = t233;
+    const real t234 = Rc[6] * S_p[4];
+    const real t235 = Rc[7] * S_p[10];
+    const real t236 = t234 + t235;
+    const real t237 = Rc[8] * S_p[16];
+    const real t238 = t236 + t237;
+    const real t239 = r[0] * t91;
+    const real t240 = r[1] * t179;
+    const real t241 = t239 - t240;
+    const real t242 = t238 + t241;
+    T_p[16] = t242;
+    const real t243 = Rc[6] * S_p[5];
+    const real t244 = Rc[7] * S_p[11];
+    const real t245 = t243 + t244;
+    const real t246 = Rc[8] * S_p[17];
+    const real t247 = t245 + t246;
+    const real t248 = r[0] * t110;
+    const real t249 = r[1] * t193;
+    const real t250 = t248 - t249;
+    const real t251 = t247 + t250;
+    T_p[17] = t251;
+    T_p[18] = t123;
+    T_p[19] = t137;
+    T_p[20] = t151;
+    T_p[21] = t165;
+    T_p[22] = t179;
+    T_p[23] = t193;
+    T_p[24] = t15;
+    T_p[25] = t34;
+    T_p[26] = t53;
+    T_p[27] = t72;
+    T_p[28] = t91;
+    T_p[29] = t110;
+    T_p[30] = t9;
+    T_p[31] = t28;
+    T_p[32] = t47;
+    T_p[33] = t66;
+    T_p[34] = t85;
+    T_p[35] = t104;
+    const real t252 = Rc[0] * S_p[36];
+    const real t253 = Rc[1] * S_p[42];
+    const real t254 = t252 + t253;
+    const real t255 = Rc[2] * S_p[48];
+    const real t256 = t254 + t255;
+    T_p[36] = t256;
+    const real t257 = Rc[0] * S_p[37];
+    const real t258 = Rc[1] * S_p[43];
+    const real t259 = t257 + t258;
+    const real t260 = Rc[2] * S_p[49];
+    const real t261 = t259 + t260;
+    T_p[37] = t261;
+    const real t262 = Rc[0] * S_p[38];
+    const real t263 = Rc[1] * S_p[44];
+    const real t264 = t262 + t263;
+    const real t265 = Rc[2] * S_p[50];
+    const real t266 = t264 + t265;
+    T_p[38] = t266;
+    const real t267 = Rc[0] * S_p[39];
+    const real t268 = Rc[1] * S_p[45];
+    const real t269 = t267 + t268;
+    const real t270 = Rc[2] * S_p[51];
+    const real t271 = t269 + t270;
+    T_p[39] = t271;
+    const real t272 = Rc[0] * S_p[40];
+    const real t273 = Rc[1] * S_p[46];
+    const real t274 = t272 + t273;
+    const real t275 = Rc[2] * S_p[52];
+    const real t276 = t274 + t275;
+    T_p[40] = t276;
+    const real t277 = Rc[0] * S_p[41];
+    const real t278 = Rc[1] * S_p[47];
+    const real t279 = t277 + t278;
+    const real t280 = Rc[2] * S_p[53];
+    const real t281 = t279 + t280;
+    T_p[41] = t281;
+    const real t282 = Rc[3] * S_p[36];
+    const real t283 = Rc[4] * S_p[42];
+    const real t284 = t282 + t283;
+    const real t285 = Rc[5] * S_p[48];
+    const real t286 = t284 + t285;
+    T_p[42] = t286;
+    const real t287 = Rc[3] * S_p[37];
+    const real t288 = Rc[4] * S_p[43];
+    const real t289 = t287 + t288;
+    const real t290 = Rc[5] * S_p[49];
+    const real t291 = t289 + t290;
+    T_p[43] = t291;
+    const real t292 = Rc[3] * S_p[38];
+    const real t293 = Rc[4] * S_p[44];
+    const real t294 = t292 + t293;
+    const real t295 = Rc[5] * S_p[50];
+    const real t296 = t294 + t295;
+    T_p[44] = t296;
+    const real t297 = Rc[3] * S_p[39];
+    const real t298 = Rc[4] * S_p[45];
+    const real t299 = t297 + t298;
+    const real t300 = Rc[5] * S_p[51];
+    const real t301 = t299 + t300;
+    T_p[45] = t301;
+    const real t302 = Rc[3] * S_p[40];
+    const real t303 = Rc[4] * S_p[46];
+    const real t304 = t302 + t303;
+    const real t305 = Rc[5] * S_p[52];
+    const real t306 = t304 + t305;
+    T_p[46] = t306;
+    const real t307 = Rc[3] * S_p[41];
+    const real t308 = Rc[4] * S_p[47];
+    const real t309 = t307 + t308;
+    const real t310 = Rc[5] * S_p[53];
+    const real t311 = t309 + t310;
+    T_p[47] = t311;
+    const real t312 = Rc[6] * S_p[36];
+    const real t313 = Rc[7] * S_p[42];
+    const real t314 = t312 + t313;
+    const real t315 = Rc[8] * S_p[48];
+    const real t316 = t314 + t315;
+    T_p[48] = t316;
+    const real t317 = Rc[6] * S_p[37];
+    const real t318 = Rc[7] * S_p[43];
+    const real t319 = t317 + t318;
+    const real t320 = Rc[8] * S_p[49];
+    const real t321 = t319 + t320;
+    T_p[49] = t321;
+    const real t322 = Rc[6] * S_p[38];
+    const real t323 = Rc[7] * S_p[44];
+    const real t324 = t322 + t323;
+    const real t325 = Rc[8] * S_p[50];
+    const real t326 = t324 + t325;
+    T_p[50] = t326;
+    const real t327 = Rc[6] * S_p[39];
+    const real t328 = Rc[7] * S_p[45];
+    const real t329 = t327 + t328;
+    const real t330 = Rc[8] * S_p[51];
+    const real t331 = t329 + t330;
+    T_p[51] = t331;
+    const real t332 = Rc[6] * S_p[40];
+    const real t333 = Rc[7] * S_p[46];
+    const real t334 = t332 + t333;
+    const real t335 = Rc[8] * S_p[52];
+    const real t336 = t334 + t335;
+    T_p[52] = t336;
+    const real t337 = Rc[6] * S_p[41];
+    const real t338 = Rc[7] * S_p[47];
+    const real t339 = t337 + t338;
+    const real t340 = Rc[8] * S_p[53];
+    const real t341 = t339 + t340;
+    T_p[53] = t341;
+    const real t342 = r[1] * t316;
+    const real t343 = r[2] * t286;
+    const real t344 = t342 - t343;
+    T_w[0] += t344;
+    const real t345 = r[1] * t321;
+    const real t346 = r[2] * t291;
+    const real t347 = t345 - t346;
+    T_w[1] += t347;
+    const real t348 = r[1] * t326;
+    const real t349 = r[2] * t296;
+    const real t350 = t348 - t349;
+    T_w[2] += t350;
+    const real t351 = r[1] * t331;
+    const real t352 = r[2] * t301;
+    const real t353 = t351 - t352;
+    T_w[3] += t353;
+    const real t354 = r[1] * t336;
+    const real t355 = r[2] * t306;
+    const real t356 = t354 - t355;
+    T_w[4] += t356;
+    const real t357 = r[1] * t341;
+    const real t358 = r[2] * t311;
+    const real t359 = t357 - t358;
+    T_w[5] += t359;
+    const real t360 = r[2] * t256;
+    const real t361 = r[0] * t316;
+    const real t362 = t360 - t361;
+    T_w[6] += t362;
+    const real t363 = r[2] * t261;
+    const real t364 = r[0] * t321;
+    const real t365 = t363 - t364;
+    T_w[7] += t365;
+    const real t366 = r[2] * t266;
+    const real t367 = r[0] * t326;
+    const real t368 = t366 - t367;
+    T_w[8] += t368;
+    const real t369 = r[2] * t271;
+    const real t370 = r[0] * t331;
+    const real t371 = t369 - t370;
+    T_w[9] += t371;
+    const real t372 = r[2] * t276;
+    const real t373 = r[0] * t336;
+    const real t374 = t372 - t373;
+    T_w[10] += t374;
+    const real t375 = r[2] * t281;
+    const real t376 = r[0] * t341;
+    const real t377 = t375 - t376;
+    T_w[11] += t377;
+    const real t378 = r[0] * t286;
+    const real t379 = r[1] * t256;
+    const real t380 = t378 - t379;
+    T_w[12] += t380;
+    const real t381 = r[0] * t291;
+    const real t382 = r[1] * t261;
+    const real t383 = t381 - t382;
+    T_w[13] += t383;
+    const real t384 = r[0] * t296;
+    const real t385 = r[1] * t266;
+    const real t386 = t384 - t385;
+    T_w[14] += t386;
+    const real t387 = r[0] * t301;
+    const real t388 = r[1] * t271;
+    const real t389 = t387 - t388;
+    T_w[15] += t389;
+    const real t390 = r[0] * t306;
+    const real t391 = r[1] * t276;
+    const real t392 = t390 - t391;
+    T_w[16] += t392;
+    const real t393 = r[0] * t311;
+    const real t394 = r[1] * t281;
+    const real t395 = t393 - t394;
+    T_w[17] += t395;
+    const real t396 = Rc[0] * t18;
+    const real t397 = Rc[1] * t37;
+    const real t398 = t396 + t397;
+    const real t399 = Rc[2] * t56;
+    const real t400 = t398 + t399;
+    S_pI[0] += t400;
+    const real t401 = Rc[3] * t18;
+    const real t402 = Rc[4] * t37;
+    const real t403 = t401 + t402;
+    const real t404 = Rc[5] * t56;
+    const real t405 = t403 + t404;
+    S_pI[1] += t405;
+    const real t406 = Rc[6] * t18;
+    const real t407 = Rc[7] * t37;
+    const real t408 = t406 + t407;
+    const real t409 = Rc[8] * t56;
+    const real t410 = t408 + t409;
+    S_pI[2] += t410;
+    const real t411 = r[1] * t410;
+    const real t412 = r[2] * t405;
+    const real t413 = t411 - t412;
+    const real t414 = Rc[0] * t75;
+    const real t415 = Rc[1] * t94;
+    const real t416 = t414 + t415;
+    const real t417 = Rc[2] * t113;
+    const real t418 = t416 + t417;
+    const real t419 = t413 + t418;
+    S_pI[3] += t419;
+    const real t420 = r[2] * t400;
+    const real t421 = r[0] * t410;
+    const real t422 = t420 - t421;
+    const real t423 = Rc[3] * t75;
+    const real t424 = Rc[4] * t94;
+    const real t425 = t423 + t424;
+    const real t426 = Rc[5] * t113;
+    const real t427 = t425 + t426;
+    const real t428 = t422 + t427;
+    S_pI[4] += t428;
+    const real t429 = r[0] * t405;
+    const real t430 = r[1] * t400;
+    const real t431 = t429 - t430;
+    const real t432 = Rc[6] * t75;
+    const real t433 = Rc[7] * t94;
+    const real t434 = t432 + t433;
+    const real t435 = Rc[8] * t113;
+    const real t436 = t434 + t435;
+    const real t437 = t431 + t436;
+    S_pI[5] += t437;
+    const real t438 = Rc[0] * t127;
+    const real t439 = Rc[1] * t141;
+    const real t440 = t438 + t439;
+    const real t441 = Rc[2] * t155;
+    const real t442 = t440 + t441;
+    S_pI[6] += t442;
+    const real t443 = Rc[3] * t127;
+    const real t444 = Rc[4] * t141;
+    const real t445 = t443 + t444;
+    const real t446 = Rc[5] * t155;
+    const real t447 = t445 + t446;
+    S_pI[7] += t447;
+    const real t448 = Rc[6] * t127;
+    const real t449 = Rc[7] * t141;
+    const real t450 = t448 + t449;
+    const real t451 = Rc[8] * t155;
+    const real t452 = t450 + t451;
+    S_pI[8] += t452;
+    const real t453 = r[1] * t452;
+    const real t454 = r[2] * t447;
+    const real t455 = t453 - t454;
+    const real t456 = Rc[0] * t169;
+    const real t457 = Rc[1] * t183;
+    const real t458 = t456 + t457;
+    const real t459 = Rc[2] * t197;
+    const real t460 = t458 + t459;
+    const real t461 = t455 + t460;
+    S_pI[9] += t461;
+    const real t462 = r[2] * t442;
+    const real t463 = r[0] * t452;
+    const real t464 = t462 - t463;
+    const real t465 = Rc[3] * t169;
+    const real t466 = Rc[4] * t183;
+    const real t467 = t465 + t466;
+    const real t468 = Rc[5] * t197;
+    const real t469 = t467 + t468;
+    const real t470 = t464 + t469;
+    S_pI[10] += t470;
+    const real t471 = r[0] * t447;
+    const real t472 = r[1] * t442;
+    const real t473 = t471 - t472;
+    const real t474 = Rc[6] * t169;
+    const real t475 = Rc[7] * t183;
+    const real t476 = t474 + t475;
+    const real t477 = Rc[8] * t197;
+    const real t478 = t476 + t477;
+    const real t479 = t473 + t478;
+    S_pI[11] += t479;
+    const real t480 = Rc[0] * t206;
+    const real t481 = Rc[1] * t215;
+    const real t482 = t480 + t481;
+    const real t483 = Rc[2] * t224;
+    const real t484 = t482 + t483;
+    S_pI[12] += t484;
+    const real t485 = Rc[3] * t206;
+    const real t486 = Rc[4] * t215;
+    const real t487 = t485 + t486;
+    const real t488 = Rc[5] * t224;
+    const real t489 = t487 + t488;
+    S_pI[13] += t489;
+    const real t490 = Rc[6] * t206;
+    const real t491 = Rc[7] * t215;
+    const real t492 = t490 + t491;
+    const real t493 = Rc[8] * t224;
+    const real t494 = t492 + t493;
+    S_pI[14] += t494;
+    const real t495 = r[1] * t494;
+    const real t496 = r[2] * t489;
+    const real t497 = t495 - t496;
+    const real t498 = Rc[0] * t233;
+    const real t499 = Rc[1] * t242;
+    const real t500 = t498 + t499;
+    const real t501 = Rc[2] * t251;
+    const real t502 = t500 + t501;
+    const real t503 = t497 + t502;
+    S_pI[15] += t503;
+    const real t504 = r[2] * t484;
+    const real t505 = r[0] * t494;
+    const real t506 = t504 - t505;
+    const real t507 = Rc[3] * t233;
+    const real t508 = Rc[4] * t242;
+    const real t509 = t507 + t508;
+    const real t510 = Rc[5] * t251;
+    const real t511 = t509 + t510;
+    const real t512 = t506 + t511;
+    S_pI[16] += t512;
+    const real t513 = r[0] * t489;
+    const real t514 = r[1] * t484;
+    const real t515 = t513 - t514;
+    const real t516 = Rc[6] * t233;
+    const real t517 = Rc[7] * t242;
+    const real t518 = t516 + t517;
+    const real t519 = Rc[8] * t251;
+    const real t520 = t518 + t519;
+    const real t521 = t515 + t520;
+    S_pI[17] += t521;
+    const real t522 = Rc[0] * t123;
+    const real t523 = Rc[1] * t137;
+    const real t524 = t522 + t523;
+    const real t525 = Rc[2] * t151;
+    const real t526 = t524 + t525;
+    S_pI[18] += t526;
+    const real t527 = Rc[3] * t123;
+    const real t528 = Rc[4] * t137;
+    const real t529 = t527 + t528;
+    const real t530 = Rc[5] * t151;
+    const real t531 = t529 + t530;
+    S_pI[19] += t531;
+    const real t532 = Rc[6] * t123;
+    const real t533 = Rc[7] * t137;
+    const real t534 = t532 + t533;
+    const real t535 = Rc[8] * t151;
+    const real t536 = t534 + t535;
+    S_pI[20] += t536;
+    const real t537 = r[1] * t536;
+    const real t538 = r[2] * t531;
+    const real t539 = t537 - t538;
+    const real t540 = Rc[0] * t165;
+    const real t541 = Rc[1] * t179;
+    const real t542 = t540 + t541;
+    const real t543 = Rc[2] * t193;
+    const real t544 = t542 + t543;
+    const real t545 = t539 + t544;
+    S_pI[21] += t545;
+    const real t546 = r[2] * t526;
+    const real t547 = r[0] * t536;
+    const real t548 = t546 - t547;
+    const real t549 = Rc[3] * t165;
+    const real t550 = Rc[4] * t179;
+    const real t551 = t549 + t550;
+    const real t552 = Rc[5] * t193;
+    const real t553 = t551 + t552;
+    const real t554 = t548 + t553;
+    S_pI[22] += t554;
+    const real t555 = r[0] * t531;
+    const real t556 = r[1] * t526;
+    const real t557 = t555 - t556;
+    const real t558 = Rc[6] * t165;
+    const real t559 = Rc[7] * t179;
+    const real t560 = t558 + t559;
+    const real t561 = Rc[8] * t193;
+    const real t562 = t560 + t561;
+    const real t563 = t557 + t562;
+    S_pI[23] += t563;
+    const real t564 = Rc[0] * t15;
+    const real t565 = Rc[1] * t34;
+    const real t566 = t564 + t565;
+    const real t567 = Rc[2] * t53;
+    const real t568 = t566 + t567;
+    S_pI[24] += t568;
+    const real t569 = Rc[3] * t15;
+    const real t570 = Rc[4] * t34;
+    const real t571 = t569 + t570;
+    const real t572 = Rc[5] * t53;
+    const real t573 = t571 + t572;
+    S_pI[25] += t573;
+    const real t574 = Rc[6] * t15;
+    const real t575 = Rc[7] * t34;
+    const real t576 = t574 + t575;
+    const real t577 = Rc[8] * t53;
+    const real t578 = t576 + t577;
+    S_pI[26] += t578;
+    const real t579 = r[1] * t578;
+    const real t580 = r[2] * t573;
+    const real t581 = t579 - t580;
+    const real t582 = Rc[0] * t72;
+    const real t583 = Rc[1] * t91;
+    const real t584 = t582 + t583;
+    const real t585 = Rc[2] * t110;
+    const real t586 = t584 + t585;
+    const real t587 = t581 + t586;
+    S_pI[27] += t587;
+    const real t588 = r[2] * t568;
+    const real t589 = r[0] * t578;
+    const real t590 = t588 - t589;
+    const real t591 = Rc[3] * t72;
+    const real t592 = Rc[4] * t91;
+    const real t593 = t591 + t592;
+    const real t594 = Rc[5] * t110;
+    const real t595 = t593 + t594;
+    const real t596 = t590 + t595;
+    S_pI[28] += t596;
+    const real t597 = r[0] * t573;
+    const real t598 = r[1] * t568;
+    const real t599 = t597 - t598;
+    const real t600 = Rc[6] * t72;
+    const real t601 = Rc[7] * t91;
+    const real t602 = t600 + t601;
+    const real t603 = Rc[8] * t110;
+    const real t604 = t602 + t603;
+    const real t605 = t599 + t604;
+    S_pI[29] += t605;
+    const real t606 = Rc[0] * t9;
+    const real t607 = Rc[1] * t28;
+    const real t608 = t606 + t607;
+    const real t609 = Rc[2] * t47;
+    const real t610 = t608 + t609;
+    S_pI[30] += t610;
+    const real t611 = Rc[3] * t9;
+    const real t612 = Rc[4] * t28;
+    const real t613 = t611 + t612;
+    const real t614 = Rc[5] * t47;
+    const real t615 = t613 + t614;
+    S_pI[31] += t615;
+    const real t616 = Rc[6] * t9;
+    const real t617 = Rc[7] * t28;
+    const real t618 = t616 + t617;
+    const real t619 = Rc[8] * t47;
+    const real t620 = t618 + t619;
+    S_pI[32] += t620;
+    const real t621 = r[1] * t620;
+    const real t622 = r[2] * t615;
+    const real t623 = t621 - t622;
+    const real t624 = Rc[0] * t66;
+    const real t625 = Rc[1] * t85;
+    const real t626 = t624 + t625;
+    const real t627 = Rc[2] * t104;
+    const real t628 = t626 + t627;
+    const real t629 = t623 + t628;
+    S_pI[33] += t629;
+    const real t630 = r[2] * t610;
+    const real t631 = r[0] * t620;
+    const real t632 = t630 - t631;
+    const real t633 = Rc[3] * t66;
+    const real t634 = Rc[4] * t85;
+    const real t635 = t633 + t634;
+    const real t636 = Rc[5] * t104;
+    const real t637 = t635 + t636;
+    const real t638 = t632 + t637;
+    S_pI[34] += t638;
+    const real t639 = r[0] * t615;
+    const real t640 = r[1] * t610;
+    const real t641 = t639 - t640;
+    const real t642 = Rc[6] * t66;
+    const real t643 = Rc[7] * t85;
+    const real t644 = t642 + t643;
+    const real t645 = Rc[8] * t104;
+    const real t646 = t644 + t645;
+    const real t647 = t641 + t646;
+    S_pI[35] += t647;
+    const real t648 = Rc[0] * t256;
+    const real t649 = Rc[1] * t261;
+    const real t650 = t648 + t649;
+    const real t651 = Rc[2] * t266;
+    const real t652 = t650 + t651;
+    S_pI[36] += t652;
+    const real t653 = Rc[3] * t256;
+    const real t654 = Rc[4] * t261;
+    const real t655 = t653 + t654;
+    const real t656 = Rc[5] * t266;
+    const real t657 = t655 + t656;
+    S_pI[37] += t657;
+    const real t658 = Rc[6] * t256;
+    const real t659 = Rc[7] * t261;
+    const real t660 = t658 + t659;
+    const real t661 = Rc[8] * t266;
+    const real t662 = t660 + t661;
+    S_pI[38] += t662;
+    const real t663 = r[1] * t662;
+    const real t664 = r[2] * t657;
+    const real t665 = t663 - t664;
+    const real t666 = Rc[0] * t271;
+    const real t667 = Rc[1] * t276;
+    const real t668 = t666 + t667;
+    const real t669 = Rc[2] * t281;
+    const real t670 = t668 + t669;
+    const real t671 = t665 + t670;
+    S_pI[39] += t671;
+    const real t672 = r[2] * t652;
+    const real t673 = r[0] * t662;
+    const real t674 = t672 - t673;
+    const real t675 = Rc[3] * t271;
+    const real t676 = Rc[4] * t276;
+    const real t677 = t675 + t676;
+    const real t678 = Rc[5] * t281;
+    const real t679 = t677 + t678;
+    const real t680 = t674 + t679;
+    S_pI[40] += t680;
+    const real t681 = r[0] * t657;
+    const real t682 = r[1] * t652;
+    const real t683 = t681 - t682;
+    const real t684 = Rc[6] * t271;
+    const real t685 = Rc[7] * t276;
+    const real t686 = t684 + t685;
+    const real t687 = Rc[8] * t281;
+    const real t688 = t686 + t687;
+    const real t689 = t683 + t688;
+    S_pI[41] += t689;
+    const real t690 = Rc[0] * t286;
+    const real t691 = Rc[1] * t291;
+    const real t692 = t690 + t691;
+    const real t693 = Rc[2] * t296;
+    const real t694 = t692 + t693;
+    S_pI[42] += t694;
+    const real t695 = Rc[3] * t286;
+    const real t696 = Rc[4] * t291;
+    const real t697 = t695 + t696;
+    const real t698 = Rc[5] * t296;
+    const real t699 = t697 + t698;
+    S_pI[43] += t699;
+    const real t700 = Rc[6] * t286;
+    const real t701 = Rc[7] * t291;
+    const real t702 = t700 + t701;
+    const real t703 = Rc[8] * t296;
+    const real t704 = t702 + t703;
+    S_pI[44] += t704;
+    const real t705 = r[1] * t704;
+    const real t706 = r[2] * t699;
+    const real t707 = t705 - t706;
+    const real t708 = Rc[0] * t301;
+    const real t709 = Rc[1] * t306;
+    const real t710 = t708 + t709;
+    const real t711 = Rc[2] * t311;
+    const real t712 = t710 + t711;
+    const real t713 = t707 + t712;
+    S_pI[45] += t713;
+    const real t714 = r[2] * t694;
+    const real t715 = r[0] * t704;
+    const real t716 = t714 - t715;
+    const real t717 = Rc[3] * t301;
+    const real t718 = Rc[4] * t306;
+    const real t719 = t717 + t718;
+    const real t720 = Rc[5] * t311;
+    const real t721 = t719 + t720;
+    const real t722 = t716 + t721;
+    S_pI[46] += t722;
+    const real t723 = r[0] * t699;
+    const real t724 = r[1] * t694;
+    const real t725 = t723 - t724;
+    const real t726 = Rc[6] * t301;
+    const real t727 = Rc[7] * t306;
+    const real t728 = t726 + t727;
+    const real t729 = Rc[8] * t311;
+    const real t730 = t728 + t729;
+    const real t731 = t725 + t730;
+    S_pI[47] += t731;
+    const real t732 = Rc[0] * t316;
+    const real t733 = Rc[1] * t321;
+    const real t734 = t732 + t733;
+    const real t735 = Rc[2] * t326;
+    const real t736 = t734 + t735;
+    S_pI[48] += t736;
+    const real t737 = Rc[3] * t316;
+    const real t738 = Rc[4] * t321;
+    const real t739 = t737 + t738;
+    const real t740 = Rc[5] * t326;
+    const real t741 = t739 + t740;
+    S_pI[49] += t741;
+    const real t742 = Rc[6] * t316;
+    const real t743 = Rc[7] * t321;
+    const real t744 = t742 + t743;
+    const real t745 = Rc[8] * t326;
+    const real t746 = t744 + t745;
+    S_pI[50] += t746;
+    const real t747 = r[1] * t746;
+    const real t748 = r[2] * t741;
+    const real t749 = t747 - t748;
+    const real t750 = Rc[0] * t331;
+    const real t751 = Rc[1] * t336;
+    const real t752 = t750 + t751;
+    const real t753 = Rc[2] * t341;
+    const real t754 = t752 + t753;
+    const real t755 = t749 + t754;
+    S_pI[51] += t755;
+    const real t756 = r[2] * t736;
+    const real t757 = r[0] * t746;
+    const real t758 = t756 - t757;
+    const real t759 = Rc[3] * t331;
+    const real t760 = Rc[4] * t336;
+    const real t761 = t759 + t760;
+    const real t762 = Rc[5] * t341;
+    const real t763 = t761 + t762;
+    const real t764 = t758 + t763;
+    S_pI[52] += t764;
+    const real t765 = r[0] * t741;
+    const real t766 = r[1] * t736;
+    const real t767 = t765 - t766;
+    const real t768 = Rc[6] * t331;
+    const real t769 = Rc[7] * t336;
+    const real t770 = t768 + t769;
+    const real t771 = Rc[8] * t341;
+    const real t772 = t770 + t771;
+    const real t773 = t767 + t772;
+    S_pI[53] += t773;
+    const real t774 = Rc[0] * t344;
+    const real t775 = Rc[1] * t347;
+    const real t776 = t774 + t775;
+    const real t777 = Rc[2] * t350;
+    const real t778 = t776 + t777;
+    S_wI[0] += t778;
+    const real t779 = Rc[3] * t344;
+    const real t780 = Rc[4] * t347;
+    const real t781 = t779 + t780;
+    const real t782 = Rc[5] * t350;
+    const real t783 = t781 + t782;
+    S_wI[1] += t783;
+    const real t784 = Rc[6] * t344;
+    const real t785 = Rc[7] * t347;
+    const real t786 = t784 + t785;
+    const real t787 = Rc[8] * t350;
+    const real t788 = t786 + t787;
+    S_wI[2] += t788;
+    const real t789 = r[1] * t788;
+    const real t790 = r[2] * t783;
+    const real t791 = t789 - t790;
+    const real t792 = Rc[0] * t353;
+    const real t793 = Rc[1] * t356;
+    const real t794 = t792 + t793;
+    const real t795 = Rc[2] * t359;
+    const real t796 = t794 + t795;
+    const real t797 = t791 + t796;
+    S_wI[3] += t797;
+    const real t798 = r[2] * t778;
+    const real t799 = r[0] * t788;
+    const real t800 = t798 - t799;
+    const real t801 = Rc[3] * t353;
+    const real t802 = Rc[4] * t356;
+    const real t803 = t801 + t802;
+    const real t804 = Rc[5] * t359;
+    const real t805 = t803 + t804;
+    const real t806 = t800 + t805;
+    S_wI[4] += t806;
+    const real t807 = r[0] * t783;
+    const real t808 = r[1] * t778;
+    const real t809 = t807 - t808;
+    const real t810 = Rc[6] * t353;
+    const real t811 = Rc[7] * t356;
+    const real t812 = t810 + t811;
+    const real t813 = Rc[8] * t359;
+    const real t814 = t812 + t813;
+    const real t815 = t809 + t814;
+    S_wI[5] += t815;
+    const real t816 = Rc[0] * t362;
+    const real t817 = Rc[1] * t365;
+    const real t818 = t816 + t817;
+    const real t819 = Rc[2] * t368;
+    const real t820 = t818 + t819;
+    S_wI[6] += t820;
+    const real t821 = Rc[3] * t362;
+    const real t822 = Rc[4] * t365;
+    const real t823 = t821 + t822;
+    const real t824 = Rc[5] * t368;
+    const real t825 = t823 + t824;
+    S_wI[7] += t825;
+    const real t826 = Rc[6] * t362;
+    const real t827 = Rc[7] * t365;
+    const real t828 = t826 + t827;
+    const real t829 = Rc[8] * t368;
+    const real t830 = t828 + t829;
+    S_wI[8] += t830;
+    const real t831 = r[1] * t830;
+    const real t832 = r[2] * t825;
+    const real t833 = t831 - t832;
+    const real t834 = Rc[0] * t371;
+    const real t835 = Rc[1] * t374;
+    const real t836 = t834 + t835;
+    const real t837 = Rc[2] * t377;
+    const real t838 = t836 + t837;
+    const real t839 = t833 + t838;
+    S_wI[9] += t839;
+    const real t840 = r[2] * t820;
+    const real t841 = r[0] * t830;
+    const real t842 = t840 - t841;
+    const real t843 = Rc[3] * t371;
+    const real t844 = Rc[4] * t374;
+    const real t845 = t843 + t844;
+    const real t846 = Rc[5] * t377;
+    const real t847 = t845 + t846;
+    const real t848 = t842 + t847;
+    S_wI[10] += t848;
+    const real t849 = r[0] * t825;
+    const real t850 = r[1] * t820;
+    const real t851 = t849 - t850;
+    const real t852 = Rc[6] * t371;
+    const real t853 = Rc[7] * t374;
+    const real t854 = t852 + t853;
+    const real t855 = Rc[8] * t377;
+    const real t856 = t854 + t855;
+    const real t857 = t851 + t856;
+    S_wI[11] += t857;
+    const real t858 = Rc[0] * t380;
+    const real t859 = Rc[1] * t383;
+    const real t860 = t858 + t859;
+    const real t861 = Rc[2] * t386;
+    const real t862 = t860 + t861;
+    S_wI[12] += t862;
+    const real t863 = Rc[3] * t380;
+    const real t864 = Rc[4] * t383;
+    const real t865 = t863 + t864;
+    const real t866 = Rc[5] * t386;
+    const real t867 = t865 + t866;
+    S_wI[13] += t867;
+    const real t868 = Rc[6] * t380;
+    const real t869 = Rc[7] * t383;
+    const real t870 = t868 + t869;
+    const real t871 = Rc[8] * t386;
+    const real t872 = t870 + t871;
+    S_wI[14] += t872;
+    const real t873 = r[1] * t872;
+    const real t874 = r[2] * t867;
+    const real t875 = t873 - t874;
+    const real t876 = Rc[0] * t389;
+    const real t877 = Rc[1] * t392;
+    const real t878 = t876 + t877;
+    const real t879 = Rc[2] * t395;
+    const real t880 = t878 + t879;
+    const real t881 = t875 + t880;
+    S_wI[15] += t881;
+    const real t882 = r[2] * t862;
+    const real t883 = r[0] * t872;
+    const real t884 = t882 - t883;
+    const real t885 = Rc[3] * t389;
+    const real t886 = Rc[4] * t392;
+    const real t887 = t885 + t886;
+    const real t888 = Rc[5] * t395;
+    const real t889 = t887 + t888;
+    const real t890 = t884 + t889;
+    S_wI[16] += t890;
+    const real t891 = r[0] * t867;
+    const real t892 = r[1] * t862;
+    const real t893 = t891 - t892;
+    const real t894 = Rc[6] * t389;
+    const real t895 = Rc[7] * t392;
+    const real t896 = t894 + t895;
+    const real t897 = Rc[8] * t395;
+    const real t898 = t896 + t897;
+    const real t899 = t893 + t898;
+    S_wI[17] += t899;
+    return 0;
+}
+
+static int mstmm_sweep_frames_placed_carry_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_placed_carry(in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_frames_placed_carry_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"S_p", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_placed_carry_outputs[] = {
+    {"T_p", 54, "", 0, 0},
+    {"T_w", 18, "", 1, 0},
+    {"S_pI", 54, "", 1, 0},
+    {"S_wI", 18, "", 1, 0},
+};
+
+/* load by a change of place that is known
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * in  b_p[9] change of place that is known
+ * out e_S[6] (N, N*m) load by what is known, added to what is there
+ * out e_b[6] (N, N*m) the same, as it is carried, added to what is there
+ */
+int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+    real *restrict e_S, real *restrict e_b)
+{
+    const real t0 = S_p[0] * b_p[0];
+    const real t1 = S_p[6] * b_p[1];
+    const real t2 = t0 + t1;
+    const real t3 = S_p[12] * b_p[2];
+    const real t4 = t2 + t3;
+    const real t5 = S_p[18] * b_p[3];
+    const real t6 = t4 + t5;
+    const real t7 = S_p[24] * b_p[4];
+    const real t8 = t6 + t7;
+    const real t9 = S_p[30] * b_p[5];
+    const real t10 = t8 + t9;
+    const real t11 = S_p[36] * b_p[6];
+    const real t12 = t10 + t11;
+    const real t13 = S_p[42] * b_p[7];
+    const real t14 = t12 + t13;
+    const real t15 = S_p[48] * b_p[8];
+    const real t16 = t14 + t15;
+    e_S[0] += t16;
+    const real t17 = S_p[1] * b_p[0];
+    const real t18 = S_p[7] * b_p[1];
+    const real t19 = t17 + t18;
+    const real t20 = S_p[13] * b_p[2];
+    const real t21 = t19 + t20;
+    const real t22 = S_p[19] * b_p[3];
+    const real t23 = t21 + t22;
+    const real t24 = S_p[25] * b_p[4];
+    const real t25 = t23 + t24;
+    const real t26 = S_p[31] * b_p[5];
+    const real t27 = t25 + t26;
+    const real t28 = S_p[37] * b_p[6];
+    const real t29 = t27 + t28;
+    const real t30 = S_p[43] * b_p[7];
+    const real t31 = t29 + t30;
+    const real t32 = S_p[49] * b_p[8];
+    const real t33 = t31 + t32;
+    e_S[1] += t33;
+    const real t34 = S_p[2] * b_p[0];
+    const real t35 = S_p[8] * b_p[1];
+    const real t36 = t34 + t35;
+    const real t37 = S_p[14] * b_p[2];
+    const real t38 = t36 + t37;
+    const real t39 = S_p[20] * b_p[3];
+    const real t40 = t38 + t39;
+    const real t41 = S_p[26] * b_p[4];
+    const real t42 = t40 + t41;
+    const real t43 = S_p[32] * b_p[5];
+    const real t44 = t42 + t43;
+    const real t45 = S_p[38] * b_p[6];
+    const real t46 = t44 + t45;
+    const real t47 = S_p[44] * b_p[7];
+    const real t48 = t46 + t47;
+    const real t49 = S_p[50] * b_p[8];
+    const real t50 = t48 + t49;
+    e_S[2] += t50;
+    const real t51 = S_p[3] * b_p[0];
+    const real t52 = S_p[9] * b_p[1];
+    const real t53 = t51 + t52;
+    const real t54 = S_p[15] * b_p[2];
+    const real t55 = t53 + t54;
+    const real t56 = S_p[21] * b_p[3];
+    const real t57 = t55 + t56;
+    const real t58 = S_p[27] * b_p[4];
+    const real t59 = t57 + t58;
+    const real t60 = S_p[33] * b_p[5];
+    const real t61 = t59 + t60;
+    const real t62 = S_p[39] * b_p[6];
+    const real t63 = t61 + t62;
+    const real t64 = S_p[45] * b_p[7];
+    const real t65 = t63 + t64;
+    const real t66 = S_p[51] * b_p[8];
+    const real t67 = t65 + t66;
+    e_S[3] += t67;
+    const real t68 = S_p[4] * b_p[0];
+    const real t69 = S_p[10] * b_p[1];
+    const real t70 = t68 + t69;
+    const real t71 = S_p[16] * b_p[2];
+    const real t72 = t70 + t71;
+    const real t73 = S_p[22] * b_p[3];
+    const real t74 = t72 + t73;
+    const real t75 = S_p[28] * b_p[4];
+    const real t76 = t74 + t75;
+    const real t77 = S_p[34] * b_p[5];
+    const real t78 = t76 + t77;
+    const real t79 = S_p[40] * b_p[6];
+    const real t80 = t78 + t79;
+    const real t81 = S_p[46] * b_p[7];
+    const real t82 = t80 + t81;
+    const real t83 = S_p[52] * b_p[8];
+    const real t84 = t82 + t83;
+    e_S[4] += t84;
+    const real t85 = S_p[5] * b_p[0];
+    const real t86 = S_p[11] * b_p[1];
+    const real t87 = t85 + t86;
+    const real t88 = S_p[17] * b_p[2];
+    const real t89 = t87 + t88;
+    const real t90 = S_p[23] * b_p[3];
+    const real t91 = t89 + t90;
+    const real t92 = S_p[29] * b_p[4];
+    const real t93 = t91 + t92;
+    const real t94 = S_p[35] * b_p[5];
+    const real t95 = t93 + t94;
+    const real t96 = S_p[41] * b_p[6];
+    const real t97 = t95 + t96;
+    const real t98 = S_p[47] * b_p[7];
+    const real t99 = t97 + t98;
+    const real t100 = S_p[53] * b_p[8];
+    const real t101 = t99 + t100;
+    e_S[5] += t101;
+    e_b[0] += t16;
+    e_b[1] += t33;
+    e_b[2] += t50;
+    e_b[3] += t67;
+    e_b[4] += t84;
+    e_b[5] += t101;
+    return 0;
+}
+
+static int mstmm_sweep_frames_placed_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_frames_placed_known(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_frames_placed_known_inputs[] = {
+    {"S_p", 54, "", 0, 0},
+    {"b_p", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_frames_placed_known_outputs[] = {
+    {"e_S", 6, "N, N*m", 1, 0},
+    {"e_b", 6, "N, N*m", 1, 0},
+};
+
 /* pose and its derivative along a direction
  * in  A_I[3][3] rotation, parent axes to inertial axes
  * in  x_I[3] (m) P of the parent, inertial axes
@@ -4101,6 +5610,66 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "placed_moved",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_moved,
+        .call = mstmm_sweep_frames_placed_moved_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_placed_moved_inputs,
+        .outputs = mstmm_sweep_frames_placed_moved_outputs,
+        .ir_hash = "512a0da41198a594fbcac1f8aecebf015be9b36a4fe3cfca3554a0c248b89636",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_pose",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_pose,
+        .call = mstmm_sweep_frames_placed_pose_call,
+        .n_inputs = 2,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_frames_placed_pose_inputs,
+        .outputs = mstmm_sweep_frames_placed_pose_outputs,
+        .ir_hash = "4e185e11f9d90c87dd913ca2d7c31c7461388593f730a4e4c95ece3b75e52e51",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_column",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_column,
+        .call = mstmm_sweep_frames_placed_column_call,
+        .n_inputs = 6,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_frames_placed_column_inputs,
+        .outputs = mstmm_sweep_frames_placed_column_outputs,
+        .ir_hash = "915ce735c27e3ac5fcffdca36cc0239da40874d0817b489068802929ccdff583",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_carry",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_carry,
+        .call = mstmm_sweep_frames_placed_carry_call,
+        .n_inputs = 3,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_frames_placed_carry_inputs,
+        .outputs = mstmm_sweep_frames_placed_carry_outputs,
+        .ir_hash = "96d0ae62e08ef57e85cc46721bccc841200d0a18198ac416ba22e243e0fcd1bb",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_known",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_known,
+        .call = mstmm_sweep_frames_placed_known_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_frames_placed_known_inputs,
+        .outputs = mstmm_sweep_frames_placed_known_outputs,
+        .ir_hash = "f8a617ab9500541c3c310b5dd0efbca69fffb61c3fcb4014721c35474469f139",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "pose_slope",
         .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
         .call = mstmm_sweep_frames_pose_slope_call,
@@ -4226,7 +5795,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "bb36c1e9cf6c323bc61b2e439fdc423ae3197dbeb427ede5367540272a6e0e4d",
+    .hash = "a56341e14780d8bddb7d1c508dbc6df37290d4abf92bae0bf56355904f5dae48",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4236,6 +5805,6 @@ const mstmm_element mstmm_sweep_frames = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 36,
+    .n_kernels = 41,
     .kernels = mstmm_sweep_frames_kernels,
 };

@@ -220,8 +220,8 @@ mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_kn
 
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
-int64_t mstmm_bend_numbers(int n) { return (int64_t)62 * n + 4 * (int64_t)n * n; }
-int64_t mstmm_port_numbers(int n) { return (int64_t)21 * n + 1 * (int64_t)n * n; }
+int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n; }
+int64_t mstmm_port_numbers(int n) { return (int64_t)30 * n + 1 * (int64_t)n * n; }
 
 /* Accelerations that are given: all, or none so far. */
 static int mstmm_at_prescribed(mstmm_state *state, int index)
@@ -1600,13 +1600,164 @@ static int mstmm_at_no_loads(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     real *d_block = state->slope->workspace + body->block;
     memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    if (body->modal) {
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        for (int j = 0; j < n; j++)
-            (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+    return 0;
+}
+
+/* Derivatives: force and moment at a point of a body, added to e. */
+static int mstmm_at_loads_across(mstmm_state *state, int index)
+{
+    real A_F[9];
+    real d_A_F[9];
+    real F[3];
+    real M[3];
+    real d_F[3];
+    real d_M[3];
+    const mstmm_load *load = &state->model->loads[index];
+    real *on = mstmm_block(state->model, state->workspace, load->body);
+    real *axes = mstmm_block(state->model, state->workspace, load->axes);
+    real *d_on = mstmm_block(state->model, state->slope->workspace, load->body);
+    real *d_axes = mstmm_block(state->model, state->slope->workspace, load->axes);
+    if (load->own) return 0;
+    mstmm_frames_end_frame(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .A_end = A_F);
+    mstmm_frames_end_frame_slope(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .d_A = d_axes + MSTMM_BLOCK_A,
+        .d_A_end = d_A_F);
+    for (int j = 0; j < 3; j++)
+        F[j] = mstmm_value_at(state, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        d_F[j] = mstmm_value_at(state->slope, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        M[j] = mstmm_value_at(state, load->moment[j]);
+    for (int j = 0; j < 3; j++)
+        d_M[j] = mstmm_value_at(state->slope, load->moment[j]);
+    mstmm_frames_applied_load_slope(
+        .A = on + MSTMM_BLOCK_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
+        .d_A = d_on + MSTMM_BLOCK_A, .d_A_F = d_A_F, .d_F = d_F, .d_M = d_M,
+        .d_e = d_on + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: massless elements between two ends, added to e of both. */
+static int mstmm_at_forces_across(mstmm_state *state, int index)
+{
+    real x_F[3];
+    real v_F[3];
+    real unused_a_K[3];
+    real d_x_F[3];
+    real d_v_F[3];
+    real w_F[3];
+    real unused_alpha_K[3];
+    real d_w_F[3];
+    real A_F[9];
+    real d_A_F[9];
+    real x_T[3];
+    real v_T[3];
+    real d_x_T[3];
+    real d_v_T[3];
+    real w_T[3];
+    real d_w_T[3];
+    real A_T[9];
+    real d_A_T[9];
+    real length[2];
+    real d_length[2];
+    real effort[1];
+    real F[3];
+    real M[3];
+    real V[1];
+    real P[1];
+    real d_effort[1];
+    real d_F[3];
+    real d_M[3];
+    real F_back[3];
+    real M_back[3];
+    real d_F_back[3];
+    real d_M_back[3];
+    const mstmm_force *force = &state->model->forces[index];
+    real *from = mstmm_block(state->model, state->workspace, force->body_f);
+    real *to = mstmm_block(state->model, state->workspace, force->body_t);
+    real *d_from = mstmm_block(state->model, state->slope->workspace, force->body_f);
+    real *d_to = mstmm_block(state->model, state->slope->workspace, force->body_t);
+    int code;
+    if (force->own) return 0;
+    mstmm_frames_point(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
+    mstmm_frames_point_slope(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
+        .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F,
+        .d_v_K = d_v_F);
+    mstmm_frames_turning(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_F, .alpha_K = unused_alpha_K);
+    mstmm_frames_turning_slope(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
+    mstmm_frames_end_frame(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .A_end = A_F);
+    mstmm_frames_end_frame_slope(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+        .d_A_end = d_A_F);
+    mstmm_frames_point(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
+    mstmm_frames_point_slope(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
+        .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
+        .d_v_K = d_v_T);
+    mstmm_frames_turning(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_T, .alpha_K = unused_alpha_K);
+    mstmm_frames_turning_slope(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
+    mstmm_frames_end_frame(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .A_end = A_T);
+    mstmm_frames_end_frame_slope(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+        .d_A_end = d_A_T);
+    effort[0] = 0;
+    d_effort[0] = 0;
+    if (force->effort) {
+        mstmm_frames_length(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .l = length);
+        mstmm_frames_length_slope(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .d_x_F = d_x_F, .d_v_F = d_v_F,
+            .d_x_T = d_x_T, .d_v_T = d_v_T, .d_l = d_length);
+        code = mstmm_given_effort(state, force->effort, length, effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+        code = mstmm_given_effort_slope(state, force->effort_slope, length, d_length, d_effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
     }
+    code = mstmm_force_wrench(force->wrench,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
+        .P = P);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
+    mstmm_force_wrench_slope(force->wrench_slope,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
+        .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
+        .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F, .d_M = d_M);
+    mstmm_frames_opposite(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
+    mstmm_frames_opposite_slope(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
+        .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
+    mstmm_frames_applied_load_slope(
+        .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
+        .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
+        .d_e = d_to + MSTMM_BLOCK_E);
+    mstmm_frames_applied_load_slope(
+        .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
+        .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F_back,
+        .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
     return 0;
 }
 
@@ -1663,6 +1814,15 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         code = mstmm_at_lag(state, index);
         if (code) return code;
     }
+    if (body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        real *d_block = state->slope->workspace + body->block;
+        memset(place + MSTMM_PLACE_S(body->nu, body->nq), 0, 54 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_A, 0, 9 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
+    }
     if (!body->modal) {
         real *block = state->workspace + body->block;
         real *tangent = state->tangents->numbers + body->tangent;
@@ -1680,6 +1840,10 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
             mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c);
             code = mstmm_at_modal_own_slope(state, index);
             if (code) return code;
+            if (body->modal && body->modal->drag) {
+                code = mstmm_at_drag_slope(state, index);
+                if (code) return code;
+            }
             memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
             memcpy(bend + MSTMM_BEND_Z_Z(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
         }
@@ -1688,10 +1852,43 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
             mstmm_aim_mode(state, modal, c);
             code = mstmm_at_modal_own_slope(state, index);
             if (code) return code;
+            if (body->modal && body->modal->drag) {
+                code = mstmm_at_drag_slope(state, index);
+                if (code) return code;
+            }
             memcpy(bend + MSTMM_BEND_K(n) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
             memcpy(bend + MSTMM_BEND_Z_X(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_no_mode(state, modal);
+    }
+    if (body->modal && body->placed) {
+        real *block = state->workspace + body->block;
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        for (int c = 0; c < 9; c++) {
+            mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c);
+            mstmm_frames_placed_pose(
+                .A = block + MSTMM_BLOCK_A, .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
+                .d_A = d_block + MSTMM_BLOCK_A, .d_x = d_block + MSTMM_BLOCK_X,
+                .d_v = d_block + MSTMM_BLOCK_V);
+            memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+            if (body->modal && body->modal->drag) {
+                code = mstmm_at_drag_slope(state, index);
+                if (code) return code;
+            }
+            memcpy(place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+            memcpy(bend + MSTMM_BEND_PLACE_Z(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1);
+        memset(d_block + MSTMM_BLOCK_A, 0, 9 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
     }
     if (body->modal && !body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -1745,20 +1942,269 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
     return 0;
 }
 
+/* Change of a load in the axes of space as its body turns. */
+static int mstmm_at_loads_by_place(mstmm_state *state, int index)
+{
+    real A_F[9];
+    real F[3];
+    real M[3];
+    const mstmm_load *load = &state->model->loads[index];
+    const mstmm_body *body = &state->model->bodies[load->body];
+    real *block = state->workspace + body->block;
+    real *on = mstmm_block(state->model, state->workspace, load->body);
+    real *axes = mstmm_block(state->model, state->workspace, load->axes);
+    real *place = state->tangents->numbers + body->place;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_on = mstmm_block(state->model, state->slope->workspace, load->body);
+    if (!load->own) return 0;
+    mstmm_frames_end_frame(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .A_end = A_F);
+    for (int j = 0; j < 3; j++)
+        F[j] = mstmm_value_at(state, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        M[j] = mstmm_value_at(state, load->moment[j]);
+    for (int c = 0; c < 3; c++) {
+        mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c);
+        mstmm_frames_placed_pose(
+            .A = block + MSTMM_BLOCK_A, .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
+            .d_A = d_block + MSTMM_BLOCK_A, .d_x = d_block + MSTMM_BLOCK_X,
+            .d_v = d_block + MSTMM_BLOCK_V);
+        memcpy(d_block + MSTMM_BLOCK_E, place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
+        mstmm_frames_applied_load_slope(
+            .A = on + MSTMM_BLOCK_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
+            .d_A = d_on + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = mstmm_zeros,
+            .d_M = mstmm_zeros, .d_e = d_on + MSTMM_BLOCK_E);
+        memcpy(place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+    }
+    mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1);
+    memset(d_block + MSTMM_BLOCK_A, 0, 9 * sizeof(real));
+    memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
+    memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
+    return 0;
+}
+
+/* Change of an element to the ground as its body moves. */
+static int mstmm_at_forces_by_place(mstmm_state *state, int index)
+{
+    real x_F[3];
+    real v_F[3];
+    real unused_a_K[3];
+    real w_F[3];
+    real unused_alpha_K[3];
+    real A_F[9];
+    real x_T[3];
+    real v_T[3];
+    real w_T[3];
+    real A_T[9];
+    real length[2];
+    real effort[1];
+    real F[3];
+    real M[3];
+    real V[1];
+    real P[1];
+    real F_back[3];
+    real M_back[3];
+    real d_x_F[3];
+    real d_v_F[3];
+    real d_w_F[3];
+    real d_A_F[9];
+    real d_x_T[3];
+    real d_v_T[3];
+    real d_w_T[3];
+    real d_A_T[9];
+    real d_length[2];
+    real d_effort[1];
+    real d_F[3];
+    real d_M[3];
+    real d_F_back[3];
+    real d_M_back[3];
+    const mstmm_force *force = &state->model->forces[index];
+    const mstmm_body *body = &state->model->bodies[mstmm_held(force)];
+    real *block = state->workspace + body->block;
+    real *from = mstmm_block(state->model, state->workspace, force->body_f);
+    real *to = mstmm_block(state->model, state->workspace, force->body_t);
+    real *tangent = state->tangents->numbers + body->tangent;
+    real *place = state->tangents->numbers + body->place;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_from = mstmm_block(state->model, state->slope->workspace, force->body_f);
+    real *d_to = mstmm_block(state->model, state->slope->workspace, force->body_t);
+    int code;
+    if (!force->own) return 0;
+    mstmm_frames_point(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
+    mstmm_frames_turning(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_F, .alpha_K = unused_alpha_K);
+    mstmm_frames_end_frame(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .A_end = A_F);
+    mstmm_frames_point(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
+    mstmm_frames_turning(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_T, .alpha_K = unused_alpha_K);
+    mstmm_frames_end_frame(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .A_end = A_T);
+    effort[0] = 0;
+    if (force->effort) {
+        mstmm_frames_length(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .l = length);
+        code = mstmm_given_effort(state, force->effort, length, effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+    }
+    code = mstmm_force_wrench(force->wrench,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
+        .P = P);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
+    mstmm_frames_opposite(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
+    for (int c = 0; c < 9; c++) {
+        mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c);
+        mstmm_frames_placed_pose(
+            .A = block + MSTMM_BLOCK_A, .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
+            .d_A = d_block + MSTMM_BLOCK_A, .d_x = d_block + MSTMM_BLOCK_X,
+            .d_v = d_block + MSTMM_BLOCK_V);
+        memcpy(d_block + MSTMM_BLOCK_E, place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
+        mstmm_frames_point_slope(
+            .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+            .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+            .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
+            .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION,
+            .d_x_K = d_x_F, .d_v_K = d_v_F);
+        mstmm_frames_turning_slope(
+            .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+            .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION,
+            .d_w_K = d_w_F);
+        mstmm_frames_end_frame_slope(
+            .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+            .d_A_end = d_A_F);
+        mstmm_frames_point_slope(
+            .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+            .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+            .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
+            .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
+            .d_v_K = d_v_T);
+        mstmm_frames_turning_slope(
+            .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+            .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
+        mstmm_frames_end_frame_slope(
+            .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+            .d_A_end = d_A_T);
+        d_effort[0] = 0;
+        if (force->effort) {
+            mstmm_frames_length_slope(
+                .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .d_x_F = d_x_F, .d_v_F = d_v_F,
+                .d_x_T = d_x_T, .d_v_T = d_v_T, .d_l = d_length);
+        }
+        if (force->effort) {
+            code = mstmm_given_effort_slope(state, force->effort_slope, length, d_length, d_effort);
+            if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+        }
+        mstmm_force_wrench_slope(force->wrench_slope,
+            .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+            .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
+            .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
+            .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F,
+            .d_M = d_M);
+        mstmm_frames_opposite_slope(
+            .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
+            .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
+        mstmm_frames_applied_load_slope(
+            .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
+            .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
+            .d_e = d_to + MSTMM_BLOCK_E);
+        mstmm_frames_applied_load_slope(
+            .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
+            .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
+            .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        memcpy(place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+    }
+    mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1);
+    memset(d_block + MSTMM_BLOCK_A, 0, 9 * sizeof(real));
+    memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
+    memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
+    for (int c = 0; c < 3; c++) {
+        mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c);
+        memcpy(d_block + MSTMM_BLOCK_E, tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
+        mstmm_frames_point_slope(
+            .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+            .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+            .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
+            .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION,
+            .d_x_K = d_x_F, .d_v_K = d_v_F);
+        mstmm_frames_turning_slope(
+            .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+            .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION,
+            .d_w_K = d_w_F);
+        mstmm_frames_end_frame_slope(
+            .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+            .d_A_end = d_A_F);
+        mstmm_frames_point_slope(
+            .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+            .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+            .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
+            .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
+            .d_v_K = d_v_T);
+        mstmm_frames_turning_slope(
+            .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+            .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
+        mstmm_frames_end_frame_slope(
+            .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+            .d_A_end = d_A_T);
+        d_effort[0] = 0;
+        if (force->effort) {
+            mstmm_frames_length_slope(
+                .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .d_x_F = d_x_F, .d_v_F = d_v_F,
+                .d_x_T = d_x_T, .d_v_T = d_v_T, .d_l = d_length);
+        }
+        if (force->effort) {
+            code = mstmm_given_effort_slope(state, force->effort_slope, length, d_length, d_effort);
+            if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+        }
+        mstmm_force_wrench_slope(force->wrench_slope,
+            .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+            .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
+            .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
+            .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F,
+            .d_M = d_M);
+        mstmm_frames_opposite_slope(
+            .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
+            .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
+        mstmm_frames_applied_load_slope(
+            .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
+            .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
+            .d_e = d_to + MSTMM_BLOCK_E);
+        mstmm_frames_applied_load_slope(
+            .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
+            .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
+            .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+    }
+    mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1);
+    return 0;
+}
+
 /* Unknowns of a body eliminated, the rest carried to the parent. */
 static int mstmm_at_tangent_condense(mstmm_state *state, int index)
 {
     real carrier[9];
     real turn[3];
-    real place[3];
+    real shift[3];
     real change[6];
     real S_c[54];
+    real S_p[54];
+    real placed[54];
     real K[36];
     real right[54];
     real D[36];
     real one[36];
     real work[36];
     real T[54];
+    real T_p[54];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1791,9 +2237,9 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             if (code) return code;
             mstmm_frames_tangent_turned(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
-                .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                 .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
                 .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
@@ -1801,6 +2247,12 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
                 .J = body->rotor, .laws = mstmm_zeros, .B = bend + MSTMM_BEND_B(n) + 9 * c,
                 .G = bend + MSTMM_BEND_G(n) + 6 * c, .row = change);
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = bend + MSTMM_BEND_PLACE_B(n) + 9 * c);
+            }
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -1809,6 +2261,24 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_no_mode(state, modal);
+    }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_own(
+            .n = modal->n, .B_p = bend + MSTMM_BEND_PLACE_B(n),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .K = bend + MSTMM_BEND_K(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->modal && body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         code = mstmm_judged(state, mstmm_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
@@ -1836,8 +2306,39 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     if (body->modal) {
         memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
     }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_node(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
+            .work = bend + MSTMM_BEND_WORK(n));
+    }
+    if (body->modal && !body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_node(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
+            .work = bend + MSTMM_BEND_WORK(n));
+    }
+    if (body->modal && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        memcpy(place + MSTMM_PLACE_S(body->nu, body->nq), S_p, 54 * sizeof(real));
+    }
     if (!body->section && speeds) {
         const int nu = body->nu;
+        real *place = state->tangents->numbers + body->place;
         real *d_block = state->slope->workspace + body->block;
         mstmm_generic_tangent_carrier(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
@@ -1854,15 +2355,19 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 code = mstmm_at_hinge_motion_slope(state, index);
                 if (code) return code;
             }
+            if (body->steady && body->straight && body->placed) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
             if (body->straight) {
                 mstmm_generic_tangent_along(nu,
                     .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-                    .d_q = state->slope->q + body->q, .theta = turn, .x = place);
+                    .d_q = state->slope->q + body->q, .theta = turn, .x = shift);
             }
             if (!body->straight) {
                 mstmm_frames_tangent_turned(
                     .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                    .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+                    .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             }
             if (body->turning) {
                 mstmm_generic_tangent_turning(nu,
@@ -1876,7 +2381,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             }
             if (body->steady && !body->turning) {
                 mstmm_generic_tangent_steady(nu,
-                    .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
                     .Q = carrier, .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
                     .d_s = state->slope->given + body->u, .J = body->rotor,
@@ -1886,7 +2391,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             }
             if (!body->steady) {
                 mstmm_generic_tangent_column(nu,
-                    .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
                     .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
                     .Q = carrier, .f = block + MSTMM_BLOCK_E,
@@ -1898,6 +2403,12 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                     .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
                     .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
             }
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = place + MSTMM_PLACE_B(body->nu, body->nq) + 9 * c);
+            }
             for (int k = 0; k < speeds; k++)
                 (tangent + MSTMM_TANGENT_W(body->nu, body->nq) + speeds * c)[k] = change[columns[k]];
         }
@@ -1905,6 +2416,19 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         for (int k = 0; k < speeds; k++)
             for (int row = 0; row < 6; row++)
                 (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_placed_rows(
+            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed);
+        mstmm_tangent_placed_own(
+            .n = speeds, .B_p = place + MSTMM_PLACE_B(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed,
+            .K = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .Z_x = tangent + MSTMM_TANGENT_W(body->nu, body->nq));
+    }
+    if (!body->section && speeds) {
         mstmm_generic_tangent_rows(speeds,
             .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
@@ -1921,6 +2445,14 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_placed_reduce(
+            .n = speeds, .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
+            .Z_p = placed, .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq));
     }
     if (body->section && !body->section->inward) {
         const int nu = body->nu;
@@ -1946,9 +2478,9 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             if (code) return code;
             mstmm_frames_tangent_turned(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
-                .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                 .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
                 .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                 .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
@@ -1956,6 +2488,12 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
                 .J = body->rotor, .laws = mstmm_zeros, .B = port + MSTMM_PORT_B(n) + 9 * c,
                 .G = port + MSTMM_PORT_G(n) + 6 * c, .row = change);
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = port + MSTMM_PORT_PLACE_B(n) + 9 * c);
+            }
             mstmm_modal_modal_effort_slope(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
                 .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -1970,6 +2508,14 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
         .w = block + MSTMM_BLOCK_HINGE_W, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
         .T = T, .S_I = mstmm_tangent_at(state, body->parent));
+    if (body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_frames_placed_carry(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p, .T_w = T,
+            .S_pI = mstmm_place_at(state, body->parent),
+            .S_wI = mstmm_tangent_at(state, body->parent));
+    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1984,6 +2530,21 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .T = T,
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->section && !body->section->inward && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_placed_absorb(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
+            .K = bend + MSTMM_BEND_K(n), .Z_p = bend + MSTMM_BEND_PLACE_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     return 0;
 }
@@ -2091,6 +2652,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
 static int mstmm_at_tangent_answered(mstmm_state *state, int index)
 {
     real x[6];
+    real p[9];
     real z[9];
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
@@ -2099,6 +2661,24 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     if (mstmm_idle(state, body)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
+    if (body->placed) {
+        real *block = state->workspace + body->block;
+        real *place = state->tangents->numbers + body->place;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_placed_moved(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .p_I = mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq));
+    }
+    if (!body->section && speeds && body->placed) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_placed_left(
+            .n = speeds, .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq));
+    }
     if (!body->section && speeds) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -2116,7 +2696,15 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         for (int j = 0, k = 0; j < nu; j++)
             (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
                          : 0;
-    } else {
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_displaced(
+            .n = speeds, .B = place + MSTMM_PLACE_B(body->nu, body->nq), .x = x,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
+    }
+    if (!(!body->section && speeds)) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         real *d_block = state->slope->workspace + body->block;
@@ -2138,6 +2726,26 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
     }
+    if (body->section && !body->section->inward && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = port + MSTMM_PORT_PLACE_B(n), .x = state->answer + modal->u,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
+    }
+    if (body->modal && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_left(
+            .n = modal->n, .gain = bend + MSTMM_BEND_PLACE_GAIN(n),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq), .y = bend + MSTMM_BEND_Y(n));
+    }
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2148,6 +2756,16 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
             .x = state->answer + modal->u, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = bend + MSTMM_BEND_PLACE_B(n), .x = state->answer + modal->u,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
     }
     return 0;
 }
@@ -2163,12 +2781,19 @@ static int mstmm_at_known_column(mstmm_state *state, int index)
     for (int j = 0; j < nu; j++)
         (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
     if (body->modal) {
+        memset(d_block + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
+        memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
+        code = mstmm_at_modal_own_slope(state, index);
+        if (code) return code;
+    }
+    if (body->modal && body->modal && body->modal->drag) {
+        code = mstmm_at_drag_slope(state, index);
+        if (code) return code;
+    }
+    if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        memset(d_block + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
-        code = mstmm_at_modal_own_slope(state, index);
-        if (code) return code;
         for (int j = 0; j < n; j++)
             (d_modes + MSTMM_MODES_E_F(n))[j] -= (state->column + modal->u)[j];
     }
@@ -2208,7 +2833,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
 {
     real carrier[9];
     real turn[3];
-    real place[3];
+    real shift[3];
     real turned[6];
     real change[6];
     real e_c[6];
@@ -2224,14 +2849,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        real *modes = modal ? state->workspace + modal->place : NULL;
-        const mstmm_section *section = body->section;
-        real *laid = section ? state->workspace + section->place : NULL;
         real *d_block = state->slope->workspace + body->block;
-        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        real *d_laid = section ? state->slope->workspace + section->place : NULL;
         mstmm_generic_tangent_carrier(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
             .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
@@ -2241,9 +2859,9 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         if (code) return code;
         mstmm_frames_tangent_turned(
             .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
         mstmm_generic_tangent_column(nu,
-            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
             .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
             .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
@@ -2251,6 +2869,25 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
             .J = body->rotor, .laws = mstmm_zeros,
             .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+    }
+    if (body->section && body->placed) {
+        real *block = state->workspace + body->block;
+        real *place = state->tangents->numbers + body->place;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_frames_placed_column(
+            .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+            .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V, .Q = carrier,
+            .B_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq));
+    }
+    if (body->section) {
+        real *block = state->workspace + body->block;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
         mstmm_modal_modal_effort_slope(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
             .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
@@ -2294,6 +2931,12 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
             .e_b = known);
     }
+    if (body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_frames_placed_known(
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = seen, .e_b = known);
+    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2333,19 +2976,23 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         code = mstmm_at_hinge_motion_slope(state, index);
         if (code) return code;
     }
+    if (!body->section && speeds && body->steady && body->straight && body->placed) {
+        code = mstmm_at_hinge_motion_slope(state, index);
+        if (code) return code;
+    }
     if (!body->section && speeds && body->straight) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         mstmm_generic_tangent_along(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .d_q = state->slope->q + body->q,
-            .theta = turn, .x = place);
+            .theta = turn, .x = shift);
     }
     if (!body->section && speeds && !body->straight) {
         real *block = state->workspace + body->block;
         real *d_block = state->slope->workspace + body->block;
         mstmm_frames_tangent_turned(
             .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
-            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = place);
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
     }
     if (!body->section && speeds && body->turning) {
         real *block = state->workspace + body->block;
@@ -2365,7 +3012,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
         mstmm_generic_tangent_steady(nu,
-            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
             .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier,
             .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
             .d_s = state->slope->given + body->u, .J = body->rotor,
@@ -2378,7 +3025,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
         mstmm_generic_tangent_column(nu,
-            .theta = turn, .x = place, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
             .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
             .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
@@ -2387,17 +3034,35 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .J = body->rotor, .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
             .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
     }
-    if (!body->section && speeds) {
+    if (!body->section && speeds && body->placed) {
         real *block = state->workspace + body->block;
-        real *tangent = state->tangents->numbers + body->tangent;
+        real *place = state->tangents->numbers + body->place;
         real *d_block = state->slope->workspace + body->block;
-        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_placed_column(
+            .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+            .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V, .Q = carrier,
+            .B_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq));
+    }
+    if (!body->section && speeds) {
+        real *tangent = state->tangents->numbers + body->tangent;
         for (int k = 0; k < speeds; k++)
             rows[k] = change[columns[k]];
         mstmm_frames_tangent_known(
             .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
             .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
             .e_b = known);
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_frames_placed_known(
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = seen, .e_b = known);
+    }
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
         mstmm_generic_tangent_push_known(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
@@ -2420,6 +3085,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
 static int mstmm_at_known_answered(mstmm_state *state, int index)
 {
     real x[6];
+    real p[9];
     real z[9];
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
@@ -2428,6 +3094,26 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     if (mstmm_idle(state, body)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
+    if (body->placed) {
+        real *block = state->workspace + body->block;
+        real *place = state->tangents->numbers + body->place;
+        real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+        mstmm_frames_placed_moved(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .z_I = d_parent + MSTMM_BLOCK_MOTION,
+            .p_I = mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq));
+    }
+    if (!body->section && speeds && body->placed) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *place = state->tangents->numbers + body->place;
+        for (int j = 0; j < 9; j++)
+            (place + MSTMM_PLACE_Z(body->nu, body->nq))[j] += (place + MSTMM_PLACE_KNOWN(body->nu, body->nq))[j];
+        mstmm_tangent_placed_left(
+            .n = speeds, .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
+            .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq));
+    }
     if (!body->section && speeds) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -2446,7 +3132,15 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         for (int j = 0, k = 0; j < nu; j++)
             (state->answer + body->u)[j] = k < speeds && columns[k] == j ? x[k++]
                          : 0;
-    } else {
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_displaced(
+            .n = speeds, .B = place + MSTMM_PLACE_B(body->nu, body->nq), .x = x,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
+    }
+    if (!(!body->section && speeds)) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         real *d_block = state->slope->workspace + body->block;
@@ -2463,6 +3157,11 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         for (int j = 0; j < 9; j++)
             (d_block + MSTMM_BLOCK_MOTION)[j] += (tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq))[j];
     }
+    if (body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        for (int j = 0; j < 9; j++)
+            (place + MSTMM_PLACE_Z(body->nu, body->nq))[j] += (place + MSTMM_PLACE_KNOWN(body->nu, body->nq))[j];
+    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2474,6 +3173,26 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
     }
+    if (body->section && !body->section->inward && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = port + MSTMM_PORT_PLACE_B(n), .x = state->answer + modal->u,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
+    }
+    if (body->modal && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_left(
+            .n = modal->n, .gain = bend + MSTMM_BEND_PLACE_GAIN(n),
+            .p = place + MSTMM_PLACE_Z(body->nu, body->nq), .y = bend + MSTMM_BEND_Y(n));
+    }
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2484,6 +3203,16 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
             .x = state->answer + modal->u, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
+    }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_displaced(
+            .n = modal->n, .B = bend + MSTMM_BEND_PLACE_B(n), .x = state->answer + modal->u,
+            .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
+        memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
     }
     return 0;
 }
@@ -3190,6 +3919,26 @@ static int mstmm_pass_no_loads(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_loads_across(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_loads; i++) {
+        const int code = mstmm_at_loads_across(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_forces_across(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_forces; i++) {
+        const int code = mstmm_at_forces_across(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 static int mstmm_pass_tangent_own(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -3205,6 +3954,26 @@ static int mstmm_pass_law_slopes(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_laws; i++) {
         const int code = mstmm_at_law_slopes(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_loads_by_place(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_loads; i++) {
+        const int code = mstmm_at_loads_by_place(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_forces_by_place(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_forces; i++) {
+        const int code = mstmm_at_forces_by_place(state, i);
         if (code) return code;
     }
     return 0;
@@ -3639,7 +4408,7 @@ int mstmm_run_required_slope(mstmm_state *state)
     return 0;
 }
 
-/* Derivative of what acts on bodies, and of the values of expressions. */
+/* Derivative of what acts across the tree, and of the values of expressions. */
 int mstmm_run_applied_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -3668,16 +4437,12 @@ int mstmm_run_applied_slope(mstmm_state *state)
         code = mstmm_pass_no_loads(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product) && model->n_flexible) {
-        code = mstmm_pass_drag_slope(state);
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_loads_across(state);
         if (code) return code;
     }
     if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_loads_slope(state);
-        if (code) return code;
-    }
-    if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_forces_slope(state);
+        code = mstmm_pass_forces_across(state);
         if (code) return code;
     }
     return 0;
@@ -3686,11 +4451,20 @@ int mstmm_run_applied_slope(mstmm_state *state)
 /* Tangent of inverse dynamics factored, behind inverse dynamics itself. */
 int mstmm_run_tangent(mstmm_state *state)
 {
+    const mstmm_model *model = state->model;
     int code;
     code = mstmm_pass_tangent_own(state);
     if (code) return code;
     code = mstmm_pass_law_slopes(state);
     if (code) return code;
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_loads_by_place(state);
+        if (code) return code;
+    }
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_forces_by_place(state);
+        if (code) return code;
+    }
     code = mstmm_pass_tangent_condense(state);
     if (code) return code;
     return 0;

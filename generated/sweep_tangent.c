@@ -30,6 +30,20 @@ int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict
     real *restrict work);
 int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
     real *restrict dq);
+int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
+    real *restrict Z_p);
+int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict Z_p, real *restrict K, real *restrict Z_x);
+int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
+    const real *restrict V, real *restrict gain, real *restrict S_p);
+int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
+    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
+    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
+int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x);
+int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+    real *restrict y);
 
 #ifndef MSTMM_SOLVE_LU
 #define MSTMM_SOLVE_LU
@@ -1910,6 +1924,2336 @@ static const mstmm_port mstmm_sweep_tangent_lagged_outputs[] = {
     {"dq", 1, "", 0, 1},
 };
 
+/* rows of a hinge by the change of place
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][n] motion subspace of the unknowns
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * out Z_p[9][n] rows by the place, a row an entry
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_rows_sized(int n, const real *restrict H, const real *restrict S_p,
+    real *restrict Z_p)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = S_p[0] * H[k];
+        const real t1 = S_p[1] * H[n + k];
+        const real t2 = t0 + t1;
+        const real t3 = S_p[2] * H[2 * n + k];
+        const real t4 = t2 + t3;
+        const real t5 = S_p[3] * H[3 * n + k];
+        const real t6 = t4 + t5;
+        const real t7 = S_p[4] * H[4 * n + k];
+        const real t8 = t6 + t7;
+        const real t9 = S_p[5] * H[5 * n + k];
+        const real t10 = t8 + t9;
+        Z_p[k] = t10;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t11 = S_p[6] * H[k];
+        const real t12 = S_p[7] * H[n + k];
+        const real t13 = t11 + t12;
+        const real t14 = S_p[8] * H[2 * n + k];
+        const real t15 = t13 + t14;
+        const real t16 = S_p[9] * H[3 * n + k];
+        const real t17 = t15 + t16;
+        const real t18 = S_p[10] * H[4 * n + k];
+        const real t19 = t17 + t18;
+        const real t20 = S_p[11] * H[5 * n + k];
+        const real t21 = t19 + t20;
+        Z_p[n + k] = t21;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t22 = S_p[12] * H[k];
+        const real t23 = S_p[13] * H[n + k];
+        const real t24 = t22 + t23;
+        const real t25 = S_p[14] * H[2 * n + k];
+        const real t26 = t24 + t25;
+        const real t27 = S_p[15] * H[3 * n + k];
+        const real t28 = t26 + t27;
+        const real t29 = S_p[16] * H[4 * n + k];
+        const real t30 = t28 + t29;
+        const real t31 = S_p[17] * H[5 * n + k];
+        const real t32 = t30 + t31;
+        Z_p[2 * n + k] = t32;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t33 = S_p[18] * H[k];
+        const real t34 = S_p[19] * H[n + k];
+        const real t35 = t33 + t34;
+        const real t36 = S_p[20] * H[2 * n + k];
+        const real t37 = t35 + t36;
+        const real t38 = S_p[21] * H[3 * n + k];
+        const real t39 = t37 + t38;
+        const real t40 = S_p[22] * H[4 * n + k];
+        const real t41 = t39 + t40;
+        const real t42 = S_p[23] * H[5 * n + k];
+        const real t43 = t41 + t42;
+        Z_p[3 * n + k] = t43;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t44 = S_p[24] * H[k];
+        const real t45 = S_p[25] * H[n + k];
+        const real t46 = t44 + t45;
+        const real t47 = S_p[26] * H[2 * n + k];
+        const real t48 = t46 + t47;
+        const real t49 = S_p[27] * H[3 * n + k];
+        const real t50 = t48 + t49;
+        const real t51 = S_p[28] * H[4 * n + k];
+        const real t52 = t50 + t51;
+        const real t53 = S_p[29] * H[5 * n + k];
+        const real t54 = t52 + t53;
+        Z_p[4 * n + k] = t54;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t55 = S_p[30] * H[k];
+        const real t56 = S_p[31] * H[n + k];
+        const real t57 = t55 + t56;
+        const real t58 = S_p[32] * H[2 * n + k];
+        const real t59 = t57 + t58;
+        const real t60 = S_p[33] * H[3 * n + k];
+        const real t61 = t59 + t60;
+        const real t62 = S_p[34] * H[4 * n + k];
+        const real t63 = t61 + t62;
+        const real t64 = S_p[35] * H[5 * n + k];
+        const real t65 = t63 + t64;
+        Z_p[5 * n + k] = t65;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t66 = S_p[36] * H[k];
+        const real t67 = S_p[37] * H[n + k];
+        const real t68 = t66 + t67;
+        const real t69 = S_p[38] * H[2 * n + k];
+        const real t70 = t68 + t69;
+        const real t71 = S_p[39] * H[3 * n + k];
+        const real t72 = t70 + t71;
+        const real t73 = S_p[40] * H[4 * n + k];
+        const real t74 = t72 + t73;
+        const real t75 = S_p[41] * H[5 * n + k];
+        const real t76 = t74 + t75;
+        Z_p[6 * n + k] = t76;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t77 = S_p[42] * H[k];
+        const real t78 = S_p[43] * H[n + k];
+        const real t79 = t77 + t78;
+        const real t80 = S_p[44] * H[2 * n + k];
+        const real t81 = t79 + t80;
+        const real t82 = S_p[45] * H[3 * n + k];
+        const real t83 = t81 + t82;
+        const real t84 = S_p[46] * H[4 * n + k];
+        const real t85 = t83 + t84;
+        const real t86 = S_p[47] * H[5 * n + k];
+        const real t87 = t85 + t86;
+        Z_p[7 * n + k] = t87;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t88 = S_p[48] * H[k];
+        const real t89 = S_p[49] * H[n + k];
+        const real t90 = t88 + t89;
+        const real t91 = S_p[50] * H[2 * n + k];
+        const real t92 = t90 + t91;
+        const real t93 = S_p[51] * H[3 * n + k];
+        const real t94 = t92 + t93;
+        const real t95 = S_p[52] * H[4 * n + k];
+        const real t96 = t94 + t95;
+        const real t97 = S_p[53] * H[5 * n + k];
+        const real t98 = t96 + t97;
+        Z_p[8 * n + k] = t98;
+    }
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
+    real *restrict Z_p)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_rows_sized(1, H, S_p, Z_p);
+    case 2: return mstmm_sweep_tangent_placed_rows_sized(2, H, S_p, Z_p);
+    case 3: return mstmm_sweep_tangent_placed_rows_sized(3, H, S_p, Z_p);
+    case 4: return mstmm_sweep_tangent_placed_rows_sized(4, H, S_p, Z_p);
+    default: return mstmm_sweep_tangent_placed_rows_sized(n, H, S_p, Z_p);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_rows_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_rows(n, in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_rows_inputs[] = {
+    {"H", 6, "", 0, 1},
+    {"S_p", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_rows_outputs[] = {
+    {"Z_p", 9, "", 0, 1},
+};
+
+/* load and rows along the unknowns by the change of place
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  B_p[n][9] change of place along the unknowns
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * in  Z_p[9][n] own rows by the place, a row an entry
+ * out K[n][6], added to what is there
+ * out Z_x[n][n], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_own_sized(int n, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict Z_p, real *restrict K, real *restrict Z_x)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = S_p[0] * B_p[9 * k];
+        const real t1 = S_p[6] * B_p[9 * k + 1];
+        const real t2 = t0 + t1;
+        const real t3 = S_p[12] * B_p[9 * k + 2];
+        const real t4 = t2 + t3;
+        const real t5 = S_p[18] * B_p[9 * k + 3];
+        const real t6 = t4 + t5;
+        const real t7 = S_p[24] * B_p[9 * k + 4];
+        const real t8 = t6 + t7;
+        const real t9 = S_p[30] * B_p[9 * k + 5];
+        const real t10 = t8 + t9;
+        const real t11 = S_p[36] * B_p[9 * k + 6];
+        const real t12 = t10 + t11;
+        const real t13 = S_p[42] * B_p[9 * k + 7];
+        const real t14 = t12 + t13;
+        const real t15 = S_p[48] * B_p[9 * k + 8];
+        const real t16 = t14 + t15;
+        K[6 * k] += t16;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t17 = S_p[1] * B_p[9 * k];
+        const real t18 = S_p[7] * B_p[9 * k + 1];
+        const real t19 = t17 + t18;
+        const real t20 = S_p[13] * B_p[9 * k + 2];
+        const real t21 = t19 + t20;
+        const real t22 = S_p[19] * B_p[9 * k + 3];
+        const real t23 = t21 + t22;
+        const real t24 = S_p[25] * B_p[9 * k + 4];
+        const real t25 = t23 + t24;
+        const real t26 = S_p[31] * B_p[9 * k + 5];
+        const real t27 = t25 + t26;
+        const real t28 = S_p[37] * B_p[9 * k + 6];
+        const real t29 = t27 + t28;
+        const real t30 = S_p[43] * B_p[9 * k + 7];
+        const real t31 = t29 + t30;
+        const real t32 = S_p[49] * B_p[9 * k + 8];
+        const real t33 = t31 + t32;
+        K[6 * k + 1] += t33;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t34 = S_p[2] * B_p[9 * k];
+        const real t35 = S_p[8] * B_p[9 * k + 1];
+        const real t36 = t34 + t35;
+        const real t37 = S_p[14] * B_p[9 * k + 2];
+        const real t38 = t36 + t37;
+        const real t39 = S_p[20] * B_p[9 * k + 3];
+        const real t40 = t38 + t39;
+        const real t41 = S_p[26] * B_p[9 * k + 4];
+        const real t42 = t40 + t41;
+        const real t43 = S_p[32] * B_p[9 * k + 5];
+        const real t44 = t42 + t43;
+        const real t45 = S_p[38] * B_p[9 * k + 6];
+        const real t46 = t44 + t45;
+        const real t47 = S_p[44] * B_p[9 * k + 7];
+        const real t48 = t46 + t47;
+        const real t49 = S_p[50] * B_p[9 * k + 8];
+        const real t50 = t48 + t49;
+        K[6 * k + 2] += t50;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t51 = S_p[3] * B_p[9 * k];
+        const real t52 = S_p[9] * B_p[9 * k + 1];
+        const real t53 = t51 + t52;
+        const real t54 = S_p[15] * B_p[9 * k + 2];
+        const real t55 = t53 + t54;
+        const real t56 = S_p[21] * B_p[9 * k + 3];
+        const real t57 = t55 + t56;
+        const real t58 = S_p[27] * B_p[9 * k + 4];
+        const real t59 = t57 + t58;
+        const real t60 = S_p[33] * B_p[9 * k + 5];
+        const real t61 = t59 + t60;
+        const real t62 = S_p[39] * B_p[9 * k + 6];
+        const real t63 = t61 + t62;
+        const real t64 = S_p[45] * B_p[9 * k + 7];
+        const real t65 = t63 + t64;
+        const real t66 = S_p[51] * B_p[9 * k + 8];
+        const real t67 = t65 + t66;
+        K[6 * k + 3] += t67;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t68 = S_p[4] * B_p[9 * k];
+        const real t69 = S_p[10] * B_p[9 * k + 1];
+        const real t70 = t68 + t69;
+        const real t71 = S_p[16] * B_p[9 * k + 2];
+        const real t72 = t70 + t71;
+        const real t73 = S_p[22] * B_p[9 * k + 3];
+        const real t74 = t72 + t73;
+        const real t75 = S_p[28] * B_p[9 * k + 4];
+        const real t76 = t74 + t75;
+        const real t77 = S_p[34] * B_p[9 * k + 5];
+        const real t78 = t76 + t77;
+        const real t79 = S_p[40] * B_p[9 * k + 6];
+        const real t80 = t78 + t79;
+        const real t81 = S_p[46] * B_p[9 * k + 7];
+        const real t82 = t80 + t81;
+        const real t83 = S_p[52] * B_p[9 * k + 8];
+        const real t84 = t82 + t83;
+        K[6 * k + 4] += t84;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t85 = S_p[5] * B_p[9 * k];
+        const real t86 = S_p[11] * B_p[9 * k + 1];
+        const real t87 = t85 + t86;
+        const real t88 = S_p[17] * B_p[9 * k + 2];
+        const real t89 = t87 + t88;
+        const real t90 = S_p[23] * B_p[9 * k + 3];
+        const real t91 = t89 + t90;
+        const real t92 = S_p[29] * B_p[9 * k + 4];
+        const real t93 = t91 + t92;
+        const real t94 = S_p[35] * B_p[9 * k + 5];
+        const real t95 = t93 + t94;
+        const real t96 = S_p[41] * B_p[9 * k + 6];
+        const real t97 = t95 + t96;
+        const real t98 = S_p[47] * B_p[9 * k + 7];
+        const real t99 = t97 + t98;
+        const real t100 = S_p[53] * B_p[9 * k + 8];
+        const real t101 = t99 + t100;
+        K[6 * k + 5] += t101;
+    }
+    for (int k = 0; k < n; ++k) {
+        for (int l = 0; l < n; ++l) {
+            const real t102 = B_p[9 * k] * Z_p[l];
+            const real t103 = B_p[9 * k + 1] * Z_p[n + l];
+            const real t104 = t102 + t103;
+            const real t105 = B_p[9 * k + 2] * Z_p[2 * n + l];
+            const real t106 = t104 + t105;
+            const real t107 = B_p[9 * k + 3] * Z_p[3 * n + l];
+            const real t108 = t106 + t107;
+            const real t109 = B_p[9 * k + 4] * Z_p[4 * n + l];
+            const real t110 = t108 + t109;
+            const real t111 = B_p[9 * k + 5] * Z_p[5 * n + l];
+            const real t112 = t110 + t111;
+            const real t113 = B_p[9 * k + 6] * Z_p[6 * n + l];
+            const real t114 = t112 + t113;
+            const real t115 = B_p[9 * k + 7] * Z_p[7 * n + l];
+            const real t116 = t114 + t115;
+            const real t117 = B_p[9 * k + 8] * Z_p[8 * n + l];
+            const real t118 = t116 + t117;
+            Z_x[n * k + l] += t118;
+        }
+    }
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict Z_p, real *restrict K, real *restrict Z_x)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
+    case 2: return mstmm_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
+    case 3: return mstmm_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
+    case 4: return mstmm_sweep_tangent_placed_own_sized(4, B_p, S_p, Z_p, K, Z_x);
+    default: return mstmm_sweep_tangent_placed_own_sized(n, B_p, S_p, Z_p, K, Z_x);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_own_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_own(n, in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_own_inputs[] = {
+    {"B_p", 9, "", 0, 1},
+    {"S_p", 54, "", 0, 0},
+    {"Z_p", 9, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_own_outputs[] = {
+    {"K", 6, "", 1, 1},
+    {"Z_x", 1, "", 1, 2},
+};
+
+/* unknowns of a hinge eliminated from loads by place
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  inverse[n][n] D^-1
+ * in  Z_p[9][n] own rows by the place, a row an entry
+ * in  V[n][6] K + G, a row a direction
+ * out gain[n][9] D^-1 times the rows by the place
+ * out S_p[9][6] change of the load by the place, a row an entry, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_reduce_sized(int n, const real *restrict inverse,
+    const real *restrict Z_p, const real *restrict V, real *restrict gain, real *restrict S_p)
+{
+    for (int k = 0; k < n; ++k) {
+        real t1 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t0 = inverse[n * k + l] * Z_p[l];
+            t1 += t0;
+        }
+        gain[9 * k] = t1;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t3 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t2 = inverse[n * k + l] * Z_p[n + l];
+            t3 += t2;
+        }
+        gain[9 * k + 1] = t3;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t5 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t4 = inverse[n * k + l] * Z_p[2 * n + l];
+            t5 += t4;
+        }
+        gain[9 * k + 2] = t5;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t7 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t6 = inverse[n * k + l] * Z_p[3 * n + l];
+            t7 += t6;
+        }
+        gain[9 * k + 3] = t7;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t9 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t8 = inverse[n * k + l] * Z_p[4 * n + l];
+            t9 += t8;
+        }
+        gain[9 * k + 4] = t9;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t11 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t10 = inverse[n * k + l] * Z_p[5 * n + l];
+            t11 += t10;
+        }
+        gain[9 * k + 5] = t11;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t13 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t12 = inverse[n * k + l] * Z_p[6 * n + l];
+            t13 += t12;
+        }
+        gain[9 * k + 6] = t13;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t15 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t14 = inverse[n * k + l] * Z_p[7 * n + l];
+            t15 += t14;
+        }
+        gain[9 * k + 7] = t15;
+    }
+    for (int k = 0; k < n; ++k) {
+        real t17 = 0;
+        for (int l = 0; l < n; ++l) {
+            const real t16 = inverse[n * k + l] * Z_p[8 * n + l];
+            t17 += t16;
+        }
+        gain[9 * k + 8] = t17;
+    }
+    real t19 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t18 = gain[9 * k] * V[6 * k];
+        t19 += t18;
+    }
+    const real t20 = -t19;
+    S_p[0] += t20;
+    real t22 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t21 = gain[9 * k] * V[6 * k + 1];
+        t22 += t21;
+    }
+    const real t23 = -t22;
+    S_p[1] += t23;
+    real t25 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t24 = gain[9 * k] * V[6 * k + 2];
+        t25 += t24;
+    }
+    const real t26 = -t25;
+    S_p[2] += t26;
+    real t28 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t27 = gain[9 * k] * V[6 * k + 3];
+        t28 += t27;
+    }
+    const real t29 = -t28;
+    S_p[3] += t29;
+    real t31 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t30 = gain[9 * k] * V[6 * k + 4];
+        t31 += t30;
+    }
+    const real t32 = -t31;
+    S_p[4] += t32;
+    real t34 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t33 = gain[9 * k] * V[6 * k + 5];
+        t34 += t33;
+    }
+    const real t35 = -t34;
+    S_p[5] += t35;
+    real t37 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t36 = V[6 * k] * gain[9 * k + 1];
+        t37 += t36;
+    }
+    const real t38 = -t37;
+    S_p[6] += t38;
+    real t40 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t39 = V[6 * k + 1] * gain[9 * k + 1];
+        t40 += t39;
+    }
+    const real t41 = -t40;
+    S_p[7] += t41;
+    real t43 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t42 = V[6 * k + 2] * gain[9 * k + 1];
+        t43 += t42;
+    }
+    const real t44 = -t43;
+    S_p[8] += t44;
+    real t46 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t45 = V[6 * k + 3] * gain[9 * k + 1];
+        t46 += t45;
+    }
+    const real t47 = -t46;
+    S_p[9] += t47;
+    real t49 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t48 = V[6 * k + 4] * gain[9 * k + 1];
+        t49 += t48;
+    }
+    const real t50 = -t49;
+    S_p[10] += t50;
+    real t52 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t51 = V[6 * k + 5] * gain[9 * k + 1];
+        t52 += t51;
+    }
+    const real t53 = -t52;
+    S_p[11] += t53;
+    real t55 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t54 = V[6 * k] * gain[9 * k + 2];
+        t55 += t54;
+    }
+    const real t56 = -t55;
+    S_p[12] += t56;
+    real t58 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t57 = V[6 * k + 1] * gain[9 * k + 2];
+        t58 += t57;
+    }
+    const real t59 = -t58;
+    S_p[13] += t59;
+    real t61 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t60 = V[6 * k + 2] * gain[9 * k + 2];
+        t61 += t60;
+    }
+    const real t62 = -t61;
+    S_p[14] += t62;
+    real t64 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t63 = V[6 * k + 3] * gain[9 * k + 2];
+        t64 += t63;
+    }
+    const real t65 = -t64;
+    S_p[15] += t65;
+    real t67 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t66 = V[6 * k + 4] * gain[9 * k + 2];
+        t67 += t66;
+    }
+    const real t68 = -t67;
+    S_p[16] += t68;
+    real t70 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t69 = V[6 * k + 5] * gain[9 * k + 2];
+        t70 += t69;
+    }
+    const real t71 = -t70;
+    S_p[17] += t71;
+    real t73 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t72 = V[6 * k] * gain[9 * k + 3];
+        t73 += t72;
+    }
+    const real t74 = -t73;
+    S_p[18] += t74;
+    real t76 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t75 = V[6 * k + 1] * gain[9 * k + 3];
+        t76 += t75;
+    }
+    const real t77 = -t76;
+    S_p[19] += t77;
+    real t79 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t78 = V[6 * k + 2] * gain[9 * k + 3];
+        t79 += t78;
+    }
+    const real t80 = -t79;
+    S_p[20] += t80;
+    real t82 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t81 = V[6 * k + 3] * gain[9 * k + 3];
+        t82 += t81;
+    }
+    const real t83 = -t82;
+    S_p[21] += t83;
+    real t85 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t84 = V[6 * k + 4] * gain[9 * k + 3];
+        t85 += t84;
+    }
+    const real t86 = -t85;
+    S_p[22] += t86;
+    real t88 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t87 = V[6 * k + 5] * gain[9 * k + 3];
+        t88 += t87;
+    }
+    const real t89 = -t88;
+    S_p[23] += t89;
+    real t91 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t90 = V[6 * k] * gain[9 * k + 4];
+        t91 += t90;
+    }
+    const real t92 = -t91;
+    S_p[24] += t92;
+    real t94 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t93 = V[6 * k + 1] * gain[9 * k + 4];
+        t94 += t93;
+    }
+    const real t95 = -t94;
+    S_p[25] += t95;
+    real t97 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t96 = V[6 * k + 2] * gain[9 * k + 4];
+        t97 += t96;
+    }
+    const real t98 = -t97;
+    S_p[26] += t98;
+    real t100 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t99 = V[6 * k + 3] * gain[9 * k + 4];
+        t100 += t99;
+    }
+    const real t101 = -t100;
+    S_p[27] += t101;
+    real t103 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t102 = V[6 * k + 4] * gain[9 * k + 4];
+        t103 += t102;
+    }
+    const real t104 = -t103;
+    S_p[28] += t104;
+    real t106 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t105 = V[6 * k + 5] * gain[9 * k + 4];
+        t106 += t105;
+    }
+    const real t107 = -t106;
+    S_p[29] += t107;
+    real t109 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t108 = V[6 * k] * gain[9 * k + 5];
+        t109 += t108;
+    }
+    const real t110 = -t109;
+    S_p[30] += t110;
+    real t112 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t111 = V[6 * k + 1] * gain[9 * k + 5];
+        t112 += t111;
+    }
+    const real t113 = -t112;
+    S_p[31] += t113;
+    real t115 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t114 = V[6 * k + 2] * gain[9 * k + 5];
+        t115 += t114;
+    }
+    const real t116 = -t115;
+    S_p[32] += t116;
+    real t118 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t117 = V[6 * k + 3] * gain[9 * k + 5];
+        t118 += t117;
+    }
+    const real t119 = -t118;
+    S_p[33] += t119;
+    real t121 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t120 = V[6 * k + 4] * gain[9 * k + 5];
+        t121 += t120;
+    }
+    const real t122 = -t121;
+    S_p[34] += t122;
+    real t124 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t123 = V[6 * k + 5] * gain[9 * k + 5];
+        t124 += t123;
+    }
+    const real t125 = -t124;
+    S_p[35] += t125;
+    real t127 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t126 = V[6 * k] * gain[9 * k + 6];
+        t127 += t126;
+    }
+    const real t128 = -t127;
+    S_p[36] += t128;
+    real t130 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t129 = V[6 * k + 1] * gain[9 * k + 6];
+        t130 += t129;
+    }
+    const real t131 = -t130;
+    S_p[37] += t131;
+    real t133 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t132 = V[6 * k + 2] * gain[9 * k + 6];
+        t133 += t132;
+    }
+    const real t134 = -t133;
+    S_p[38] += t134;
+    real t136 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t135 = V[6 * k + 3] * gain[9 * k + 6];
+        t136 += t135;
+    }
+    const real t137 = -t136;
+    S_p[39] += t137;
+    real t139 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t138 = V[6 * k + 4] * gain[9 * k + 6];
+        t139 += t138;
+    }
+    const real t140 = -t139;
+    S_p[40] += t140;
+    real t142 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t141 = V[6 * k + 5] * gain[9 * k + 6];
+        t142 += t141;
+    }
+    const real t143 = -t142;
+    S_p[41] += t143;
+    real t145 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t144 = V[6 * k] * gain[9 * k + 7];
+        t145 += t144;
+    }
+    const real t146 = -t145;
+    S_p[42] += t146;
+    real t148 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t147 = V[6 * k + 1] * gain[9 * k + 7];
+        t148 += t147;
+    }
+    const real t149 = -t148;
+    S_p[43] += t149;
+    real t151 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t150 = V[6 * k + 2] * gain[9 * k + 7];
+        t151 += t150;
+    }
+    const real t152 = -t151;
+    S_p[44] += t152;
+    real t154 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t153 = V[6 * k + 3] * gain[9 * k + 7];
+        t154 += t153;
+    }
+    const real t155 = -t154;
+    S_p[45] += t155;
+    real t157 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t156 = V[6 * k + 4] * gain[9 * k + 7];
+        t157 += t156;
+    }
+    const real t158 = -t157;
+    S_p[46] += t158;
+    real t160 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t159 = V[6 * k + 5] * gain[9 * k + 7];
+        t160 += t159;
+    }
+    const real t161 = -t160;
+    S_p[47] += t161;
+    real t163 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t162 = V[6 * k] * gain[9 * k + 8];
+        t163 += t162;
+    }
+    const real t164 = -t163;
+    S_p[48] += t164;
+    real t166 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t165 = V[6 * k + 1] * gain[9 * k + 8];
+        t166 += t165;
+    }
+    const real t167 = -t166;
+    S_p[49] += t167;
+    real t169 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t168 = V[6 * k + 2] * gain[9 * k + 8];
+        t169 += t168;
+    }
+    const real t170 = -t169;
+    S_p[50] += t170;
+    real t172 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t171 = V[6 * k + 3] * gain[9 * k + 8];
+        t172 += t171;
+    }
+    const real t173 = -t172;
+    S_p[51] += t173;
+    real t175 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t174 = V[6 * k + 4] * gain[9 * k + 8];
+        t175 += t174;
+    }
+    const real t176 = -t175;
+    S_p[52] += t176;
+    real t178 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t177 = V[6 * k + 5] * gain[9 * k + 8];
+        t178 += t177;
+    }
+    const real t179 = -t178;
+    S_p[53] += t179;
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
+    const real *restrict V, real *restrict gain, real *restrict S_p)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_reduce_sized(1, inverse, Z_p, V, gain, S_p);
+    case 2: return mstmm_sweep_tangent_placed_reduce_sized(2, inverse, Z_p, V, gain, S_p);
+    case 3: return mstmm_sweep_tangent_placed_reduce_sized(3, inverse, Z_p, V, gain, S_p);
+    case 4: return mstmm_sweep_tangent_placed_reduce_sized(4, inverse, Z_p, V, gain, S_p);
+    default: return mstmm_sweep_tangent_placed_reduce_sized(n, inverse, Z_p, V, gain, S_p);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_reduce_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_reduce(n, in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_reduce_inputs[] = {
+    {"inverse", 1, "", 0, 2},
+    {"Z_p", 9, "", 0, 1},
+    {"V", 6, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_reduce_outputs[] = {
+    {"gain", 9, "", 0, 1},
+    {"S_p", 54, "", 1, 0},
+};
+
+/* unknowns of a flexible body eliminated from loads by place
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][n] motion subspace of the unknowns
+ * in  V[6][n] K + G
+ * in  D[n][n] rows by unknowns
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * in  Z_p[9][n] own rows by the place, a row an entry
+ * out right[n][9] rows by the place
+ * out gain[n][9] D^-1 times the rows by the place
+ * out S_c[9][6] S_p without the unknowns, a row an entry
+ * out work[n][n] factor L, D of solve
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_node_sized(int n, const real *restrict H, const real *restrict V,
+    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
+    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = S_p[0] * H[k];
+        const real t1 = S_p[1] * H[n + k];
+        const real t2 = t0 + t1;
+        const real t3 = S_p[2] * H[2 * n + k];
+        const real t4 = t2 + t3;
+        const real t5 = S_p[3] * H[3 * n + k];
+        const real t6 = t4 + t5;
+        const real t7 = S_p[4] * H[4 * n + k];
+        const real t8 = t6 + t7;
+        const real t9 = S_p[5] * H[5 * n + k];
+        const real t10 = t8 + t9;
+        const real t11 = t10 + Z_p[k];
+        right[9 * k] = t11;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t12 = S_p[6] * H[k];
+        const real t13 = S_p[7] * H[n + k];
+        const real t14 = t12 + t13;
+        const real t15 = S_p[8] * H[2 * n + k];
+        const real t16 = t14 + t15;
+        const real t17 = S_p[9] * H[3 * n + k];
+        const real t18 = t16 + t17;
+        const real t19 = S_p[10] * H[4 * n + k];
+        const real t20 = t18 + t19;
+        const real t21 = S_p[11] * H[5 * n + k];
+        const real t22 = t20 + t21;
+        const real t23 = t22 + Z_p[n + k];
+        right[9 * k + 1] = t23;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t24 = S_p[12] * H[k];
+        const real t25 = S_p[13] * H[n + k];
+        const real t26 = t24 + t25;
+        const real t27 = S_p[14] * H[2 * n + k];
+        const real t28 = t26 + t27;
+        const real t29 = S_p[15] * H[3 * n + k];
+        const real t30 = t28 + t29;
+        const real t31 = S_p[16] * H[4 * n + k];
+        const real t32 = t30 + t31;
+        const real t33 = S_p[17] * H[5 * n + k];
+        const real t34 = t32 + t33;
+        const real t35 = t34 + Z_p[2 * n + k];
+        right[9 * k + 2] = t35;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t36 = S_p[18] * H[k];
+        const real t37 = S_p[19] * H[n + k];
+        const real t38 = t36 + t37;
+        const real t39 = S_p[20] * H[2 * n + k];
+        const real t40 = t38 + t39;
+        const real t41 = S_p[21] * H[3 * n + k];
+        const real t42 = t40 + t41;
+        const real t43 = S_p[22] * H[4 * n + k];
+        const real t44 = t42 + t43;
+        const real t45 = S_p[23] * H[5 * n + k];
+        const real t46 = t44 + t45;
+        const real t47 = t46 + Z_p[3 * n + k];
+        right[9 * k + 3] = t47;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t48 = S_p[24] * H[k];
+        const real t49 = S_p[25] * H[n + k];
+        const real t50 = t48 + t49;
+        const real t51 = S_p[26] * H[2 * n + k];
+        const real t52 = t50 + t51;
+        const real t53 = S_p[27] * H[3 * n + k];
+        const real t54 = t52 + t53;
+        const real t55 = S_p[28] * H[4 * n + k];
+        const real t56 = t54 + t55;
+        const real t57 = S_p[29] * H[5 * n + k];
+        const real t58 = t56 + t57;
+        const real t59 = t58 + Z_p[4 * n + k];
+        right[9 * k + 4] = t59;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t60 = S_p[30] * H[k];
+        const real t61 = S_p[31] * H[n + k];
+        const real t62 = t60 + t61;
+        const real t63 = S_p[32] * H[2 * n + k];
+        const real t64 = t62 + t63;
+        const real t65 = S_p[33] * H[3 * n + k];
+        const real t66 = t64 + t65;
+        const real t67 = S_p[34] * H[4 * n + k];
+        const real t68 = t66 + t67;
+        const real t69 = S_p[35] * H[5 * n + k];
+        const real t70 = t68 + t69;
+        const real t71 = t70 + Z_p[5 * n + k];
+        right[9 * k + 5] = t71;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t72 = S_p[36] * H[k];
+        const real t73 = S_p[37] * H[n + k];
+        const real t74 = t72 + t73;
+        const real t75 = S_p[38] * H[2 * n + k];
+        const real t76 = t74 + t75;
+        const real t77 = S_p[39] * H[3 * n + k];
+        const real t78 = t76 + t77;
+        const real t79 = S_p[40] * H[4 * n + k];
+        const real t80 = t78 + t79;
+        const real t81 = S_p[41] * H[5 * n + k];
+        const real t82 = t80 + t81;
+        const real t83 = t82 + Z_p[6 * n + k];
+        right[9 * k + 6] = t83;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t84 = S_p[42] * H[k];
+        const real t85 = S_p[43] * H[n + k];
+        const real t86 = t84 + t85;
+        const real t87 = S_p[44] * H[2 * n + k];
+        const real t88 = t86 + t87;
+        const real t89 = S_p[45] * H[3 * n + k];
+        const real t90 = t88 + t89;
+        const real t91 = S_p[46] * H[4 * n + k];
+        const real t92 = t90 + t91;
+        const real t93 = S_p[47] * H[5 * n + k];
+        const real t94 = t92 + t93;
+        const real t95 = t94 + Z_p[7 * n + k];
+        right[9 * k + 7] = t95;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t96 = S_p[48] * H[k];
+        const real t97 = S_p[49] * H[n + k];
+        const real t98 = t96 + t97;
+        const real t99 = S_p[50] * H[2 * n + k];
+        const real t100 = t98 + t99;
+        const real t101 = S_p[51] * H[3 * n + k];
+        const real t102 = t100 + t101;
+        const real t103 = S_p[52] * H[4 * n + k];
+        const real t104 = t102 + t103;
+        const real t105 = S_p[53] * H[5 * n + k];
+        const real t106 = t104 + t105;
+        const real t107 = t106 + Z_p[8 * n + k];
+        right[9 * k + 8] = t107;
+    }
+    /* a pivot of D vanishes: a motion is undetermined */
+    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
+    if (found_gain == 1) return 1;
+    real t109 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t108 = gain[9 * k] * V[k];
+        t109 += t108;
+    }
+    const real t110 = S_p[0] - t109;
+    S_c[0] = t110;
+    real t112 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t111 = gain[9 * k] * V[n + k];
+        t112 += t111;
+    }
+    const real t113 = S_p[1] - t112;
+    S_c[1] = t113;
+    real t115 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t114 = gain[9 * k] * V[2 * n + k];
+        t115 += t114;
+    }
+    const real t116 = S_p[2] - t115;
+    S_c[2] = t116;
+    real t118 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t117 = gain[9 * k] * V[3 * n + k];
+        t118 += t117;
+    }
+    const real t119 = S_p[3] - t118;
+    S_c[3] = t119;
+    real t121 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t120 = gain[9 * k] * V[4 * n + k];
+        t121 += t120;
+    }
+    const real t122 = S_p[4] - t121;
+    S_c[4] = t122;
+    real t124 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t123 = gain[9 * k] * V[5 * n + k];
+        t124 += t123;
+    }
+    const real t125 = S_p[5] - t124;
+    S_c[5] = t125;
+    real t127 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t126 = V[k] * gain[9 * k + 1];
+        t127 += t126;
+    }
+    const real t128 = S_p[6] - t127;
+    S_c[6] = t128;
+    real t130 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t129 = V[n + k] * gain[9 * k + 1];
+        t130 += t129;
+    }
+    const real t131 = S_p[7] - t130;
+    S_c[7] = t131;
+    real t133 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t132 = V[2 * n + k] * gain[9 * k + 1];
+        t133 += t132;
+    }
+    const real t134 = S_p[8] - t133;
+    S_c[8] = t134;
+    real t136 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t135 = V[3 * n + k] * gain[9 * k + 1];
+        t136 += t135;
+    }
+    const real t137 = S_p[9] - t136;
+    S_c[9] = t137;
+    real t139 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t138 = V[4 * n + k] * gain[9 * k + 1];
+        t139 += t138;
+    }
+    const real t140 = S_p[10] - t139;
+    S_c[10] = t140;
+    real t142 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t141 = V[5 * n + k] * gain[9 * k + 1];
+        t142 += t141;
+    }
+    const real t143 = S_p[11] - t142;
+    S_c[11] = t143;
+    real t145 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t144 = V[k] * gain[9 * k + 2];
+        t145 += t144;
+    }
+    const real t146 = S_p[12] - t145;
+    S_c[12] = t146;
+    real t148 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t147 = V[n + k] * gain[9 * k + 2];
+        t148 += t147;
+    }
+    const real t149 = S_p[13] - t148;
+    S_c[13] = t149;
+    real t151 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t150 = V[2 * n + k] * gain[9 * k + 2];
+        t151 += t150;
+    }
+    const real t152 = S_p[14] - t151;
+    S_c[14] = t152;
+    real t154 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t153 = V[3 * n + k] * gain[9 * k + 2];
+        t154 += t153;
+    }
+    const real t155 = S_p[15] - t154;
+    S_c[15] = t155;
+    real t157 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t156 = V[4 * n + k] * gain[9 * k + 2];
+        t157 += t156;
+    }
+    const real t158 = S_p[16] - t157;
+    S_c[16] = t158;
+    real t160 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t159 = V[5 * n + k] * gain[9 * k + 2];
+        t160 += t159;
+    }
+    const real t161 = S_p[17] - t160;
+    S_c[17] = t161;
+    real t163 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t162 = V[k] * gain[9 * k + 3];
+        t163 += t162;
+    }
+    const real t164 = S_p[18] - t163;
+    S_c[18] = t164;
+    real t166 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t165 = V[n + k] * gain[9 * k + 3];
+        t166 += t165;
+    }
+    const real t167 = S_p[19] - t166;
+    S_c[19] = t167;
+    real t169 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t168 = V[2 * n + k] * gain[9 * k + 3];
+        t169 += t168;
+    }
+    const real t170 = S_p[20] - t169;
+    S_c[20] = t170;
+    real t172 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t171 = V[3 * n + k] * gain[9 * k + 3];
+        t172 += t171;
+    }
+    const real t173 = S_p[21] - t172;
+    S_c[21] = t173;
+    real t175 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t174 = V[4 * n + k] * gain[9 * k + 3];
+        t175 += t174;
+    }
+    const real t176 = S_p[22] - t175;
+    S_c[22] = t176;
+    real t178 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t177 = V[5 * n + k] * gain[9 * k + 3];
+        t178 += t177;
+    }
+    const real t179 = S_p[23] - t178;
+    S_c[23] = t179;
+    real t181 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t180 = V[k] * gain[9 * k + 4];
+        t181 += t180;
+    }
+    const real t182 = S_p[24] - t181;
+    S_c[24] = t182;
+    real t184 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t183 = V[n + k] * gain[9 * k + 4];
+        t184 += t183;
+    }
+    const real t185 = S_p[25] - t184;
+    S_c[25] = t185;
+    real t187 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t186 = V[2 * n + k] * gain[9 * k + 4];
+        t187 += t186;
+    }
+    const real t188 = S_p[26] - t187;
+    S_c[26] = t188;
+    real t190 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t189 = V[3 * n + k] * gain[9 * k + 4];
+        t190 += t189;
+    }
+    const real t191 = S_p[27] - t190;
+    S_c[27] = t191;
+    real t193 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t192 = V[4 * n + k] * gain[9 * k + 4];
+        t193 += t192;
+    }
+    const real t194 = S_p[28] - t193;
+    S_c[28] = t194;
+    real t196 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t195 = V[5 * n + k] * gain[9 * k + 4];
+        t196 += t195;
+    }
+    const real t197 = S_p[29] - t196;
+    S_c[29] = t197;
+    real t199 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t198 = V[k] * gain[9 * k + 5];
+        t199 += t198;
+    }
+    const real t200 = S_p[30] - t199;
+    S_c[30] = t200;
+    real t202 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t201 = V[n + k] * gain[9 * k + 5];
+        t202 += t201;
+    }
+    const real t203 = S_p[31] - t202;
+    S_c[31] = t203;
+    real t205 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t204 = V[2 * n + k] * gain[9 * k + 5];
+        t205 += t204;
+    }
+    const real t206 = S_p[32] - t205;
+    S_c[32] = t206;
+    real t208 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t207 = V[3 * n + k] * gain[9 * k + 5];
+        t208 += t207;
+    }
+    const real t209 = S_p[33] - t208;
+    S_c[33] = t209;
+    real t211 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t210 = V[4 * n + k] * gain[9 * k + 5];
+        t211 += t210;
+    }
+    const real t212 = S_p[34] - t211;
+    S_c[34] = t212;
+    real t214 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t213 = V[5 * n + k] * gain[9 * k + 5];
+        t214 += t213;
+    }
+    const real t215 = S_p[35] - t214;
+    S_c[35] = t215;
+    real t217 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t216 = V[k] * gain[9 * k + 6];
+        t217 += t216;
+    }
+    const real t218 = S_p[36] - t217;
+    S_c[36] = t218;
+    real t220 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t219 = V[n + k] * gain[9 * k + 6];
+        t220 += t219;
+    }
+    const real t221 = S_p[37] - t220;
+    S_c[37] = t221;
+    real t223 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t222 = V[2 * n + k] * gain[9 * k + 6];
+        t223 += t222;
+    }
+    const real t224 = S_p[38] - t223;
+    S_c[38] = t224;
+    real t226 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t225 = V[3 * n + k] * gain[9 * k + 6];
+        t226 += t225;
+    }
+    const real t227 = S_p[39] - t226;
+    S_c[39] = t227;
+    real t229 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t228 = V[4 * n + k] * gain[9 * k + 6];
+        t229 += t228;
+    }
+    const real t230 = S_p[40] - t229;
+    S_c[40] = t230;
+    real t232 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t231 = V[5 * n + k] * gain[9 * k + 6];
+        t232 += t231;
+    }
+    const real t233 = S_p[41] - t232;
+    S_c[41] = t233;
+    real t235 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t234 = V[k] * gain[9 * k + 7];
+        t235 += t234;
+    }
+    const real t236 = S_p[42] - t235;
+    S_c[42] = t236;
+    real t238 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t237 = V[n + k] * gain[9 * k + 7];
+        t238 += t237;
+    }
+    const real t239 = S_p[43] - t238;
+    S_c[43] = t239;
+    real t241 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t240 = V[2 * n + k] * gain[9 * k + 7];
+        t241 += t240;
+    }
+    const real t242 = S_p[44] - t241;
+    S_c[44] = t242;
+    real t244 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t243 = V[3 * n + k] * gain[9 * k + 7];
+        t244 += t243;
+    }
+    const real t245 = S_p[45] - t244;
+    S_c[45] = t245;
+    real t247 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t246 = V[4 * n + k] * gain[9 * k + 7];
+        t247 += t246;
+    }
+    const real t248 = S_p[46] - t247;
+    S_c[46] = t248;
+    real t250 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t249 = V[5 * n + k] * gain[9 * k + 7];
+        t250 += t249;
+    }
+    const real t251 = S_p[47] - t250;
+    S_c[47] = t251;
+    real t253 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t252 = V[k] * gain[9 * k + 8];
+        t253 += t252;
+    }
+    const real t254 = S_p[48] - t253;
+    S_c[48] = t254;
+    real t256 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t255 = V[n + k] * gain[9 * k + 8];
+        t256 += t255;
+    }
+    const real t257 = S_p[49] - t256;
+    S_c[49] = t257;
+    real t259 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t258 = V[2 * n + k] * gain[9 * k + 8];
+        t259 += t258;
+    }
+    const real t260 = S_p[50] - t259;
+    S_c[50] = t260;
+    real t262 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t261 = V[3 * n + k] * gain[9 * k + 8];
+        t262 += t261;
+    }
+    const real t263 = S_p[51] - t262;
+    S_c[51] = t263;
+    real t265 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t264 = V[4 * n + k] * gain[9 * k + 8];
+        t265 += t264;
+    }
+    const real t266 = S_p[52] - t265;
+    S_c[52] = t266;
+    real t268 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t267 = V[5 * n + k] * gain[9 * k + 8];
+        t268 += t267;
+    }
+    const real t269 = S_p[53] - t268;
+    S_c[53] = t269;
+    if (found_gain) return 2; /* a negative determinant */
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
+    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
+    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 2: return mstmm_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 3: return mstmm_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 4: return mstmm_sweep_tangent_placed_node_sized(4, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    default: return mstmm_sweep_tangent_placed_node_sized(n, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_node_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_node(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_node_inputs[] = {
+    {"H", 6, "", 0, 1},
+    {"V", 6, "", 0, 1},
+    {"D", 1, "", 0, 2},
+    {"S_p", 54, "", 0, 0},
+    {"Z_p", 9, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_node_outputs[] = {
+    {"right", 9, "", 0, 1},
+    {"gain", 9, "", 0, 1},
+    {"S_c", 54, "", 0, 0},
+    {"work", 1, "", 0, 2},
+};
+
+static const mstmm_guard mstmm_sweep_tangent_placed_node_guards[] = {
+    {1, "a pivot of D vanishes: a motion is undetermined"},
+    {2, "the determinant is negative; all results are there"},
+};
+
+/* loads by place of what hangs on a port, as the unknowns of its body see them
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  H[6][n] motion subspace of the unknowns
+ * in  B_p[n][9] change of place along the unknowns
+ * in  S_p[9][6] change of the load by the place, a row an entry
+ * in  T_p[9][6] S_p Th_p, a row an entry
+ * out K[n][6], added to what is there
+ * out Z_p[9][n], added to what is there
+ * out Z_x[n][n], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = S_p[0] * B_p[9 * k];
+        const real t1 = S_p[6] * B_p[9 * k + 1];
+        const real t2 = t0 + t1;
+        const real t3 = S_p[12] * B_p[9 * k + 2];
+        const real t4 = t2 + t3;
+        const real t5 = S_p[18] * B_p[9 * k + 3];
+        const real t6 = t4 + t5;
+        const real t7 = S_p[24] * B_p[9 * k + 4];
+        const real t8 = t6 + t7;
+        const real t9 = S_p[30] * B_p[9 * k + 5];
+        const real t10 = t8 + t9;
+        const real t11 = S_p[36] * B_p[9 * k + 6];
+        const real t12 = t10 + t11;
+        const real t13 = S_p[42] * B_p[9 * k + 7];
+        const real t14 = t12 + t13;
+        const real t15 = S_p[48] * B_p[9 * k + 8];
+        const real t16 = t14 + t15;
+        const real t17 = Rc[0] * t16;
+        const real t18 = S_p[1] * B_p[9 * k];
+        const real t19 = S_p[7] * B_p[9 * k + 1];
+        const real t20 = t18 + t19;
+        const real t21 = S_p[13] * B_p[9 * k + 2];
+        const real t22 = t20 + t21;
+        const real t23 = S_p[19] * B_p[9 * k + 3];
+        const real t24 = t22 + t23;
+        const real t25 = S_p[25] * B_p[9 * k + 4];
+        const real t26 = t24 + t25;
+        const real t27 = S_p[31] * B_p[9 * k + 5];
+        const real t28 = t26 + t27;
+        const real t29 = S_p[37] * B_p[9 * k + 6];
+        const real t30 = t28 + t29;
+        const real t31 = S_p[43] * B_p[9 * k + 7];
+        const real t32 = t30 + t31;
+        const real t33 = S_p[49] * B_p[9 * k + 8];
+        const real t34 = t32 + t33;
+        const real t35 = Rc[1] * t34;
+        const real t36 = t17 + t35;
+        const real t37 = S_p[2] * B_p[9 * k];
+        const real t38 = S_p[8] * B_p[9 * k + 1];
+        const real t39 = t37 + t38;
+        const real t40 = S_p[14] * B_p[9 * k + 2];
+        const real t41 = t39 + t40;
+        const real t42 = S_p[20] * B_p[9 * k + 3];
+        const real t43 = t41 + t42;
+        const real t44 = S_p[26] * B_p[9 * k + 4];
+        const real t45 = t43 + t44;
+        const real t46 = S_p[32] * B_p[9 * k + 5];
+        const real t47 = t45 + t46;
+        const real t48 = S_p[38] * B_p[9 * k + 6];
+        const real t49 = t47 + t48;
+        const real t50 = S_p[44] * B_p[9 * k + 7];
+        const real t51 = t49 + t50;
+        const real t52 = S_p[50] * B_p[9 * k + 8];
+        const real t53 = t51 + t52;
+        const real t54 = Rc[2] * t53;
+        const real t55 = t36 + t54;
+        K[6 * k] += t55;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t56 = S_p[0] * B_p[9 * k];
+        const real t57 = S_p[6] * B_p[9 * k + 1];
+        const real t58 = t56 + t57;
+        const real t59 = S_p[12] * B_p[9 * k + 2];
+        const real t60 = t58 + t59;
+        const real t61 = S_p[18] * B_p[9 * k + 3];
+        const real t62 = t60 + t61;
+        const real t63 = S_p[24] * B_p[9 * k + 4];
+        const real t64 = t62 + t63;
+        const real t65 = S_p[30] * B_p[9 * k + 5];
+        const real t66 = t64 + t65;
+        const real t67 = S_p[36] * B_p[9 * k + 6];
+        const real t68 = t66 + t67;
+        const real t69 = S_p[42] * B_p[9 * k + 7];
+        const real t70 = t68 + t69;
+        const real t71 = S_p[48] * B_p[9 * k + 8];
+        const real t72 = t70 + t71;
+        const real t73 = Rc[3] * t72;
+        const real t74 = S_p[1] * B_p[9 * k];
+        const real t75 = S_p[7] * B_p[9 * k + 1];
+        const real t76 = t74 + t75;
+        const real t77 = S_p[13] * B_p[9 * k + 2];
+        const real t78 = t76 + t77;
+        const real t79 = S_p[19] * B_p[9 * k + 3];
+        const real t80 = t78 + t79;
+        const real t81 = S_p[25] * B_p[9 * k + 4];
+        const real t82 = t80 + t81;
+        const real t83 = S_p[31] * B_p[9 * k + 5];
+        const real t84 = t82 + t83;
+        const real t85 = S_p[37] * B_p[9 * k + 6];
+        const real t86 = t84 + t85;
+        const real t87 = S_p[43] * B_p[9 * k + 7];
+        const real t88 = t86 + t87;
+        const real t89 = S_p[49] * B_p[9 * k + 8];
+        const real t90 = t88 + t89;
+        const real t91 = Rc[4] * t90;
+        const real t92 = t73 + t91;
+        const real t93 = S_p[2] * B_p[9 * k];
+        const real t94 = S_p[8] * B_p[9 * k + 1];
+        const real t95 = t93 + t94;
+        const real t96 = S_p[14] * B_p[9 * k + 2];
+        const real t97 = t95 + t96;
+        const real t98 = S_p[20] * B_p[9 * k + 3];
+        const real t99 = t97 + t98;
+        const real t100 = S_p[26] * B_p[9 * k + 4];
+        const real t101 = t99 + t100;
+        const real t102 = S_p[32] * B_p[9 * k + 5];
+        const real t103 = t101 + t102;
+        const real t104 = S_p[38] * B_p[9 * k + 6];
+        const real t105 = t103 + t104;
+        const real t106 = S_p[44] * B_p[9 * k + 7];
+        const real t107 = t105 + t106;
+        const real t108 = S_p[50] * B_p[9 * k + 8];
+        const real t109 = t107 + t108;
+        const real t110 = Rc[5] * t109;
+        const real t111 = t92 + t110;
+        K[6 * k + 1] += t111;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t112 = S_p[0] * B_p[9 * k];
+        const real t113 = S_p[6] * B_p[9 * k + 1];
+        const real t114 = t112 + t113;
+        const real t115 = S_p[12] * B_p[9 * k + 2];
+        const real t116 = t114 + t115;
+        const real t117 = S_p[18] * B_p[9 * k + 3];
+        const real t118 = t116 + t117;
+        const real t119 = S_p[24] * B_p[9 * k + 4];
+        const real t120 = t118 + t119;
+        const real t121 = S_p[30] * B_p[9 * k + 5];
+        const real t122 = t120 + t121;
+        const real t123 = S_p[36] * B_p[9 * k + 6];
+        const real t124 = t122 + t123;
+        const real t125 = S_p[42] * B_p[9 * k + 7];
+        const real t126 = t124 + t125;
+        const real t127 = S_p[48] * B_p[9 * k + 8];
+        const real t128 = t126 + t127;
+        const real t129 = Rc[6] * t128;
+        const real t130 = S_p[1] * B_p[9 * k];
+        const real t131 = S_p[7] * B_p[9 * k + 1];
+        const real t132 = t130 + t131;
+        const real t133 = S_p[13] * B_p[9 * k + 2];
+        const real t134 = t132 + t133;
+        const real t135 = S_p[19] * B_p[9 * k + 3];
+        const real t136 = t134 + t135;
+        const real t137 = S_p[25] * B_p[9 * k + 4];
+        const real t138 = t136 + t137;
+        const real t139 = S_p[31] * B_p[9 * k + 5];
+        const real t140 = t138 + t139;
+        const real t141 = S_p[37] * B_p[9 * k + 6];
+        const real t142 = t140 + t141;
+        const real t143 = S_p[43] * B_p[9 * k + 7];
+        const real t144 = t142 + t143;
+        const real t145 = S_p[49] * B_p[9 * k + 8];
+        const real t146 = t144 + t145;
+        const real t147 = Rc[7] * t146;
+        const real t148 = t129 + t147;
+        const real t149 = S_p[2] * B_p[9 * k];
+        const real t150 = S_p[8] * B_p[9 * k + 1];
+        const real t151 = t149 + t150;
+        const real t152 = S_p[14] * B_p[9 * k + 2];
+        const real t153 = t151 + t152;
+        const real t154 = S_p[20] * B_p[9 * k + 3];
+        const real t155 = t153 + t154;
+        const real t156 = S_p[26] * B_p[9 * k + 4];
+        const real t157 = t155 + t156;
+        const real t158 = S_p[32] * B_p[9 * k + 5];
+        const real t159 = t157 + t158;
+        const real t160 = S_p[38] * B_p[9 * k + 6];
+        const real t161 = t159 + t160;
+        const real t162 = S_p[44] * B_p[9 * k + 7];
+        const real t163 = t161 + t162;
+        const real t164 = S_p[50] * B_p[9 * k + 8];
+        const real t165 = t163 + t164;
+        const real t166 = Rc[8] * t165;
+        const real t167 = t148 + t166;
+        K[6 * k + 2] += t167;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t168 = S_p[3] * B_p[9 * k];
+        const real t169 = S_p[9] * B_p[9 * k + 1];
+        const real t170 = t168 + t169;
+        const real t171 = S_p[15] * B_p[9 * k + 2];
+        const real t172 = t170 + t171;
+        const real t173 = S_p[21] * B_p[9 * k + 3];
+        const real t174 = t172 + t173;
+        const real t175 = S_p[27] * B_p[9 * k + 4];
+        const real t176 = t174 + t175;
+        const real t177 = S_p[33] * B_p[9 * k + 5];
+        const real t178 = t176 + t177;
+        const real t179 = S_p[39] * B_p[9 * k + 6];
+        const real t180 = t178 + t179;
+        const real t181 = S_p[45] * B_p[9 * k + 7];
+        const real t182 = t180 + t181;
+        const real t183 = S_p[51] * B_p[9 * k + 8];
+        const real t184 = t182 + t183;
+        const real t185 = Rc[0] * t184;
+        const real t186 = S_p[4] * B_p[9 * k];
+        const real t187 = S_p[10] * B_p[9 * k + 1];
+        const real t188 = t186 + t187;
+        const real t189 = S_p[16] * B_p[9 * k + 2];
+        const real t190 = t188 + t189;
+        const real t191 = S_p[22] * B_p[9 * k + 3];
+        const real t192 = t190 + t191;
+        const real t193 = S_p[28] * B_p[9 * k + 4];
+        const real t194 = t192 + t193;
+        const real t195 = S_p[34] * B_p[9 * k + 5];
+        const real t196 = t194 + t195;
+        const real t197 = S_p[40] * B_p[9 * k + 6];
+        const real t198 = t196 + t197;
+        const real t199 = S_p[46] * B_p[9 * k + 7];
+        const real t200 = t198 + t199;
+        const real t201 = S_p[52] * B_p[9 * k + 8];
+        const real t202 = t200 + t201;
+        const real t203 = Rc[1] * t202;
+        const real t204 = t185 + t203;
+        const real t205 = S_p[5] * B_p[9 * k];
+        const real t206 = S_p[11] * B_p[9 * k + 1];
+        const real t207 = t205 + t206;
+        const real t208 = S_p[17] * B_p[9 * k + 2];
+        const real t209 = t207 + t208;
+        const real t210 = S_p[23] * B_p[9 * k + 3];
+        const real t211 = t209 + t210;
+        const real t212 = S_p[29] * B_p[9 * k + 4];
+        const real t213 = t211 + t212;
+        const real t214 = S_p[35] * B_p[9 * k + 5];
+        const real t215 = t213 + t214;
+        const real t216 = S_p[41] * B_p[9 * k + 6];
+        const real t217 = t215 + t216;
+        const real t218 = S_p[47] * B_p[9 * k + 7];
+        const real t219 = t217 + t218;
+        const real t220 = S_p[53] * B_p[9 * k + 8];
+        const real t221 = t219 + t220;
+        const real t222 = Rc[2] * t221;
+        const real t223 = t204 + t222;
+        const real t224 = S_p[0] * B_p[9 * k];
+        const real t225 = S_p[6] * B_p[9 * k + 1];
+        const real t226 = t224 + t225;
+        const real t227 = S_p[12] * B_p[9 * k + 2];
+        const real t228 = t226 + t227;
+        const real t229 = S_p[18] * B_p[9 * k + 3];
+        const real t230 = t228 + t229;
+        const real t231 = S_p[24] * B_p[9 * k + 4];
+        const real t232 = t230 + t231;
+        const real t233 = S_p[30] * B_p[9 * k + 5];
+        const real t234 = t232 + t233;
+        const real t235 = S_p[36] * B_p[9 * k + 6];
+        const real t236 = t234 + t235;
+        const real t237 = S_p[42] * B_p[9 * k + 7];
+        const real t238 = t236 + t237;
+        const real t239 = S_p[48] * B_p[9 * k + 8];
+        const real t240 = t238 + t239;
+        const real t241 = Rc[6] * t240;
+        const real t242 = S_p[1] * B_p[9 * k];
+        const real t243 = S_p[7] * B_p[9 * k + 1];
+        const real t244 = t242 + t243;
+        const real t245 = S_p[13] * B_p[9 * k + 2];
+        const real t246 = t244 + t245;
+        const real t247 = S_p[19] * B_p[9 * k + 3];
+        const real t248 = t246 + t247;
+        const real t249 = S_p[25] * B_p[9 * k + 4];
+        const real t250 = t248 + t249;
+        const real t251 = S_p[31] * B_p[9 * k + 5];
+        const real t252 = t250 + t251;
+        const real t253 = S_p[37] * B_p[9 * k + 6];
+        const real t254 = t252 + t253;
+        const real t255 = S_p[43] * B_p[9 * k + 7];
+        const real t256 = t254 + t255;
+        const real t257 = S_p[49] * B_p[9 * k + 8];
+        const real t258 = t256 + t257;
+        const real t259 = Rc[7] * t258;
+        const real t260 = t241 + t259;
+        const real t261 = S_p[2] * B_p[9 * k];
+        const real t262 = S_p[8] * B_p[9 * k + 1];
+        const real t263 = t261 + t262;
+        const real t264 = S_p[14] * B_p[9 * k + 2];
+        const real t265 = t263 + t264;
+        const real t266 = S_p[20] * B_p[9 * k + 3];
+        const real t267 = t265 + t266;
+        const real t268 = S_p[26] * B_p[9 * k + 4];
+        const real t269 = t267 + t268;
+        const real t270 = S_p[32] * B_p[9 * k + 5];
+        const real t271 = t269 + t270;
+        const real t272 = S_p[38] * B_p[9 * k + 6];
+        const real t273 = t271 + t272;
+        const real t274 = S_p[44] * B_p[9 * k + 7];
+        const real t275 = t273 + t274;
+        const real t276 = S_p[50] * B_p[9 * k + 8];
+        const real t277 = t275 + t276;
+        const real t278 = Rc[8] * t277;
+        const real t279 = t260 + t278;
+        const real t280 = r[1] * t279;
+        const real t281 = Rc[3] * t240;
+        const real t282 = Rc[4] * t258;
+        const real t283 = t281 + t282;
+        const real t284 = Rc[5] * t277;
+        const real t285 = t283 + t284;
+        const real t286 = r[2] * t285;
+        const real t287 = t280 - t286;
+        const real t288 = t223 + t287;
+        K[6 * k + 3] += t288;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t289 = S_p[3] * B_p[9 * k];
+        const real t290 = S_p[9] * B_p[9 * k + 1];
+        const real t291 = t289 + t290;
+        const real t292 = S_p[15] * B_p[9 * k + 2];
+        const real t293 = t291 + t292;
+        const real t294 = S_p[21] * B_p[9 * k + 3];
+        const real t295 = t293 + t294;
+        const real t296 = S_p[27] * B_p[9 * k + 4];
+        const real t297 = t295 + t296;
+        const real t298 = S_p[33] * B_p[9 * k + 5];
+        const real t299 = t297 + t298;
+        const real t300 = S_p[39] * B_p[9 * k + 6];
+        const real t301 = t299 + t300;
+        const real t302 = S_p[45] * B_p[9 * k + 7];
+        const real t303 = t301 + t302;
+        const real t304 = S_p[51] * B_p[9 * k + 8];
+        const real t305 = t303 + t304;
+        const real t306 = Rc[3] * t305;
+        const real t307 = S_p[4] * B_p[9 * k];
+        const real t308 = S_p[10] * B_p[9 * k + 1];
+        const real t309 = t307 + t308;
+        const real t310 = S_p[16] * B_p[9 * k + 2];
+        const real t311 = t309 + t310;
+        const real t312 = S_p[22] * B_p[9 * k + 3];
+        const real t313 = t311 + t312;
+        const real t314 = S_p[28] * B_p[9 * k + 4];
+        const real t315 = t313 + t314;
+        const real t316 = S_p[34] * B_p[9 * k + 5];
+        const real t317 = t315 + t316;
+        const real t318 = S_p[40] * B_p[9 * k + 6];
+        const real t319 = t317 + t318;
+        const real t320 = S_p[46] * B_p[9 * k + 7];
+        const real t321 = t319 + t320;
+        const real t322 = S_p[52] * B_p[9 * k + 8];
+        const real t323 = t321 + t322;
+        const real t324 = Rc[4] * t323;
+        const real t325 = t306 + t324;
+        const real t326 = S_p[5] * B_p[9 * k];
+        const real t327 = S_p[11] * B_p[9 * k + 1];
+        const real t328 = t326 + t327;
+        const real t329 = S_p[17] * B_p[9 * k + 2];
+        const real t330 = t328 + t329;
+        const real t331 = S_p[23] * B_p[9 * k + 3];
+        const real t332 = t330 + t331;
+        const real t333 = S_p[29] * B_p[9 * k + 4];
+        const real t334 = t332 + t333;
+        const real t335 = S_p[35] * B_p[9 * k + 5];
+        const real t336 = t334 + t335;
+        const real t337 = S_p[41] * B_p[9 * k + 6];
+        const real t338 = t336 + t337;
+        const real t339 = S_p[47] * B_p[9 * k + 7];
+        const real t340 = t338 + t339;
+        const real t341 = S_p[53] * B_p[9 * k + 8];
+        const real t342 = t340 + t341;
+        const real t343 = Rc[5] * t342;
+        const real t344 = t325 + t343;
+        const real t345 = S_p[0] * B_p[9 * k];
+        const real t346 = S_p[6] * B_p[9 * k + 1];
+        const real t347 = t345 + t346;
+        const real t348 = S_p[12] * B_p[9 * k + 2];
+        const real t349 = t347 + t348;
+        const real t350 = S_p[18] * B_p[9 * k + 3];
+        const real t351 = t349 + t350;
+        const real t352 = S_p[24] * B_p[9 * k + 4];
+        const real t353 = t351 + t352;
+        const real t354 = S_p[30] * B_p[9 * k + 5];
+        const real t355 = t353 + t354;
+        const real t356 = S_p[36] * B_p[9 * k + 6];
+        const real t357 = t355 + t356;
+        const real t358 = S_p[42] * B_p[9 * k + 7];
+        const real t359 = t357 + t358;
+        const real t360 = S_p[48] * B_p[9 * k + 8];
+        const real t361 = t359 + t360;
+        const real t362 = Rc[0] * t361;
+        const real t363 = S_p[1] * B_p[9 * k];
+        const real t364 = S_p[7] * B_p[9 * k + 1];
+        const real t365 = t363 + t364;
+        const real t366 = S_p[13] * B_p[9 * k + 2];
+        const real t367 = t365 + t366;
+        const real t368 = S_p[19] * B_p[9 * k + 3];
+        const real t369 = t367 + t368;
+        const real t370 = S_p[25] * B_p[9 * k + 4];
+        const real t371 = t369 + t370;
+        const real t372 = S_p[31] * B_p[9 * k + 5];
+        const real t373 = t371 + t372;
+        const real t374 = S_p[37] * B_p[9 * k + 6];
+        const real t375 = t373 + t374;
+        const real t376 = S_p[43] * B_p[9 * k + 7];
+        const real t377 = t375 + t376;
+        const real t378 = S_p[49] * B_p[9 * k + 8];
+        const real t379 = t377 + t378;
+        const real t380 = Rc[1] * t379;
+        const real t381 = t362 + t380;
+        const real t382 = S_p[2] * B_p[9 * k];
+        const real t383 = S_p[8] * B_p[9 * k + 1];
+        const real t384 = t382 + t383;
+        const real t385 = S_p[14] * B_p[9 * k + 2];
+        const real t386 = t384 + t385;
+        const real t387 = S_p[20] * B_p[9 * k + 3];
+        const real t388 = t386 + t387;
+        const real t389 = S_p[26] * B_p[9 * k + 4];
+        const real t390 = t388 + t389;
+        const real t391 = S_p[32] * B_p[9 * k + 5];
+        const real t392 = t390 + t391;
+        const real t393 = S_p[38] * B_p[9 * k + 6];
+        const real t394 = t392 + t393;
+        const real t395 = S_p[44] * B_p[9 * k + 7];
+        const real t396 = t394 + t395;
+        const real t397 = S_p[50] * B_p[9 * k + 8];
+        const real t398 = t396 + t397;
+        const real t399 = Rc[2] * t398;
+        const real t400 = t381 + t399;
+        const real t401 = r[2] * t400;
+        const real t402 = Rc[6] * t361;
+        const real t403 = Rc[7] * t379;
+        const real t404 = t402 + t403;
+        const real t405 = Rc[8] * t398;
+        const real t406 = t404 + t405;
+        const real t407 = r[0] * t406;
+        const real t408 = t401 - t407;
+        const real t409 = t344 + t408;
+        K[6 * k + 4] += t409;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t410 = S_p[3] * B_p[9 * k];
+        const real t411 = S_p[9] * B_p[9 * k + 1];
+        const real t412 = t410 + t411;
+        const real t413 = S_p[15] * B_p[9 * k + 2];
+        const real t414 = t412 + t413;
+        const real t415 = S_p[21] * B_p[9 * k + 3];
+        const real t416 = t414 + t415;
+        const real t417 = S_p[27] * B_p[9 * k + 4];
+        const real t418 = t416 + t417;
+        const real t419 = S_p[33] * B_p[9 * k + 5];
+        const real t420 = t418 + t419;
+        const real t421 = S_p[39] * B_p[9 * k + 6];
+        const real t422 = t420 + t421;
+        const real t423 = S_p[45] * B_p[9 * k + 7];
+        const real t424 = t422 + t423;
+        const real t425 = S_p[51] * B_p[9 * k + 8];
+        const real t426 = t424 + t425;
+        const real t427 = Rc[6] * t426;
+        const real t428 = S_p[4] * B_p[9 * k];
+        const real t429 = S_p[10] * B_p[9 * k + 1];
+        const real t430 = t428 + t429;
+        const real t431 = S_p[16] * B_p[9 * k + 2];
+        const real t432 = t430 + t431;
+        const real t433 = S_p[22] * B_p[9 * k + 3];
+        const real t434 = t432 + t433;
+        const real t435 = S_p[28] * B_p[9 * k + 4];
+        const real t436 = t434 + t435;
+        const real t437 = S_p[34] * B_p[9 * k + 5];
+        const real t438 = t436 + t437;
+        const real t439 = S_p[40] * B_p[9 * k + 6];
+        const real t440 = t438 + t439;
+        const real t441 = S_p[46] * B_p[9 * k + 7];
+        const real t442 = t440 + t441;
+        const real t443 = S_p[52] * B_p[9 * k + 8];
+        const real t444 = t442 + t443;
+        const real t445 = Rc[7] * t444;
+        const real t446 = t427 + t445;
+        const real t447 = S_p[5] * B_p[9 * k];
+        const real t448 = S_p[11] * B_p[9 * k + 1];
+        const real t449 = t447 + t448;
+        const real t450 = S_p[17] * B_p[9 * k + 2];
+        const real t451 = t449 + t450;
+        const real t452 = S_p[23] * B_p[9 * k + 3];
+        const real t453 = t451 + t452;
+        const real t454 = S_p[29] * B_p[9 * k + 4];
+        const real t455 = t453 + t454;
+        const real t456 = S_p[35] * B_p[9 * k + 5];
+        const real t457 = t455 + t456;
+        const real t458 = S_p[41] * B_p[9 * k + 6];
+        const real t459 = t457 + t458;
+        const real t460 = S_p[47] * B_p[9 * k + 7];
+        const real t461 = t459 + t460;
+        const real t462 = S_p[53] * B_p[9 * k + 8];
+        const real t463 = t461 + t462;
+        const real t464 = Rc[8] * t463;
+        const real t465 = t446 + t464;
+        const real t466 = S_p[0] * B_p[9 * k];
+        const real t467 = S_p[6] * B_p[9 * k + 1];
+        const real t468 = t466 + t467;
+        const real t469 = S_p[12] * B_p[9 * k + 2];
+        const real t470 = t468 + t469;
+        const real t471 = S_p[18] * B_p[9 * k + 3];
+        const real t472 = t470 + t471;
+        const real t473 = S_p[24] * B_p[9 * k + 4];
+        const real t474 = t472 + t473;
+        const real t475 = S_p[30] * B_p[9 * k + 5];
+        const real t476 = t474 + t475;
+        const real t477 = S_p[36] * B_p[9 * k + 6];
+        const real t478 = t476 + t477;
+        const real t479 = S_p[42] * B_p[9 * k + 7];
+        const real t480 = t478 + t479;
+        const real t481 = S_p[48] * B_p[9 * k + 8];
+        const real t482 = t480 + t481;
+        const real t483 = Rc[3] * t482;
+        const real t484 = S_p[1] * B_p[9 * k];
+        const real t485 = S_p[7] * B_p[9 * k + 1];
+        const real t486 = t484 + t485;
+        const real t487 = S_p[13] * B_p[9 * k + 2];
+        const real t488 = t486 + t487;
+        const real t489 = S_p[19] * B_p[9 * k + 3];
+        const real t490 = t488 + t489;
+        const real t491 = S_p[25] * B_p[9 * k + 4];
+        const real t492 = t490 + t491;
+        const real t493 = S_p[31] * B_p[9 * k + 5];
+        const real t494 = t492 + t493;
+        const real t495 = S_p[37] * B_p[9 * k + 6];
+        const real t496 = t494 + t495;
+        const real t497 = S_p[43] * B_p[9 * k + 7];
+        const real t498 = t496 + t497;
+        const real t499 = S_p[49] * B_p[9 * k + 8];
+        const real t500 = t498 + t499;
+        const real t501 = Rc[4] * t500;
+        const real t502 = t483 + t501;
+        const real t503 = S_p[2] * B_p[9 * k];
+        const real t504 = S_p[8] * B_p[9 * k + 1];
+        const real t505 = t503 + t504;
+        const real t506 = S_p[14] * B_p[9 * k + 2];
+        const real t507 = t505 + t506;
+        const real t508 = S_p[20] * B_p[9 * k + 3];
+        const real t509 = t507 + t508;
+        const real t510 = S_p[26] * B_p[9 * k + 4];
+        const real t511 = t509 + t510;
+        const real t512 = S_p[32] * B_p[9 * k + 5];
+        const real t513 = t511 + t512;
+        const real t514 = S_p[38] * B_p[9 * k + 6];
+        const real t515 = t513 + t514;
+        const real t516 = S_p[44] * B_p[9 * k + 7];
+        const real t517 = t515 + t516;
+        const real t518 = S_p[50] * B_p[9 * k + 8];
+        const real t519 = t517 + t518;
+        const real t520 = Rc[5] * t519;
+        const real t521 = t502 + t520;
+        const real t522 = r[0] * t521;
+        const real t523 = Rc[0] * t482;
+        const real t524 = Rc[1] * t500;
+        const real t525 = t523 + t524;
+        const real t526 = Rc[2] * t519;
+        const real t527 = t525 + t526;
+        const real t528 = r[1] * t527;
+        const real t529 = t522 - t528;
+        const real t530 = t465 + t529;
+        K[6 * k + 5] += t530;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t531 = T_p[0] * H[k];
+        const real t532 = T_p[1] * H[n + k];
+        const real t533 = t531 + t532;
+        const real t534 = T_p[2] * H[2 * n + k];
+        const real t535 = t533 + t534;
+        const real t536 = T_p[3] * H[3 * n + k];
+        const real t537 = t535 + t536;
+        const real t538 = T_p[4] * H[4 * n + k];
+        const real t539 = t537 + t538;
+        const real t540 = T_p[5] * H[5 * n + k];
+        const real t541 = t539 + t540;
+        Z_p[k] += t541;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t542 = T_p[6] * H[k];
+        const real t543 = T_p[7] * H[n + k];
+        const real t544 = t542 + t543;
+        const real t545 = T_p[8] * H[2 * n + k];
+        const real t546 = t544 + t545;
+        const real t547 = T_p[9] * H[3 * n + k];
+        const real t548 = t546 + t547;
+        const real t549 = T_p[10] * H[4 * n + k];
+        const real t550 = t548 + t549;
+        const real t551 = T_p[11] * H[5 * n + k];
+        const real t552 = t550 + t551;
+        Z_p[n + k] += t552;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t553 = T_p[12] * H[k];
+        const real t554 = T_p[13] * H[n + k];
+        const real t555 = t553 + t554;
+        const real t556 = T_p[14] * H[2 * n + k];
+        const real t557 = t555 + t556;
+        const real t558 = T_p[15] * H[3 * n + k];
+        const real t559 = t557 + t558;
+        const real t560 = T_p[16] * H[4 * n + k];
+        const real t561 = t559 + t560;
+        const real t562 = T_p[17] * H[5 * n + k];
+        const real t563 = t561 + t562;
+        Z_p[2 * n + k] += t563;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t564 = T_p[18] * H[k];
+        const real t565 = T_p[19] * H[n + k];
+        const real t566 = t564 + t565;
+        const real t567 = T_p[20] * H[2 * n + k];
+        const real t568 = t566 + t567;
+        const real t569 = T_p[21] * H[3 * n + k];
+        const real t570 = t568 + t569;
+        const real t571 = T_p[22] * H[4 * n + k];
+        const real t572 = t570 + t571;
+        const real t573 = T_p[23] * H[5 * n + k];
+        const real t574 = t572 + t573;
+        Z_p[3 * n + k] += t574;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t575 = T_p[24] * H[k];
+        const real t576 = T_p[25] * H[n + k];
+        const real t577 = t575 + t576;
+        const real t578 = T_p[26] * H[2 * n + k];
+        const real t579 = t577 + t578;
+        const real t580 = T_p[27] * H[3 * n + k];
+        const real t581 = t579 + t580;
+        const real t582 = T_p[28] * H[4 * n + k];
+        const real t583 = t581 + t582;
+        const real t584 = T_p[29] * H[5 * n + k];
+        const real t585 = t583 + t584;
+        Z_p[4 * n + k] += t585;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t586 = T_p[30] * H[k];
+        const real t587 = T_p[31] * H[n + k];
+        const real t588 = t586 + t587;
+        const real t589 = T_p[32] * H[2 * n + k];
+        const real t590 = t588 + t589;
+        const real t591 = T_p[33] * H[3 * n + k];
+        const real t592 = t590 + t591;
+        const real t593 = T_p[34] * H[4 * n + k];
+        const real t594 = t592 + t593;
+        const real t595 = T_p[35] * H[5 * n + k];
+        const real t596 = t594 + t595;
+        Z_p[5 * n + k] += t596;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t597 = T_p[36] * H[k];
+        const real t598 = T_p[37] * H[n + k];
+        const real t599 = t597 + t598;
+        const real t600 = T_p[38] * H[2 * n + k];
+        const real t601 = t599 + t600;
+        const real t602 = T_p[39] * H[3 * n + k];
+        const real t603 = t601 + t602;
+        const real t604 = T_p[40] * H[4 * n + k];
+        const real t605 = t603 + t604;
+        const real t606 = T_p[41] * H[5 * n + k];
+        const real t607 = t605 + t606;
+        Z_p[6 * n + k] += t607;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t608 = T_p[42] * H[k];
+        const real t609 = T_p[43] * H[n + k];
+        const real t610 = t608 + t609;
+        const real t611 = T_p[44] * H[2 * n + k];
+        const real t612 = t610 + t611;
+        const real t613 = T_p[45] * H[3 * n + k];
+        const real t614 = t612 + t613;
+        const real t615 = T_p[46] * H[4 * n + k];
+        const real t616 = t614 + t615;
+        const real t617 = T_p[47] * H[5 * n + k];
+        const real t618 = t616 + t617;
+        Z_p[7 * n + k] += t618;
+    }
+    for (int k = 0; k < n; ++k) {
+        const real t619 = T_p[48] * H[k];
+        const real t620 = T_p[49] * H[n + k];
+        const real t621 = t619 + t620;
+        const real t622 = T_p[50] * H[2 * n + k];
+        const real t623 = t621 + t622;
+        const real t624 = T_p[51] * H[3 * n + k];
+        const real t625 = t623 + t624;
+        const real t626 = T_p[52] * H[4 * n + k];
+        const real t627 = t625 + t626;
+        const real t628 = T_p[53] * H[5 * n + k];
+        const real t629 = t627 + t628;
+        Z_p[8 * n + k] += t629;
+    }
+    for (int k = 0; k < n; ++k) {
+        for (int l = 0; l < n; ++l) {
+            const real t630 = S_p[0] * B_p[9 * k];
+            const real t631 = S_p[6] * B_p[9 * k + 1];
+            const real t632 = t630 + t631;
+            const real t633 = S_p[12] * B_p[9 * k + 2];
+            const real t634 = t632 + t633;
+            const real t635 = S_p[18] * B_p[9 * k + 3];
+            const real t636 = t634 + t635;
+            const real t637 = S_p[24] * B_p[9 * k + 4];
+            const real t638 = t636 + t637;
+            const real t639 = S_p[30] * B_p[9 * k + 5];
+            const real t640 = t638 + t639;
+            const real t641 = S_p[36] * B_p[9 * k + 6];
+            const real t642 = t640 + t641;
+            const real t643 = S_p[42] * B_p[9 * k + 7];
+            const real t644 = t642 + t643;
+            const real t645 = S_p[48] * B_p[9 * k + 8];
+            const real t646 = t644 + t645;
+            const real t647 = t646 * H[l];
+            const real t648 = S_p[1] * B_p[9 * k];
+            const real t649 = S_p[7] * B_p[9 * k + 1];
+            const real t650 = t648 + t649;
+            const real t651 = S_p[13] * B_p[9 * k + 2];
+            const real t652 = t650 + t651;
+            const real t653 = S_p[19] * B_p[9 * k + 3];
+            const real t654 = t652 + t653;
+            const real t655 = S_p[25] * B_p[9 * k + 4];
+            const real t656 = t654 + t655;
+            const real t657 = S_p[31] * B_p[9 * k + 5];
+            const real t658 = t656 + t657;
+            const real t659 = S_p[37] * B_p[9 * k + 6];
+            const real t660 = t658 + t659;
+            const real t661 = S_p[43] * B_p[9 * k + 7];
+            const real t662 = t660 + t661;
+            const real t663 = S_p[49] * B_p[9 * k + 8];
+            const real t664 = t662 + t663;
+            const real t665 = t664 * H[n + l];
+            const real t666 = t647 + t665;
+            const real t667 = S_p[2] * B_p[9 * k];
+            const real t668 = S_p[8] * B_p[9 * k + 1];
+            const real t669 = t667 + t668;
+            const real t670 = S_p[14] * B_p[9 * k + 2];
+            const real t671 = t669 + t670;
+            const real t672 = S_p[20] * B_p[9 * k + 3];
+            const real t673 = t671 + t672;
+            const real t674 = S_p[26] * B_p[9 * k + 4];
+            const real t675 = t673 + t674;
+            const real t676 = S_p[32] * B_p[9 * k + 5];
+            const real t677 = t675 + t676;
+            const real t678 = S_p[38] * B_p[9 * k + 6];
+            const real t679 = t677 + t678;
+            const real t680 = S_p[44] * B_p[9 * k + 7];
+            const real t681 = t679 + t680;
+            const real t682 = S_p[50] * B_p[9 * k + 8];
+            const real t683 = t681 + t682;
+            const real t684 = t683 * H[2 * n + l];
+            const real t685 = t666 + t684;
+            const real t686 = S_p[3] * B_p[9 * k];
+            const real t687 = S_p[9] * B_p[9 * k + 1];
+            const real t688 = t686 + t687;
+            const real t689 = S_p[15] * B_p[9 * k + 2];
+            const real t690 = t688 + t689;
+            const real t691 = S_p[21] * B_p[9 * k + 3];
+            const real t692 = t690 + t691;
+            const real t693 = S_p[27] * B_p[9 * k + 4];
+            const real t694 = t692 + t693;
+            const real t695 = S_p[33] * B_p[9 * k + 5];
+            const real t696 = t694 + t695;
+            const real t697 = S_p[39] * B_p[9 * k + 6];
+            const real t698 = t696 + t697;
+            const real t699 = S_p[45] * B_p[9 * k + 7];
+            const real t700 = t698 + t699;
+            const real t701 = S_p[51] * B_p[9 * k + 8];
+            const real t702 = t700 + t701;
+            const real t703 = t702 * H[3 * n + l];
+            const real t704 = t685 + t703;
+            const real t705 = S_p[4] * B_p[9 * k];
+            const real t706 = S_p[10] * B_p[9 * k + 1];
+            const real t707 = t705 + t706;
+            const real t708 = S_p[16] * B_p[9 * k + 2];
+            const real t709 = t707 + t708;
+            const real t710 = S_p[22] * B_p[9 * k + 3];
+            const real t711 = t709 + t710;
+            const real t712 = S_p[28] * B_p[9 * k + 4];
+            const real t713 = t711 + t712;
+            const real t714 = S_p[34] * B_p[9 * k + 5];
+            const real t715 = t713 + t714;
+            const real t716 = S_p[40] * B_p[9 * k + 6];
+            const real t717 = t715 + t716;
+            const real t718 = S_p[46] * B_p[9 * k + 7];
+            const real t719 = t717 + t718;
+            const real t720 = S_p[52] * B_p[9 * k + 8];
+            const real t721 = t719 + t720;
+            const real t722 = t721 * H[4 * n + l];
+            const real t723 = t704 + t722;
+            const real t724 = S_p[5] * B_p[9 * k];
+            const real t725 = S_p[11] * B_p[9 * k + 1];
+            const real t726 = t724 + t725;
+            const real t727 = S_p[17] * B_p[9 * k + 2];
+            const real t728 = t726 + t727;
+            const real t729 = S_p[23] * B_p[9 * k + 3];
+            const real t730 = t728 + t729;
+            const real t731 = S_p[29] * B_p[9 * k + 4];
+            const real t732 = t730 + t731;
+            const real t733 = S_p[35] * B_p[9 * k + 5];
+            const real t734 = t732 + t733;
+            const real t735 = S_p[41] * B_p[9 * k + 6];
+            const real t736 = t734 + t735;
+            const real t737 = S_p[47] * B_p[9 * k + 7];
+            const real t738 = t736 + t737;
+            const real t739 = S_p[53] * B_p[9 * k + 8];
+            const real t740 = t738 + t739;
+            const real t741 = t740 * H[5 * n + l];
+            const real t742 = t723 + t741;
+            Z_x[n * k + l] += t742;
+        }
+    }
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
+    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_absorb_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 2: return mstmm_sweep_tangent_placed_absorb_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 3: return mstmm_sweep_tangent_placed_absorb_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 4: return mstmm_sweep_tangent_placed_absorb_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    default: return mstmm_sweep_tangent_placed_absorb_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_absorb_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_absorb(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_absorb_inputs[] = {
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"H", 6, "", 0, 1},
+    {"B_p", 9, "", 0, 1},
+    {"S_p", 54, "", 0, 0},
+    {"T_p", 54, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_absorb_outputs[] = {
+    {"K", 6, "", 1, 1},
+    {"Z_p", 9, "", 1, 1},
+    {"Z_x", 1, "", 1, 2},
+};
+
+/* rows less what the change of place makes of them
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  gain[n][9] D^-1 times the rows by the place
+ * in  p[9] change of place: turn, place and velocity of P, own axes
+ * out y[n] what is left of the rows, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_left_sized(int n, const real *restrict gain, const real *restrict p,
+    real *restrict y)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = p[0] * gain[9 * k];
+        const real t1 = p[1] * gain[9 * k + 1];
+        const real t2 = t0 + t1;
+        const real t3 = p[2] * gain[9 * k + 2];
+        const real t4 = t2 + t3;
+        const real t5 = p[3] * gain[9 * k + 3];
+        const real t6 = t4 + t5;
+        const real t7 = p[4] * gain[9 * k + 4];
+        const real t8 = t6 + t7;
+        const real t9 = p[5] * gain[9 * k + 5];
+        const real t10 = t8 + t9;
+        const real t11 = p[6] * gain[9 * k + 6];
+        const real t12 = t10 + t11;
+        const real t13 = p[7] * gain[9 * k + 7];
+        const real t14 = t12 + t13;
+        const real t15 = p[8] * gain[9 * k + 8];
+        const real t16 = t14 + t15;
+        const real t17 = -t16;
+        y[k] += t17;
+    }
+    return 0;
+}
+
+int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+    real *restrict y)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_tangent_placed_left_sized(1, gain, p, y);
+    case 2: return mstmm_sweep_tangent_placed_left_sized(2, gain, p, y);
+    case 3: return mstmm_sweep_tangent_placed_left_sized(3, gain, p, y);
+    case 4: return mstmm_sweep_tangent_placed_left_sized(4, gain, p, y);
+    default: return mstmm_sweep_tangent_placed_left_sized(n, gain, p, y);
+    }
+}
+
+static int mstmm_sweep_tangent_placed_left_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_tangent_placed_left(n, in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_tangent_placed_left_inputs[] = {
+    {"gain", 9, "", 0, 1},
+    {"p", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_tangent_placed_left_outputs[] = {
+    {"y", 1, "", 1, 1},
+};
+
 static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
     {
         .name = "invert",
@@ -2007,13 +4351,85 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "placed_rows",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_rows,
+        .call = mstmm_sweep_tangent_placed_rows_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_tangent_placed_rows_inputs,
+        .outputs = mstmm_sweep_tangent_placed_rows_outputs,
+        .ir_hash = "666189d6791c294a3d3daff68cc94df2e7dd252a3766a06d21432f5f04603a1e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_own",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_own,
+        .call = mstmm_sweep_tangent_placed_own_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_tangent_placed_own_inputs,
+        .outputs = mstmm_sweep_tangent_placed_own_outputs,
+        .ir_hash = "889aae21ede678902d2bd635d9d13a3d782b87ef32d24a32160cc561bf47f5fc",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_reduce",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_reduce,
+        .call = mstmm_sweep_tangent_placed_reduce_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_tangent_placed_reduce_inputs,
+        .outputs = mstmm_sweep_tangent_placed_reduce_outputs,
+        .ir_hash = "c6deaa0d6de6f47ebd00356a88aa9ff43c9bda1a2d42252bc6e219f61b0a7ce0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_node",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_node,
+        .call = mstmm_sweep_tangent_placed_node_call,
+        .n_inputs = 5,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_tangent_placed_node_inputs,
+        .outputs = mstmm_sweep_tangent_placed_node_outputs,
+        .ir_hash = "36f21af23eab8677ed1e8d4d43ed60ccc1f43281b1887fa14678daa9cf4e67de",
+        .n_guards = 2,
+        .guards = mstmm_sweep_tangent_placed_node_guards,
+    },
+    {
+        .name = "placed_absorb",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_absorb,
+        .call = mstmm_sweep_tangent_placed_absorb_call,
+        .n_inputs = 6,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_tangent_placed_absorb_inputs,
+        .outputs = mstmm_sweep_tangent_placed_absorb_outputs,
+        .ir_hash = "8da0468ba31e903e2984c69ed715263c2222b13102544fea23714c01cd137c00",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "placed_left",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_left,
+        .call = mstmm_sweep_tangent_placed_left_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_tangent_placed_left_inputs,
+        .outputs = mstmm_sweep_tangent_placed_left_outputs,
+        .ir_hash = "49ae35f10bd8c4177dd7e075c31abfcb349ec00d419f49c60205fcca42dca172",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "646fdbe3d823cb3e70051be2d6e7950a34d6f569af38549fa87c10a0142397d9",
+    .hash = "1fcdf7959ad449b7a49d4c01cb3dfe022d6557de87946388ffad01b56429a8bb",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2023,6 +4439,6 @@ const mstmm_element mstmm_sweep_tangent = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 14,
     .kernels = mstmm_sweep_tangent_kernels,
 };

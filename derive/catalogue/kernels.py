@@ -15,6 +15,7 @@ from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
 from ..equations import columns, frames, laws, link, screw, sweep, tangent, tangent_hinge
 from ..equations import force as force_kernels
+from ..equations import tangent_placed as placed
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from ..flexible import beam_fields, beam_second_order, modal, modal_sweep, section
@@ -35,6 +36,8 @@ FRAME_DERIVATIONS = (
     frames.classical_body, frames.state_deviation,
     tangent.tangent_carry, tangent.tangent_moved, tangent_hinge.tangent_turned,
     tangent.tangent_known,
+    placed.placed_moved, placed.placed_pose, placed.placed_column, placed.placed_carry,
+    placed.placed_known,
 )  # fmt: skip
 
 #: Steps of the tangent for hinges with any number of speeds, and for those that have some.
@@ -199,7 +202,9 @@ def tangent_kernels() -> tuple[Kernel, ...]:
     return tuple(
         Kernel(make.__name__, make())
         for make in (tangent.invert, tangent.node, tangent.absorb, tangent.push, tangent.answer,
-                     tangent.displaced, tangent.lag, tangent.lagged)
+                     tangent.displaced, tangent.lag, tangent.lagged, placed.placed_rows,
+                     placed.placed_own, placed.placed_reduce, placed.placed_node,
+                     placed.placed_absorb, placed.placed_left)
     )  # fmt: skip
 
 

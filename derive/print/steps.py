@@ -48,6 +48,11 @@ _ALONG = {
     "motion": (
         "9", "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c)", ("d_block",),
     ),
+    "spin": (
+        "3", "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c)", ("d_block",),
+    ),
+    "place": ("9", "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c)", ("place",)),
+    "turn": ("3", "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c)", ("place",)),
 }  # fmt: skip
 #: What points them nowhere again.
 _RESTS = {
@@ -55,7 +60,8 @@ _RESTS = {
         ("free", "felt", "rates", "coordinates", "law"), "mstmm_aim_nowhere(state, body)"
     ),
     "modes": "mstmm_aim_no_mode(state, modal)",
-    "motion": "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)",
+    **dict.fromkeys(("motion", "spin"), "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)"),
+    **dict.fromkeys(("place", "turn"), "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1)"),
 }
 #: Sizes of kernels for any size: C expression, variables that it reads.
 _SIZES: dict[str, tuple[str, set[str]]] = {
@@ -107,6 +113,8 @@ class StepText:
                     name, _, entry = slot.partition("[")
                     if slot not in self.given and place(name) is None:
                         size = MOST_SPEEDS if entry == "k]" else size
+                        if word_of(name) in VARIABLES:
+                            raise ValueError(f"pass {self.name}: {name!r} hides a variable")
                         found[word_of(name)] = max(found.get(word_of(name), 1), size)
         return found
 

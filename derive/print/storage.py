@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..schedule.slope import D
@@ -45,17 +46,25 @@ TANGENT = {
     "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),
     "tangent.lag": (0, 0, 0, 1, 0), "tangent.lag_work": (0, 0, 0, 1, 0),
 }  # fmt: skip
+#: And of a body whose loads change with its place.
+PLACE = {
+    "place.S": (54, 0, 0, 0, 0), "place.z": (9, 0, 0, 0, 0), "place.known": (9, 0, 0, 0, 0),
+    "place.B": (0, 9, 0, 0, 0), "place.gain": (0, 9, 0, 0, 0),
+}  # fmt: skip
 #: Numbers of the tangent by flexible body, and by section: slot -> (per mode, per pair of modes).
 BEND = {
     "bend.B": (9, 0), "bend.G": (6, 0), "bend.W": (0, 1), "bend.still": (6, 0), "bend.K": (6, 0),
     "bend.Z_z": (9, 0), "bend.Z_x": (0, 1), "bend.V": (6, 0), "bend.D": (0, 1),
     "bend.right": (9, 0), "bend.gain": (9, 0), "bend.work": (0, 1), "bend.rest": (1, 0),
-    "bend.y": (1, 0),
+    "bend.y": (1, 0), "bend.place_B": (9, 0), "bend.place_Z": (9, 0), "bend.place_gain": (9, 0),
 }  # fmt: skip
-PORT = {"port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0)}
+PORT = {
+    "port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0),
+    "port.place_B": (9, 0),
+}  # fmt: skip
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {
-    "hinge.F": "hinge.H", "modes.felt": "modes.right",
+    "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
     # One of the two tangents is held at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
     "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",
@@ -108,6 +117,8 @@ _PLACES = {
     " + body->nu * (law->speed + c) + law->speed",
     "inboard.S": "mstmm_tangent_at(state, body->parent)",
     "inboard.mass": "mstmm_tangent_at(state, body->parent)",
+    "inboard.place": "mstmm_place_at(state, body->parent)",
+    "inboard.z": "mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0)",
     "step.rate": "&state->tangents->rate",
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
@@ -144,6 +155,7 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "nu": ("const int nu = body->nu;", ("body",)),
     "nq": ("const int nq = body->nq;", ("body",)),
     "tangent": ("real *tangent = state->tangents->numbers + body->tangent;", ("body",)),
+    "place": ("real *place = state->tangents->numbers + body->place;", ("body",)),
     "modal": ("const mstmm_modal *modal = mstmm_modal_of(body);", ("body",)),
     "n": ("const int n = mstmm_modes_of(modal);", ("modal",)),
     "modes": ("real *modes = modal ? state->workspace + modal->place : NULL;", ("modal",)),
@@ -180,7 +192,10 @@ VARIABLES |= {
     for name in _DOUBLED
 }  # fmt: skip
 #: Which body the subject of a pass is about.
-BODY_OF = {"body": "index", "law": "law->body", "drive": "drive->body"}
+BODY_OF = {
+    "body": "index", "law": "law->body", "drive": "drive->body", "load": "load->body",
+    "force": "mstmm_held(force)",
+}  # fmt: skip
 
 
 @dataclass
@@ -226,6 +241,8 @@ def _stored(slot: str) -> str | None:
             return f"{start} + {_macro(slot)}(n)"
     if slot in TANGENT:
         return f"tangent + {_macro(slot)}(body->nu, body->nq)"
+    if slot in PLACE:
+        return f"place + {_macro(slot)}(body->nu, body->nq)"
     return None
 
 
@@ -256,7 +273,8 @@ def _offsets(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
 _PAIRS = " * (size_t)(n) * (n)"
 
 
-def _tangent_offsets() -> list[str]:
+def _offsets_by_speeds(layout: Mapping[str, tuple[int, ...]], total: str) -> list[str]:
+    """The same by the numbers of speeds and coordinates of a hinge, and `total`, all of them."""
     lines, counts = [], [0] * 5
 
     def macro(name: str) -> str:
@@ -265,10 +283,10 @@ def _tangent_offsets() -> list[str]:
             f"#define {name}(nu, nq) ({' + '.join(f'{n} * {word}' for n, word in words if n) or 0})"
         )
 
-    for slot, sizes in TANGENT.items():
+    for slot, sizes in layout.items():
         lines.append(macro(_macro(slot)))
         counts = [a + b for a, b in zip(counts, sizes, strict=True)]
-    return [*lines, macro("MSTMM_TANGENT_NUMBERS")]
+    return [*lines, macro(total)]
 
 
 def reads(text: str, word: str) -> bool:
@@ -312,6 +330,13 @@ def layout_header() -> str:
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offsets(MODES, _PAIRS), *_offsets(SECTION, "")])
         + "\n/* What the tangent keeps of a body, of a flexible one, of a section. */\n"
-        + "\n".join([*_tangent_offsets(), *_offsets(BEND, _PAIRS), *_offsets(PORT, _PAIRS)])
+        + "\n".join(
+            [
+                *_offsets_by_speeds(TANGENT, "MSTMM_TANGENT_NUMBERS"),
+                *_offsets_by_speeds(PLACE, "MSTMM_PLACE_NUMBERS"),
+                *_offsets(BEND, _PAIRS),
+                *_offsets(PORT, _PAIRS),
+            ]
+        )
         + "\n\n#endif\n"
     )

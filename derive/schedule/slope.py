@@ -89,6 +89,11 @@ class Sloped(Call):
     still: tuple[str, ...] = ()
 
 
+def still(step: Call, *ports: str) -> Sloped:
+    """The derivative of a call in which these ports do not move."""
+    return Sloped(step.when, step.kernel + SLOPE, step.ports, still=ports)
+
+
 def ports_of(step: Call) -> dict[str, str]:
     """port -> slot; a differentiated kernel has ports of derivatives besides."""
     ports = dict(step.ports)

@@ -119,7 +119,8 @@ class Along(Step):
 
     `of`: "free", the unknowns of a hinge; "felt", those that a law feels; "rates", its speeds
     alone; "coordinates", its coordinates alone; "modes", the unknowns of a flexible body; "motion",
-    the nine numbers of a motion; "law", the unknowns that go with the speeds that a law acts on.
+    the nine numbers of a motion, "spin" the first three; "place", the nine of a change of place,
+    "turn" the first three; "law", the unknowns that go with the speeds that a law acts on.
     """
 
     of: str = ""

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from . import placed
 from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
 from .inverse import REQUIRED
 from .loads import EFFORTS, FORCES, LAWS, LOADS
 from .motion import BODY, CONNECTION, COORDINATES, DRIVES, FORWARD, HINGE, POSES, PRESCRIBED
-from .slope import SLOPE, D, Sloped, sloped
+from .slope import SLOPE, D, Sloped, sloped, still
 from .steps import (
     TIPS_TO_ROOT,
     Add,
@@ -87,32 +88,36 @@ DIRECTIONAL = Sweep(
     ),
 )  # fmt: skip
 
-_NO_LOADS = Pass(
-    "no_loads", "body", "Loads begun from none.",
-    (Copy(to=D + "body.e"), Copy(to=D + "modes.e_f", when="modal")),
-)  # fmt: skip
+_NO_LOADS = Pass("no_loads", "body", "Loads begun from none.", (Copy(to=D + "body.e"),))
 
-#: What acts by where bodies are and how fast, the bodies' own loads apart: springs, loads, drag and
+
+def _across(whole: Pass, own: str) -> Run:
+    """Without what the elimination sees."""
+    return Run(whole=replace(sloped(whole), name=f"{whole.name}_across", skip=own), when="posed")
+
+
+#: What acts on a body by what others do: springs between bodies, loads in axes of other bodies and
 #: the values of expressions reach across the tree, so that the elimination does not see them.
 APPLIED_SLOPE = Sweep(
-    "applied_slope", "Derivative of what acts on bodies, and of the values of expressions.",
-    (*_MOVED_ALONG, _POSED, Run(whole=_NO_LOADS, when="posed"), *_ACTING),
+    "applied_slope", "Derivative of what acts across the tree, and of the values of expressions.",
+    (
+        *_MOVED_ALONG,
+        _POSED,
+        Run(whole=_NO_LOADS, when="posed"),
+        _across(LOADS, "own_load"),
+        _across(FORCES, "own_force"),
+    ),
 )  # fmt: skip
 
 
 # --- along the unknowns of one body -------------------------------------------------------------
 
 
-def _still(step: Call, *ports: str) -> Sloped:
-    """The derivative of a call in which these ports do not move."""
-    return Sloped(step.when, step.kernel + SLOPE, step.ports, still=ports)
-
-
 #: What the derivatives of a hinge or of a section are made into, and the numbers that go with them.
 _ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
 _CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
                 motion="body.motion", Q="local.carrier")  # fmt: skip
-_TURNED = {"theta": "local.turn", "x": "local.place"}
+_TURNED = {"theta": "local.turn", "x": "local.shift"}
 _TURN = call("frames.tangent_turned", R="hinge.R", d_R=D + "hinge.R", d_d=D + "hinge.d",
              **_TURNED)  # fmt: skip
 
@@ -128,7 +133,7 @@ def _column(b: str, g: str, laws: str) -> dict[str, str]:
 _CHANGES = {"s": "body.s"} | {f"d_{name}": f"{D}hinge.{name}" for name in ("H", "v", "w", "c")}
 
 
-def _along_modes(b: str, g: str) -> tuple[Step, ...]:
+def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
     """Where the derivatives of modes point: of a section and, in d:modes.felt, of the rows."""
     felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
                 tau="modes.felt")  # fmt: skip
@@ -136,7 +141,8 @@ def _along_modes(b: str, g: str) -> tuple[Step, ...]:
         Do(whole=sloped(SECTION_MOTION)),
         _TURN,
         call("generic{nu}.tangent_column", **_column(b, g, "none"), **_CHANGES),
-        _still(felt, "e"),
+        placed.column(b_p),
+        still(felt, "e"),
     )
 
 
@@ -148,26 +154,30 @@ def _section(matrices: str) -> tuple[Step, ...]:
             of="modes",
             steps=(
                 Copy(to=D + "modes.e_f"),
-                *_along_modes(f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]"),
+                *_along_modes(
+                    f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]", f"{matrices}.place_B[9 * c]"
+                ),
                 Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
             ),
         ),
     )
 
 
-def _along_hinge(b: str, g: str, laws: str) -> tuple[Step, ...]:
+def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
     """Where the derivatives of a hinge point; its rows in local.change."""
     column = _column(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
         Do(whole=HINGE_CHANGE, when="!steady"),
         Do(whole=HINGE_CHANGE, when="steady curved"),
+        Do(whole=HINGE_CHANGE, when="steady !curved placed"),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_TURNED),
         replace(_TURN, when="curved"),
         call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
         call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
         call("generic{nu}.tangent_column", when="!steady", **column, **_CHANGES),
+        placed.column(b_p),
     )  # fmt: skip
 
 
@@ -176,7 +186,9 @@ _HINGE = (
     Along(
         of="free",
         steps=(
-            *_along_hinge("tangent.B[9 * c]", "tangent.G[6 * c]", "tangent.laws[nu * c]"),
+            *_along_hinge(
+                "tangent.B[9 * c]", "tangent.G[6 * c]", "place.B[9 * c]", "tangent.laws[nu * c]"
+            ),
             Pick(to="tangent.W[speeds * c]", source="local.change"),
         ),
     ),
@@ -237,6 +249,7 @@ TANGENT_OWN = Pass(
     (
         Copy(to="tangent.laws", when="laws"),
         Do(whole=LAG, when="curved"),
+        *placed.BEGUN,
         call("body.load_by_motion", when="!modal", p="body.p", motion="body.motion",
              J="tangent.S"),
         *only(
@@ -245,6 +258,7 @@ TANGENT_OWN = Pass(
                 of="motion",
                 steps=(
                     Do(whole=sloped(MODAL_OWN)),
+                    placed.DRAGGED,
                     Move(to="tangent.S[6 * c]", source=D + "body.e", count="6"),
                     Move(to="bend.Z_z[n * c]", source=D + "modes.e_f", count="n"),
                 ),
@@ -253,11 +267,13 @@ TANGENT_OWN = Pass(
                 of="modes",
                 steps=(
                     Do(whole=sloped(MODAL_OWN)),
+                    placed.DRAGGED,
                     Move(to="bend.K[6 * c]", source=D + "body.e", count="6"),
                     Move(to="bend.Z_x[n * c]", source=D + "modes.e_f", count="n"),
                 ),
             ),
         ),
+        *placed.OWN_BY_PLACE,
         *only("modal !section", Copy(to="bend.B"), Copy(to="bend.G"), Copy(to="bend.W"),
               Copy(to="bend.still")),
     ),
@@ -277,15 +293,17 @@ TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
     (
         *only("modal section", *_section("bend")),
+        *placed.MODES_OWN,
         call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
              **_NODE),
         call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
              **_NODE),
         *only("modal", Copy(to="tangent.S", source="local.S_c")),
+        *placed.MODES_REDUCED,
+        *only("moving", *_HINGE, Pick(to="tangent.H", source="hinge.H", rows=6)),
+        *placed.HINGE_ROWS,
         *only(
             "moving",
-            *_HINGE,
-            Pick(to="tangent.H", source="hinge.H", rows=6),
             call("generic{free}.tangent_rows", H="tangent.H", B="tangent.B", W="tangent.W",
                  S="tangent.S", **_ROWS, D="local.D", one="local.one"),
             call("tangent.invert", n="free", fails="tangent", D="local.D", one="local.one",
@@ -293,10 +311,13 @@ TANGENT_CONDENSE = Pass(
             call("generic{free}.tangent_reduce", inverse="tangent.inverse", **_ROWS,
                  G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
         ),
+        *placed.HINGE_REDUCED,
         *only("outward", *_section("port")),
         call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
+        placed.CARRIED,
         call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
              B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
+        placed.ABSORBED,
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
@@ -304,7 +325,13 @@ TANGENT_CONDENSE = Pass(
 TANGENT = Sweep(
     "tangent",
     "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
-    (Run(whole=TANGENT_OWN), Run(whole=LAW_SLOPES), Run(whole=TANGENT_CONDENSE)),
+    (
+        Run(whole=TANGENT_OWN),
+        Run(whole=LAW_SLOPES),
+        Run(whole=placed.LOADS_BY_PLACE, when="posed"),
+        Run(whole=placed.FORCES_BY_PLACE, when="posed"),
+        Run(whole=TANGENT_CONDENSE),
+    ),
 )
 
 
@@ -377,12 +404,15 @@ def _behind_modes(*known: Step) -> tuple[Step, ...]:
         call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
         *only("outward", _MOVED),
+        *placed.PORT_DISPLACED,
+        *placed.MODES_LEFT,
         *only(
             "modal",
             call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
                  z_c=D + "body.motion", x="modes.answer", z="local.z"),
             _MOVED,
         ),
+        *placed.MODES_DISPLACED,
     )  # fmt: skip
 
 
@@ -390,7 +420,10 @@ TANGENT_ANSWERED = Pass(
     "tangent_answered", "body", "Unknowns that answer a right-hand side.",
     (
         Copy(to="body.answer"),
+        placed.MOVED,
+        *placed.HINGE_LEFT,
         *only("moving", call("generic{free}.tangent_answer", **_ANSWER), _SPREAD),
+        *placed.HINGE_DISPLACED,
         *_behind_modes(),
     ),
     skip="idle",
@@ -415,7 +448,8 @@ KNOWN_COLUMN = Pass(
     (
         _NO_LOAD,
         Copy(to=D + "body.tau", source="body.column"),
-        *only("modal", Copy(to=D + "body.motion"), Do(whole=sloped(MODAL_OWN)), _RIGHT),
+        *only("modal", Copy(to=D + "body.motion"), Copy(to=D + "body.v"),
+              Do(whole=sloped(MODAL_OWN)), placed.DRAGGED, _RIGHT),
     ),
 )  # fmt: skip
 
@@ -427,7 +461,7 @@ KNOWN_LAWS = Pass(
 _KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",
               e_S="local.seen", e_b="local.known")  # fmt: skip
 _KNOWN_ROWS = (
-    *_along_modes("tangent.known", "local.turned"),
+    *_along_modes("tangent.known", "local.turned", "place.known"),
     Copy(to=D + "modes.e_f", source=D + "modes.felt"),
 )
 _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
@@ -440,16 +474,17 @@ KNOWN_CARRIED = Pass(
         *only("section", _CARRIER, *_KNOWN_ROWS),
         *only("modal section", *_pushed("section.H")),
         *only("modal !section", *_pushed("bend.still")),
-        *only("section", _KNOWN),
+        *only("section", _KNOWN, placed.KNOWN),
         *only("outward", Add(to=D + "body.e", source="local.seen"), *_FELT_CHANGE,
               Add(to=D + "body.e", source="local.turned")),
         *only("modal section", _KNOWN_LOAD),
         *only(
             "moving",
             _CARRIER,
-            *_along_hinge("tangent.known", "local.turned", D + "body.tau"),
+            *_along_hinge("tangent.known", "local.turned", "place.known", D + "body.tau"),
             Pick(to="local.rows", source="local.change"),
             _KNOWN,
+            placed.KNOWN,
             call("generic{free}.tangent_push_known", **_PUSH, e_b="local.known"),
         ),
         _STILL,
@@ -461,9 +496,16 @@ KNOWN_ANSWERED = Pass(
     "known_answered", "body", "Unknowns that answer a right-hand side, beside what is known.",
     (
         Copy(to="body.answer"),
+        placed.MOVED,
+        *only("moving placed", placed.KNOWN_MOVED),
+        *placed.HINGE_LEFT,
         *only("moving", call("generic{free}.tangent_answer_known", **_ANSWER, b="tangent.known"),
               _SPREAD),
-        *_behind_modes(Add(to=D + "body.motion", source="tangent.known", when="section")),
+        *placed.HINGE_DISPLACED,
+        *_behind_modes(
+            Add(to=D + "body.motion", source="tangent.known", when="section"),
+            *only("section placed", placed.KNOWN_MOVED),
+        ),
     ),
     skip="idle",
 )  # fmt: skip

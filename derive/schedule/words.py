@@ -180,6 +180,11 @@ tangent.gain | 9 nu | rows by the motion, divided by those by the unknowns
 tangent.inverse | nu nu | inverse of the rows by the unknowns
 tangent.y | nu | what is left of the rows, divided by those by the unknowns
 tangent.known | 9 | change of motion across the connection that is known
+place.S | 54 | change of the load at P by that of the place, a row an entry of the place
+place.z | 9 | change of the place: turn, place and velocity of P, own axes
+place.known | 9 | change of place across the connection that is known
+place.B | 9 nu | change of place along the free speeds, a row a speed
+place.gain | 9 nu | rows by the place, divided by those by the unknowns
 tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
 tangent.turns | nq nq | slopes of the rates by the coordinates, a row a coordinate
 tangent.ways | nq nu | slopes of the rates by the speeds, a row a speed
@@ -198,10 +203,15 @@ bend.V | 6 n | load by the unknowns
 bend.D | n n | rows by the unknowns
 bend.right | 9 n | rows by the motion
 bend.gain | 9 n | D^-1 times them
+bend.place_B | 9 n | change of place along the modes, a row a mode
+bend.place_Z | 9 n | own rows by the place, a row an entry
+bend.place_right | 9 n | rows by the place
+bend.place_gain | 9 n | D^-1 times them
 bend.work | n n | factors of D
 bend.rest | n | what is left of the rows
 bend.y | n | D^-1 times it
 port.B | 9 n | as bend.B, of an end that follows the modes
+port.place_B | 9 n | as bend.place_B
 port.G | 6 n | as bend.G
 port.W | n n | as bend.W
 port.K | 6 n | S B of what hangs on the end
@@ -217,6 +227,8 @@ shapes.right | 7 n | right-hand sides of the modal elimination
 shapes.gain | 7 n | etadd = g - G a: columns of G, then -g
 law.slopes | nu | change of the law's efforts along the speed at hand
 inboard.S | 54 | tangent.S of the parent
+inboard.place | 54 | place.S of the parent
+inboard.z | 9 | place.z of the parent
 step.rate | 1 | change of the speeds along the unknowns
 step.q | 1 | inverse time by which coordinates follow speeds
 step.kappa | 1 | whether the rates' own slopes count
@@ -275,6 +287,9 @@ TRAITS: dict[str, str] = {
     "driven": "there are drives",
     "valued": "efforts or loads are expressions",
     "flexible": "there are flexible bodies",
+    "placed": "loads on the body or outboard of it change with its place and nothing else",
+    "own_load": "the load changes with the place of its body and nothing else",
+    "own_force": "the element is between a body and the ground",
     "posed": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
     "product": "the product of classical matrices is asked for too",

@@ -182,6 +182,9 @@ _DIRECTIONS = {
     "law": "every unknown c that goes with a speed of the law",
     "modes": "every mode c, and what changes with it in a step",
     "motion": "every entry c of the body's motion",
+    "spin": "every entry c of the body's angular velocity",
+    "place": "every entry c of a change of the body's place",
+    "turn": "every entry c of a turn of the body",
 }
 
 

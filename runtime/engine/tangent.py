@@ -7,16 +7,12 @@ R and its tangent, eliminated from the tips to the root (derive/equations/tangen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.ir import Assign, Element, KernelIR, Operand, Store, Temporary
-
-from ..pack.system import LoadNumbers, System
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -112,65 +108,16 @@ class Tangent:
 
 def _couplings(engine: Engine) -> tuple[list[Any], int]:
     """The record of what reaches across the tree with what keeps it, and how many numbers it is."""
-    packed, ffi = engine.packed, engine.ffi
-    system = packed.system
-    depends = _depends_on_state(system.values)
-    acted = {load.body for load in system.loads if _turns(load, depends)}
-    acted |= {body for force in system.forces for body, _, _ in force.ends}
-    efforts = _efforts_of_state(system, depends)
-    drags = system.dragged
-    bodies = sorted((acted | set(drags)) - {-1})
+    ffi, reach = engine.ffi, engine.packed.written.reach
     record = ffi.new("mstmm_couplings *")
     kept = [record]
-    for name, numbers in (
-        ("bodies", bodies), ("drags", drags), ("values", [v for v, _ in efforts]),
-        ("speeds", [j for _, j in efforts]),
-    ):  # fmt: skip
-        array = ffi.new("int[]", numbers or [0])
+    values, speeds = [v for v, _ in reach.efforts], [j for _, j in reach.efforts]
+    for name, numbers in (("bodies", reach.across), ("values", values), ("speeds", speeds)):
+        array = ffi.new("int[]", list(numbers) or [0])
         kept.append(array)
         setattr(record, name, array)
-    record.n_bodies, record.n_drags, record.n_efforts = len(bodies), len(drags), len(efforts)
-    modes = sum(modal.n for i in drags if (modal := system.body(i).modal))
-    return kept, 6 * len(bodies) + modes + len(efforts)
-
-
-def _efforts_of_state(system: System, depends: Sequence[bool]) -> list[tuple[int, int]]:
-    """(value, speed) of every effort of a law that an expression of the state gives."""
-    first = system.places["u"]
-    return [
-        (value, int(first[body]) + law.speed + j)
-        for run in system.laws
-        if any(x >= 0 and depends[x] for law in run.pattern for some in law.efforts for x in some)
-        for law, body, _, values in run.each()
-        for j, value in enumerate(values)
-        if value >= 0 and depends[value]
-    ]
-
-
-def _turns(load: LoadNumbers, depends: Sequence[bool]) -> bool:
-    """Whether a load changes with the state, seen from its body."""
-    places = (*load.force, *load.moment)
-    return load.axes != load.body or any(depends[place] for place in places if place >= 0)
-
-
-def _depends_on_state(values: KernelIR | None) -> list[bool]:
-    """Whether each value of the scene's expressions reads coordinates or speeds."""
-    if values is None:
-        return []
-    reads: dict[int, bool] = {}
-    found = [False] * values.outputs[0].length(1)
-
-    def moving(operand: Operand) -> bool:
-        if isinstance(operand, Temporary):
-            return reads[operand.number]
-        return isinstance(operand, Element) and operand.port in ("q", "u")
-
-    for statement in values.statements:
-        if isinstance(statement, Assign):
-            reads[statement.number] = any(map(moving, statement.args))
-        elif isinstance(statement, Store):
-            found[int(statement.index[0])] = moving(statement.value)
-    return found
+    record.n_bodies, record.n_efforts = len(reach.across), len(reach.efforts)
+    return kept, 6 * len(reach.across) + len(reach.efforts)
 
 
 def _laid(engine: Engine) -> int:

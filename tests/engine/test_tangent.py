@@ -224,3 +224,56 @@ def test_undetermined_motion_is_named() -> None:
     tangent.residual(0.0, np.array([0.2, np.pi / 2, 0.1]), still, still)
     with pytest.raises(NumericalFailure, match=r'hinge "eye".*undetermined'):
         tangent.factor(10.0, 10.0, 1.0)
+
+
+def pushed_everywhere(count: int) -> tuple[Scene, Array, Array]:
+    """Rods on pins and balls, every tip on a spring to the ground and under a force in space."""
+    kinds = [
+        {"type": "ball"} if k % 3 else {"type": "pin", "axis": [0, 1, 0]} for k in range(count)
+    ]
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.09, 0.09]}
+    rods = [rod | {"name": f"rod{k}", "ends": {"tip": [1, 0.1, 0]}} for k in range(count)]
+    inboard = ["ground", *(f"rod{k}.tip" for k in range(count - 1))]
+    scene = {
+        "schema_version": 1,
+        "gravity": [0, 0, -9.81],
+        "body": rods,
+        "hinge": [
+            kind | {"name": f"hinge{k}", "inboard": inboard[k], "outboard": f"rod{k}"}
+            for k, kind in enumerate(kinds)
+        ],
+        "load": [
+            {"on": f"rod{k}.tip", "force": [0, "2*sin(t)", 1.0], "moment": [0.3, 0, 0.1]}
+            for k in range(count)
+        ],
+        "spring": [
+            {"from": "ground", "to": f"rod{k}.tip", "position": [k + 1.0, 0, 1.0],
+             "law": {"stiffness": 200.0, "damping": 3.0, "rest": 0.8, "effort": "0.2*u"}}
+            for k in range(count)
+        ],
+    }  # fmt: skip
+    return scene, *random_scenes.random_state(scene, count)
+
+
+def test_loads_that_feel_their_body_alone_are_eliminated(rng: Generator) -> None:
+    """A load on each of many bodies leaves nothing to close behind the sweep."""
+    scene, q, u = pushed_everywhere(30)
+    assert compiled(scene)[1].coupled == 0
+    check_solution(scene, q, u, rng)
+
+
+def test_tangent_is_the_same_whatever_was_asked_before(rng: Generator) -> None:
+    """Directions leave their marks in the workspaces, of which the elimination must not know."""
+    scene, q, u = pushed_everywhere(4)
+    scene["spring"].append({"from": "rod0.tip", "to": "rod3.tip", "law": {"stiffness": 50.0}})
+    _, tangent = compiled(scene)
+    a, right = rng.normal(size=tangent.nu), rng.normal(size=tangent.nu)
+
+    def answer() -> Array:
+        tangent.residual(TIME, q, u, a)
+        tangent.factor(200.0, 200.0, SHARE)
+        return tangent.solve(right)
+
+    first = answer()
+    tangent.slope(1.0, *(rng.normal(size=n) for n in (tangent.nq, tangent.nu, tangent.nu)))
+    assert np.array_equal(answer(), first)

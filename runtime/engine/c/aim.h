@@ -84,6 +84,19 @@ static inline int mstmm_judged(mstmm_state *state, int code)
     return 0;
 }
 
+/* The body of an element that has an end on the ground. */
+static inline int mstmm_held(const mstmm_force *force)
+{
+    return force->body_f < 0 && force->body_t >= 0 ? force->body_t : force->body_f;
+}
+
+/* Numbers by place of a body that is placed, or (-1) of the ground: behind its S. */
+static inline real *mstmm_place_at(const mstmm_state *state, int body)
+{
+    const int64_t place = body < 0 ? MSTMM_TANGENT_B(0, 0) : state->model->bodies[body].place;
+    return state->tangents->numbers + place;
+}
+
 /* S of the tangent, of a body or (-1) of the ground. */
 static inline real *mstmm_tangent_at(const mstmm_state *state, int body)
 {

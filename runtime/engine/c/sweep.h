@@ -57,6 +57,8 @@ typedef struct {
     int steady;       /* H is the same in every position */
     int turning;      /* and has turns alone */
     int64_t tangent;  /* of its numbers in those of the tangent */
+    int64_t place;    /* and of those by place, where it is placed */
+    int placed;       /* loads on it or outboard of it change with its place and nothing else */
     mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
     mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
     int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
@@ -97,11 +99,13 @@ typedef struct {
     real axes_own[9]; /* those axes in the body's internal ones */
     real offset[3];
     int force[3], moment[3]; /* places among the expression values, -1 for zero */
+    int own;          /* it changes with the place of its body and nothing else */
 } mstmm_load;
 
 /* Massless element between an end F and an end T; body -1 is the ground. */
 typedef struct {
     int body_f, body_t;
+    int own; /* one end is on the ground, and no expression of the state acts */
     real axes_f[9], axes_t[9], offset_f[3], offset_t[3];
     const mstmm_tape *effort; /* t, q, u, [length, its rate] -> given effort; NULL for none */
     const mstmm_tape *effort_slope; /* t, q, u, [length, its rate], their derivatives -> its own */

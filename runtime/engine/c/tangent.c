@@ -14,13 +14,18 @@ int64_t mstmm_port_numbers(int n);
 
 int64_t mstmm_tangent_lay(mstmm_model *model)
 {
-    int64_t place = 54; /* S of the ground, which nobody reads */
+    /* The ground has an S that nobody reads, and a place that does not change. */
+    int64_t place = MSTMM_TANGENT_B(0, 0) + MSTMM_PLACE_NUMBERS(0, 0);
     for (int i = 0; i < model->n_bodies; i++) {
         mstmm_body *body = &model->bodies[i];
         const int known = body->slope_tape || body->hinge_slope;
         if (!known || !body->bias_load_slope || !body->load_by_motion) return -1 - i;
         body->tangent = place;
         place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
+        if (body->placed) {
+            body->place = place;
+            place += MSTMM_PLACE_NUMBERS(body->nu, body->nq);
+        }
         if (body->modal) {
             body->modal->tangent = place;
             place += mstmm_bend_numbers(body->modal->n);
@@ -252,13 +257,7 @@ static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
     const mstmm_model *model = at->model;
     if (k < 6 * all->n_bodies)
         return mstmm_block(model, slope->workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E + k % 6;
-    k -= 6 * all->n_bodies;
-    for (int i = 0; i < all->n_drags; i++) {
-        const mstmm_modal *modal = model->bodies[all->drags[i]].modal;
-        if (k < modal->n) return slope->workspace + modal->place + MSTMM_MODES_E_F(modal->n) + k;
-        k -= modal->n;
-    }
-    return mstmm_values(slope) + all->values[k];
+    return mstmm_values(slope) + all->values[k - 6 * all->n_bodies];
 }
 
 /* The change of every coupling along x and increments that are known (NULL: none). */
@@ -357,6 +356,7 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
     /* With couplings left out a body may topple that they hold. */
     int negative = 0;
     if (at->n_coupled) step.negative = &negative;

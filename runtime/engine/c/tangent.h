@@ -7,11 +7,10 @@
 
 /* cdef begin */
 /* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
- * where bodies are, and efforts that expressions of the state give. */
+ * what other bodies do, and efforts that expressions of the state give. */
 typedef struct {
-    int n_bodies, n_drags, n_efforts;
+    int n_bodies, n_efforts;
     const int *bodies; /* on which such loads act: 6 numbers each */
-    const int *drags;  /* flexible bodies with drag: a number a mode */
     const int *values, *speeds; /* an expression's value, and the speed that it acts on */
 } mstmm_couplings;
 

@@ -9,6 +9,7 @@ from mstmm.arrays import Integers
 
 from ...kernels import prebuilt
 from ..elements import Elements
+from ..reach import Reach, reach_of
 from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
 from .laws import LawRecords
@@ -32,6 +33,7 @@ class Written:
     sections: dict[int, int]
     scratch: int
     slots: int
+    reach: Reach
 
 
 def write(system: System, elements: Elements) -> Written:
@@ -51,20 +53,32 @@ def write(system: System, elements: Elements) -> Written:
     model.drive_tape = memory.expression(system.drives)
     laws = LawRecords(system, memory)
     model.laws, model.n_laws = laws.records.array, laws.records.count
+    reach = reach_of(system)
+    for place in reach.placed:
+        bodies.records.array[place].placed = 1
     loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
-    for record, load in zip(loads, system.loads, strict=False):
+    for record, load, own in zip(loads, system.loads, reach.loads, strict=False):
         _load(record, load)
+        record.own = int(own)
     model.loads, model.n_loads = loads, len(system.loads)
     forces = memory.new("mstmm_force[]", max(1, len(system.forces)))
-    for record, force in zip(forces, system.forces, strict=False):
+    for record, force, own in zip(forces, system.forces, reach.forces, strict=False):
         _force(record, force, elements, memory)
+        record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     scratch = attach_runs(model, system, memory, lib, bodies.end)
     modal = bodies.modal
     return Written(
-        model, memory.kept, bodies.blocks, modal.modal, modal.sections, scratch, memory.slots
+        model,
+        memory.kept,
+        bodies.blocks,
+        modal.modal,
+        modal.sections,
+        scratch,
+        memory.slots,
+        reach,
     )
 
 

@@ -1,0 +1,113 @@
+"""How far loads reach: those that change with the place of their own body alone, and the others.
+
+A load in the axes of space, a force element to the ground and drag change with where their body is
+and how fast it goes: the tangent of the sweep takes them along.  Loads in axes of other bodies,
+springs between bodies and what expressions of the state give reach across the tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mstmm.ir import Assign, Element, KernelIR, Operand, Store, Temporary
+from mstmm.ir.kernel import reads
+
+from .system import ForceNumbers, LoadNumbers, System
+
+GROUND = -1
+
+
+@dataclass(frozen=True)
+class Reach:
+    """`loads` and `forces` say of each whether it changes with the place of its body alone;
+    `placed` are the places of the bodies that lead to such loads, `across` those on which others
+    act, `efforts` (value, speed) of every effort of a law that an expression of the state gives."""
+
+    loads: tuple[bool, ...]
+    forces: tuple[bool, ...]
+    placed: tuple[int, ...]
+    across: tuple[int, ...]
+    efforts: tuple[tuple[int, int], ...]
+
+
+def reach_of(system: System) -> Reach:
+    """What the loads of a system reach."""
+    depends = _depends_on_state(system.values)
+    turning = [_turns(load) for load in system.loads]
+    read = [_reads_state(load, depends) for load in system.loads]
+    loads = tuple(
+        turns and not reading and load.axes == GROUND
+        for load, turns, reading in zip(system.loads, turning, read, strict=True)
+    )
+    forces = tuple(map(_to_ground, system.forces))
+    own = {load.body for load, alone in zip(system.loads, loads, strict=True) if alone}
+    across = {
+        load.body
+        for load, alone, turns, reading in zip(system.loads, loads, turning, read, strict=True)
+        if not alone and (turns or reading)
+    }
+    for force, alone in zip(system.forces, forces, strict=True):
+        (own if alone else across).update(body for body, _, _ in force.ends)
+    return Reach(
+        loads, forces, _to_the_root(system, own | set(system.dragged)),
+        tuple(sorted(across - {GROUND})), tuple(_efforts_of_state(system, depends)),
+    )  # fmt: skip
+
+
+def _to_the_root(system: System, bodies: set[int]) -> tuple[int, ...]:
+    """The bodies and all that are inboard of them."""
+    parents, found = system.parents, set[int]()
+    for body in bodies:
+        while body != GROUND and body not in found:
+            found.add(body)
+            body = int(parents[body])
+    return tuple(sorted(found))
+
+
+def _turns(load: LoadNumbers) -> bool:
+    """Whether a load turns against the axes of its body."""
+    return load.axes != load.body
+
+
+def _reads_state(load: LoadNumbers, depends: Sequence[bool]) -> bool:
+    return any(depends[place] for place in (*load.force, *load.moment) if place >= 0)
+
+
+def _to_ground(force: ForceNumbers) -> bool:
+    ends = [body for body, _, _ in force.ends]
+    effort = force.effort
+    told = effort is not None and (reads(effort, "q") or reads(effort, "u"))
+    return ends.count(GROUND) == 1 and not told
+
+
+def _efforts_of_state(system: System, depends: Sequence[bool]) -> list[tuple[int, int]]:
+    first = system.places["u"]
+    return [
+        (value, int(first[body]) + law.speed + j)
+        for run in system.laws
+        if any(x >= 0 and depends[x] for law in run.pattern for some in law.efforts for x in some)
+        for law, body, _, values in run.each()
+        for j, value in enumerate(values)
+        if value >= 0 and depends[value]
+    ]
+
+
+def _depends_on_state(values: KernelIR | None) -> list[bool]:
+    """Whether each value of the scene's expressions reads coordinates or speeds."""
+    if values is None:
+        return []
+    reading: dict[int, bool] = {}
+    found = [False] * values.outputs[0].length(1)
+
+    def moving(operand: Operand) -> bool:
+        if isinstance(operand, Temporary):
+            return reading[operand.number]
+        return isinstance(operand, Element) and operand.port in ("q", "u")
+
+    for statement in values.statements:
+        if isinstance(statement, Assign):
+            reading[statement.number] = any(map(moving, statement.args))
+        elif isinstance(statement, Store):
+            found[int(statement.index[0])] = moving(statement.value)
+    return found
