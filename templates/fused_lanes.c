@@ -24,8 +24,14 @@ MSTMM_INLINE lanes_t lanes_number(mask_t truth)
 {
     return (lanes_t)(truth & (mask_t)lanes_all(1.0));
 }
-MSTMM_INLINE lanes_t lanes_min(lanes_t a, lanes_t b) { return lanes_select((a < b) | (a != a), a, b); }
-MSTMM_INLINE lanes_t lanes_max(lanes_t a, lanes_t b) { return lanes_select((a < b) | (b != b), b, a); }
+MSTMM_INLINE lanes_t lanes_min(lanes_t a, lanes_t b)
+{
+    return lanes_select((a < b) | (a != a), a, b);
+}
+MSTMM_INLINE lanes_t lanes_max(lanes_t a, lanes_t b)
+{
+    return lanes_select((a < b) | (b != b), b, a);
+}
 MSTMM_INLINE lanes_t lanes_sign(lanes_t a)
 {
     const lanes_t minus = lanes_select(a < lanes_all(0.0), lanes_all(-1.0), a);
@@ -87,6 +93,7 @@ MSTMM_LANES_TWO(pow) MSTMM_LANES_TWO(atan2)
 
 MSTMM_INLINE int lanes_sincos_near(lanes_t x)
 {
-    return lanes_every((x >= lanes_all(-MSTMM_SINCOS_RANGE)) & (x <= lanes_all(MSTMM_SINCOS_RANGE)));
+    return lanes_every((x >= lanes_all(-MSTMM_SINCOS_RANGE)) &
+                       (x <= lanes_all(MSTMM_SINCOS_RANGE)));
 }
 MSTMM_SINCOS(lanes_t, mask_t, MSTMM_LANES, lanes_sincos)

@@ -56,8 +56,8 @@ MSTMM_INLINE int mstmm_block(int i, int width)
     return width >= MSTMM_LANES && i + MSTMM_LANES > width ? width - MSTMM_LANES : i;
 }
 
-/* Rows of `width` numbers -> lanes, of `left` states that are left; lanes without a state repeat the
- * last row. */
+/* Rows of `width` numbers -> lanes, of `left` states that are left; lanes without a state repeat
+ * the last row. */
 MSTMM_INLINE void mstmm_load(lanes_t *lanes, const double *rows, int width, long long stride,
                              long long left)
 {
@@ -76,7 +76,8 @@ MSTMM_INLINE void mstmm_load(lanes_t *lanes, const double *rows, int width, long
         return;
     }
     for (int i = 0; i < width; i++)
-        for (int k = 0; k < MSTMM_LANES; k++) lanes[i][k] = rows[(k < left ? k : left - 1) * stride + i];
+        for (int k = 0; k < MSTMM_LANES; k++)
+            lanes[i][k] = rows[(k < left ? k : left - 1) * stride + i];
 }
 
 /* Lanes -> rows, for the lanes that have a state. */
@@ -90,7 +91,8 @@ MSTMM_INLINE void mstmm_keep(double *rows, const lanes_t *lanes, int width, long
             for (int k = 0; k < MSTMM_LANES; k++) v[k] = lanes[from + k < width ? from + k : from];
             mstmm_turn(v);
 #pragma GCC unroll 8
-            for (int k = 0; k < MSTMM_LANES; k++) *(lanes_array_t *)(rows + k * width + from) = v[k];
+            for (int k = 0; k < MSTMM_LANES; k++)
+                *(lanes_array_t *)(rows + k * width + from) = v[k];
         }
         return;
     }

@@ -18,7 +18,10 @@ static void repeat(int64_t count, int lanes, const real *from, real *to)
         for (int j = 0; j < lanes; j++) to[i * lanes + j] = from[i];
 }
 
-static real *lanes_efforts(const mstmm_scene_run *run) { return run->fused_numbers + run->fused->nu; }
+static real *lanes_efforts(const mstmm_scene_run *run)
+{
+    return run->fused_numbers + run->fused->nu;
+}
 
 static real *lanes_p(const mstmm_scene_run *run)
 {

@@ -17,8 +17,8 @@ void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const ms
                           const real *p, real *numbers);
 /* Numbers that `mstmm_implicit_by_code` needs room for. */
 int64_t mstmm_implicit_code_size(const mstmm_fused *fused);
-/* From now on implicit methods go by `fused`; p holds the numbers that it reads.  To be called behind
- * mstmm_scene_implicit.  Everything given must live as long as the run. */
+/* From now on implicit methods go by `fused`; p holds the numbers that it reads.  To be called
+ * behind mstmm_scene_implicit.  Everything given must live as long as the run. */
 void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, const real *p,
                             real *numbers);
 

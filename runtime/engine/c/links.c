@@ -25,7 +25,7 @@ MSTMM_SINCOS(two_t, two_bits_t, 2, two_sincos)
 /* Numbers of S and e side by side, as they travel from link to link. */
 #define CARRIED 27
 
-/* --- splitting into runs ----------------------------------------------------------------------- */
+/* --- splitting into runs ---------------------------------------------------------------------- */
 
 static int continues(const mstmm_model *model, const mstmm_branch *run, const int *children, int i)
 {
@@ -105,7 +105,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
     return n;
 }
 
-/* --- passes ------------------------------------------------------------------------------------- */
+/* --- passes ----------------------------------------------------------------------------------- */
 
 /* Bias motion or deviation of what a run hangs on: a link, or a body's or the ground's block. */
 static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, int in_block)

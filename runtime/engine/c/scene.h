@@ -24,7 +24,7 @@ typedef struct {
     int n_probes;
     const mstmm_probe *probes;
     real *points;  /* n_probes x MSTMM_PROBE_NUMBERS, or NULL */
-    real *loads;   /* n_bodies x 6: force and moment of each inboard hinge, inertial axes, or NULL */
+    real *loads; /* n_bodies x 6: force and moment of each inboard hinge, inertial axes, or NULL */
     real *efforts; /* nu: H^T f + J udot, what laws and drives put in, or NULL */
     real *udot;    /* nu, or NULL */
     real *sums;    /* MSTMM_SUM_NUMBERS, or NULL */
@@ -48,7 +48,7 @@ typedef struct {
     int release;
 } mstmm_event_action;
 
-/* Code compiled for what implicit methods ask, and the looped engine's way, which it falls back on */
+/* Code compiled for what implicit methods ask, and the looped engine's way, its last resort */
 typedef struct {
     const mstmm_fused *fused; /* NULL: there is none */
     const real *p;
@@ -92,7 +92,8 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system);
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
 /* The same for n states in rows of `width` numbers, each with its own memory; the run's memory is
- * what it was, the rows take the turns they end in.  Returns the code of the first that fails, the others are settled all the same. */
+ * what it was, the rows take the turns they end in.  Returns the code of the first that fails, the
+ * others are settled all the same. */
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
                             real *memory, real *y);
 /* cdef end */

@@ -36,7 +36,8 @@ int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
     return mstmm_tape_run(body->slope_tape, inputs, mstmm_slots(state), outputs);
 }
 
-int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length, real *value)
+int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,
+                       real *value)
 {
     const real *inputs[] = {&state->t, state->q, state->u, length};
     real *outputs[] = {value};
@@ -87,7 +88,8 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
                              mstmm_balance *balance, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .qdot = qdot, .udot = udot, .balance = balance, .observed = 1,
+                         .memory = memory, .qdot = qdot, .udot = udot, .balance = balance,
+                         .observed = 1,
                          .failure = failure};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);

@@ -47,7 +47,8 @@ typedef struct {
     const int *imposed_mask; /* per speed: 1 where imposed */
     int release;      /* place in memory that is non-zero once they are free; -1: never */
     const real *connection; /* Rt (9), ro (3) */
-    const real *link; /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    const real *link;
     real held[3];     /* the hinge's own P from the origin of the body's frame */
     const real *hinge_p, *body_p;
     const real *rotor;       /* reflected inertia per speed */
@@ -218,7 +219,7 @@ typedef struct mstmm_tangents {
     real rate, s, sq, kappa;
     int laws_alone;       /* kappa counts for nothing: see mstmm_laws_factor */
     int shifted;          /* some increments of a right-hand side are known */
-    int *negative;        /* whether the determinant is so far; NULL: one of a body's is a failure */
+    int *negative; /* whether the determinant is so far; NULL: one of a body's is a failure */
     const real *rho;      /* nq: what the rates lack */
     real *change;         /* nq: change of the coordinates */
     real *unit;           /* a load that is one in a right-hand side; NULL: none */
@@ -319,7 +320,8 @@ static inline real mstmm_value_at(const mstmm_state *state, int place)
 }
 
 /* Given effort of a force element, by the distance of its ends and its rate. */
-int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length, real *value);
+int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,
+                       real *value);
 /* Its derivative along the direction at hand. */
 int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *slope, const real *length,
                              const real *d_length, real *d_value);

@@ -57,7 +57,9 @@ static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
 static double auxiliary(const mstmm_work *work, int i) {
   const double now = work->k[work->implicit->n_q + i], before = work->run->real.h_previous;
   const double kept = mstmm_row_behind(work, work->y)[i];
-  return before > 0.0 && !work->tableau->backward ? now + (kept - now) * (work->run->real.h / before) : now;
+  return before > 0.0 && !work->tableau->backward
+             ? now + (kept - now) * (work->run->real.h / before)
+             : now;
 }
 
 /* Part of the auxiliary acceleration at the end that is known */
@@ -125,8 +127,8 @@ static void remember(const mstmm_work *work, const mstmm_newton_equations *stage
     behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i] : known_part(work, i) + part * a[i];
 }
 
-/* The step as a whole in k_1, its error in k_2 (O. C. Zienkiewicz, Y. M. Xie, Earthquake Engineering
- * and Structural Dynamics 20 (1991) 871-887) */
+/* The step as a whole in k_1, its error in k_2 (O. C. Zienkiewicz, Y. M. Xie, Earthquake
+ * Engineering and Structural Dynamics 20 (1991) 871-887) */
 static int fill_rows(const mstmm_work *work, double t) {
   const int n_u = work->implicit->n_u;
   const double h = work->run->real.h, part = work->tableau->error_constant * h;
@@ -143,7 +145,8 @@ int mstmm_alpha_stages(const mstmm_work *work) {
   const mstmm_tableau *tableau = work->tableau;
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double h = work->run->real.h, collocation = tableau->collocation;
-  mstmm_newton_equations stage = {.t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
+  mstmm_newton_equations stage = {
+      .t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
   if (has_history(work))
     map_backward(work, &stage, h);
   else

@@ -1,10 +1,12 @@
-/* The sign that another kind of method would suit a run better, and the change to it between steps. */
+/* The sign that another kind of method would suit a run better, and the change to it between
+ * steps. */
 #include <string.h>
 
 #include "step.h"
 
 /* So many other steps in a row, and those that spoke for a change before count no more (as in the
- * codes of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.2). */
+ * codes of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section
+ * IV.2). */
 enum { FORGOTTEN_AFTER = 6 };
 
 void mstmm_watch_sign(mstmm_run *run, int limited) {

@@ -108,8 +108,8 @@ static int search_maximum(const mstmm_work *work, int i, const double *at, const
     const int status = values(work, x, work->g_trial);
     if (status) return status;
     const double value = work->g_trial[i];
-    if (reached(work, i, value)) return locate(work, i, x < t[1] ? t[0] : t[1], x < t[1] ? v[0] : v[1], x,
-                                    value, root);
+    if (reached(work, i, value))
+      return locate(work, i, x < t[1] ? t[0] : t[1], x < t[1] ? v[0] : v[1], x, value, root);
     const int upper = value > v[1] ? x > t[1] : x < t[1]; /* which neighbour to replace */
     const int middle = value > v[1];
     if (upper) {

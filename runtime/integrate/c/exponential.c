@@ -1,6 +1,6 @@
 /* An exponential Rosenbrock method.  At a step's start the motion is linearised,
- * y' = f + J (y - y_0) + f_t (t - t_0) + what is left, and its linear part, however fast it swings, is
- * followed exactly:
+ * y' = f + J (y - y_0) + f_t (t - t_0) + what is left, and its linear part, however fast it swings,
+ * is followed exactly:
  *
  *   Y = y_0 + h phi_1(h J) f + h^2 phi_2(h J) f_t
  *   y_1 = Y + 2 h phi_3(h J) D,   D = f(t_1, Y) - f - J (Y - y_0) - h f_t
@@ -9,8 +9,8 @@
  * D theta^2, so that dense output is the same motion at an earlier time.
  *
  * J comes from derivatives along single coordinates and speeds, the lower half of it and f_t behind
- * the inverse of the mass matrix.  Rows of what somebody imposes are zero, and so are those of f, f_t
- * and D: neither J nor the error knows of them.
+ * the inverse of the mass matrix.  Rows of what somebody imposes are zero, and so are those of f,
+ * f_t and D: neither J nor the error knows of them.
  *
  * M. Hochbruck, A. Ostermann, J. Schweitzer, Exponential Rosenbrock-type methods, SIAM Journal on
  * Numerical Analysis 47 (2009) 786-803. */

@@ -1,5 +1,5 @@
-/* What the implicit methods share: the calls of the system, the norm of their errors, and what a step
- * needs once it is accepted. */
+/* What the implicit methods share: the calls of the system, the norm of their errors, and what a
+ * step needs once it is accepted. */
 #include "implicit_step.h"
 
 #include <math.h>
@@ -24,7 +24,8 @@ int mstmm_step_residual(const mstmm_work *work, double t, const double *row, dou
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
-int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq) {
+int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
+                     double *dq) {
   const mstmm_implicit *at = work->implicit;
   if (!at->rates) {
     memcpy(dq, u, (size_t)at->n_q * sizeof *dq);
@@ -98,8 +99,8 @@ int mstmm_implicit_stages(const mstmm_work *work) {
 
 /* The error of quadrature i of the step: the highest difference of its rates, squared against their
  * size, which has the order of the rule where they are smooth and is their size where they are not
- * (R. Piessens and others, QUADPACK, 1983, judge alike).  To where the error estimate finds it; what
- * the last stage of it stands for is known by then. */
+ * (R. Piessens and others, QUADPACK, 1983, judge alike).  To where the error estimate finds it;
+ * what the last stage of it stands for is known by then. */
 static void estimate_quadrature(const mstmm_work *work, int i) {
   const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
   const int rest = mstmm_n_rest(work), n = work->tableau->n_inner + 2, last = terms.count - 1;
@@ -253,8 +254,8 @@ int64_t mstmm_increment_worst(const mstmm_work *work) {
   return worst_of(work, work->y_stage, work->implicit->n_q + work->implicit->n_u);
 }
 
-/* A step over which speeds and accelerations of the start displace by 1 % of the tolerance, were they
- * of the order of the estimate: a guess, which the estimate corrects in a step or two. */
+/* A step over which speeds and accelerations of the start displace by 1 % of the tolerance, were
+ * they of the order of the estimate: a guess, which the estimate corrects in a step or two. */
 double mstmm_implicit_first_step(const mstmm_work *work, double interval) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u, n = work->system->n_error;
   const int *coordinates = work->implicit->coordinates;

@@ -8,8 +8,8 @@
  * K, C, M are the slopes of R in q, u, a.  Functions return 0 or a failure code. */
 typedef struct mstmm_implicit {
   int n_q, n_u;
-  /* n_u: a coordinate that each speed changes, whose tolerance weighs the speed's error.  NULL, where
-   * there are as many coordinates as speeds: the one of the same number. */
+  /* n_u: a coordinate that each speed changes, whose tolerance weighs the speed's error.  NULL,
+   * where there are as many coordinates as speeds: the one of the same number. */
   const int *coordinates;
   /* R (n_u); work: rates of the quadratures, or NULL.  Rows of speeds that somebody imposes are
    * zero; what a drive prescribes is filled in by t, whatever y and a say of it. */
@@ -19,9 +19,9 @@ typedef struct mstmm_implicit {
   int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
   /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, nobody does */
   int (*rates)(void *context, const double *q, const double *u, double *dq);
-  /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du, dq = W du,
-   * W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base.  With kappa
-   * 0 solutions are asked for without rho. */
+  /* Takes (t, y, a) as the base point and factors K W + C + s M for increments da = s du and
+   * dq = W du, W = (sq - kappa g_q)^-1 N, where g_q is the slope of N(q) u in q at the base.
+   * With kappa 0 solutions are asked for without rho. */
   int (*tangent)(void *context, double t, const double *y, const double *a, double s, double sq,
                  int kappa);
   /* The same with slopes of laws in place of K and C, which costs about as much as a solution: an

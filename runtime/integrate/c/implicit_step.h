@@ -11,7 +11,8 @@
 void mstmm_implicit_restart(const mstmm_work *work);
 /* From the slope at the start to y_new and the error. */
 int mstmm_implicit_stages(const mstmm_work *work);
-/* What an accepted step needs besides: the slope at its end, quadratures, dense output if wanted. */
+/* What an accepted step needs besides: the slope at its end, quadratures, dense output if
+ * wanted. */
 int mstmm_implicit_finish(const mstmm_work *work, int wants_dense);
 double mstmm_implicit_norm(const mstmm_work *work, double *absolute);
 int64_t mstmm_implicit_worst(const mstmm_work *work);
@@ -23,15 +24,16 @@ int mstmm_rosenbrock_stages(const mstmm_work *work);
 int mstmm_dirk_stages(const mstmm_work *work);
 int mstmm_alpha_stages(const mstmm_work *work);
 int mstmm_exponential_stages(const mstmm_work *work);
-/* Coordinates and speeds inside the step at hand: exactly what its forces make of them, however often
- * the motion swings in it. */
+/* Coordinates and speeds inside the step at hand: exactly what its forces make of them, however
+ * often the motion swings in it. */
 void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y);
 
 /* ---- the system, with its failures and counts; a row holds its accelerations ---- */
 
 int mstmm_step_impose(const mstmm_work *work, double t, double *row);
 int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
-int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u, double *dq);
+int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
+                     double *dq);
 /* `laws`: that of laws alone */
 int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
                   int kappa, int laws);

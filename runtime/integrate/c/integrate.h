@@ -86,12 +86,13 @@ typedef struct mstmm_tableau {
   double error_constant; /* Alpha: of h^2 times the change of acceleration */
   int backward;          /* Alpha: Houbolt's differences, after two steps by the constants above */
   int one_iteration;     /* Alpha: one linearised equation a step, at the predictor */
-  /* Quadratures, but for DIRK whose stages carry them: slopes at the ends and n_inner nodes between,
-   * of which row l holds the weights in the polynomials of dense output. */
+  /* Quadratures, but for DIRK whose stages carry them: slopes at the ends and n_inner nodes
+   * between, of which row l holds the weights in the polynomials of dense output. */
   int n_inner;
   const double *inner;      /* n_inner */
   const double *quadrature; /* (n_inner + 2) x n_dense, nodes in their order */
-  const double *roughness;  /* n_inner + 2: the rates' highest divided difference, sizes adding to 1 */
+  /* n_inner + 2: the rates' highest divided difference, sizes adding to 1 */
+  const double *roughness;
 } mstmm_tableau;
 
 enum {
@@ -141,7 +142,8 @@ typedef struct mstmm_run_real {
 } mstmm_run_real;
 
 typedef struct mstmm_run_count {
-  int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense, lanes; /* compared on restoring */
+  /* compared on restoring */
+  int64_t n_state, n_events, n_memory, n_stages, n_extra, n_dense, lanes;
   int64_t n_switches;
   int64_t phase, status;
   int64_t fail_status, code, component, event;
@@ -163,7 +165,8 @@ typedef struct mstmm_run_count {
   int64_t by_laws, exact_left, exact_row;
   int64_t tangent_valid; /* the workspace holds where it was taken */
   int64_t tangent_held;  /* and the system has it factored */
-  /* Rosenbrock: steps still to be made by evaluated accelerations, and how many in a row last time */
+  /* Rosenbrock: steps still to be made by evaluated accelerations, and how many in a row last
+   * time */
   int64_t evaluated_left, evaluated_row;
   int64_t history;       /* steps of the length of the last one, at most 2 */
   int64_t sign, sign_against; /* steps that spoke for another kind of method; others since */
@@ -183,9 +186,9 @@ typedef struct mstmm_run {
   double first_step, min_step, max_step; /* 0: chosen */
   int64_t max_steps; /* 0: as many as it takes, if the end is in sight */
   int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
-  /* It returns too, with count.asked, between steps: when so many of the last ones spoke for another
-   * kind of method (of explicit methods those as long as stability allows, of implicit ones those
-   * shorter than short_step), and when look_steps have been made; 0: never. */
+  /* It returns too, with count.asked, between steps: when so many of the last ones spoke for
+   * another kind of method (of explicit methods those as long as stability allows, of implicit ones
+   * those shorter than short_step), and when look_steps have been made; 0: never. */
   int64_t sign_steps, look_steps;
   double short_step;
   int64_t n_breaks;
@@ -220,11 +223,11 @@ int mstmm_run_start(mstmm_run *run, const double *y0);
 /* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed; one step is
  * always made, and the clock is looked at about every 0.1 ms or every step. */
 int mstmm_advance(mstmm_run *run, double wall_seconds);
-/* Goes on with another method from where the run stands between two steps: what has been counted, the
- * proposed step and what is known of events stay.  `workspace` has mstmm_workspace_size doubles for
- * that method and takes the place of the run's.  Returns 0, or MSTMM_BAD_ARGUMENT with the run
- * unchanged: within a step, with fixed steps, for a method that the system does not allow.  A run that
- * failed goes on if it was for want of a step (count.no_step). */
+/* Goes on with another method from where the run stands between two steps: what has been counted,
+ * the proposed step and what is known of events stay.  `workspace` has mstmm_workspace_size doubles
+ * for that method and takes the place of the run's.  Returns 0, or MSTMM_BAD_ARGUMENT with the run
+ * unchanged: within a step, with fixed steps, for a method that the system does not allow.  A run
+ * that failed goes on if it was for want of a step (count.no_step). */
 int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);

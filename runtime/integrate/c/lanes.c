@@ -14,8 +14,9 @@ static int64_t row_of(const mstmm_system *system) {
 }
 
 int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tableau) {
-  const int sound = tableau->kind == MSTMM_EXPLICIT && system->lanes > 0 && system->n_state > 0 && !mstmm_n_watched(system) &&
-                    !system->n_memory && mstmm_workspace_size(system, tableau) > 0;
+  const int sound = tableau->kind == MSTMM_EXPLICIT && system->lanes > 0 && system->n_state > 0 &&
+                    !mstmm_n_watched(system) && !system->n_memory &&
+                    mstmm_workspace_size(system, tableau) > 0;
   const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
   return sound ? rows * row_of(system) + system->n_state + WIDE : 0;
 }

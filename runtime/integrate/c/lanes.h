@@ -1,7 +1,8 @@
-/* Many independent trajectories of one system, several of them side by side in the lanes of vectors.
- * Every lane has its own time, step and error control, and nothing of a lane reaches another: the
- * numbers of a trajectory depend neither on how many there are, nor on its neighbours, nor on the
- * number of threads.  A lane whose trajectory has ended takes the next one that nobody has begun.
+/* Many independent trajectories of one system, several of them side by side in the lanes of
+ * vectors.  Every lane has its own time, step and error control, and nothing of a lane reaches
+ * another: the numbers of a trajectory depend neither on how many there are, nor on its neighbours,
+ * nor on the number of threads.  A lane whose trajectory has ended takes the next one that nobody
+ * has begun.
  *
  * For systems without events and memory. */
 #ifndef MSTMM_LANES_H

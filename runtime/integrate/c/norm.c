@@ -51,7 +51,8 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
   }
   const double h = work->run->real.h;
   *absolute = n ? mstmm_combined_error(h, mstmm_total(&high), mstmm_total(&low), n, both) : 0.0;
-  return n ? mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled), n, both) : 0.0;
+  return n ? mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled), n, both)
+           : 0.0;
 }
 
 int64_t mstmm_worst_component(const mstmm_work *work) {

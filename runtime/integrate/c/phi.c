@@ -1,13 +1,13 @@
-/* Scaling and squaring: X is balanced by powers of two, so that a coordinate and its speed, and stiff
- * and slack parts, are of one size; halved until a short Taylor polynomial has all digits; and its
- * exponential squared back.  With E = exp(tau A) and a_k(tau) = tau^k phi_k(tau A) the phi follow in
- * products with vectors alone:
+/* Scaling and squaring: X is balanced by powers of two, so that a coordinate and its speed, and
+ * stiff and slack parts, are of one size; halved until a short Taylor polynomial has all digits;
+ * and its exponential squared back.  With E = exp(tau A) and a_k(tau) = tau^k phi_k(tau A) the phi
+ * follow in products with vectors alone:
  *
  *   a_1(2 tau) = E a_1 + a_1,  a_2(2 tau) = E a_2 + a_2 + tau a_1,
  *   a_3(2 tau) = E a_3 + a_3 + tau a_2 + tau^2/2 a_1.
  *
- * Kept is E - 1, squared as 2 (E - 1) + (E - 1)^2: beside fast motion the first levels of a slow one
- * are so close to 1 that they would lose it.
+ * Kept is E - 1, squared as 2 (E - 1) + (E - 1)^2: beside fast motion the first levels of a slow
+ * one are so close to 1 that they would lose it.
  *
  * All levels are kept: w(theta) is a piece of the first level by the polynomial and one product for
  * every bit of what is left.

@@ -1,4 +1,4 @@
-/* The exponential of a matrix X and its relatives phi_1, phi_2, phi_3, applied to vectors: the motion
+/* The exponential of a matrix X and its relatives phi_1, phi_2, phi_3, applied to vectors: motion
  *
  *   w' = X w + c_0 + c_1 theta + c_2 theta^2 / 2,  w(0) = 0,
  *   w(theta) = theta phi_1(theta X) c_0 + theta^2 phi_2(theta X) c_1 + theta^3 phi_3(theta X) c_2,

@@ -7,8 +7,8 @@
  * Evaluated: a stage evaluates the accelerations, which are no unknowns then.
  *
  * Steps are made in the first form, and again in the second where the accelerations carried to the
- * end lie elsewhere than those evaluated there, for another reason than stiff springs or by too much;
- * some steps after that are made in the second at once.
+ * end lie elsewhere than those evaluated there, for another reason than stiff springs or by too
+ * much; some steps after that are made in the second at once.
  *
  * E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), sections IV.7 (the form
  * without products by the Jacobian) and VI.3, VI.4 (differential-algebraic equations). */
@@ -126,8 +126,8 @@ static int make(const mstmm_work *work, form *prepare) {
 
 /* ---- the choice between the forms ---- */
 
-/* Sizes, in units of the tolerance, of what the gap of accelerations in rho_u moves within a step: on
- * its own, and through the tangent, which leaves little where the gap is a stiff spring's. */
+/* Sizes, in units of the tolerance, of what the gap of accelerations in rho_u moves within a step:
+ * on its own, and through the tangent, which leaves little where the gap is a stiff spring's. */
 static int effects_of_gap(const mstmm_work *work, double *alone, double *held) {
   const mstmm_implicit *at = work->implicit;
   const double reach = work->tableau->gamma * work->run->real.h;
@@ -157,8 +157,8 @@ static int carried_well(const mstmm_work *work) {
   return held < SMALL || held < fmin(most, ALIKE * alone);
 }
 
-/* The step in the form that suits it.  As often as the first one fails in a row, twice as many steps
- * are made in the second. */
+/* The step in the form that suits it.  As often as the first one fails in a row, twice as many
+ * steps are made in the second. */
 static int choose(const mstmm_work *work) {
   mstmm_run_count *count = &work->run->count;
   if (by_laws(work)) return make(work, evaluated);

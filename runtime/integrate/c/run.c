@@ -155,7 +155,8 @@ static int bad_argument(const mstmm_run *run) {
   if (!(run->fixed_step >= 0.0) || !(run->rtol >= 0.0) || !(run->first_step >= 0.0) ||
       !(run->min_step >= 0.0) || !(run->max_step >= 0.0) || run->max_steps < 0)
     return 3;
-  if (run->fixed_step == 0.0 && (!run->tableau->n_errors || (system->n_error && !run->atol))) return 3;
+  if (run->fixed_step == 0.0 && (!run->tableau->n_errors || (system->n_error && !run->atol)))
+    return 3;
   if (newton(run->tableau) && !run->atol) return 3; /* it says when the iteration may stop */
   for (int i = 0; run->atol && i < system->n_error; i++)
     if (!(run->atol[i] > 0.0)) return 3;
@@ -264,13 +265,15 @@ void mstmm_run_pack(const mstmm_run *run, double *reals, int64_t *integers) {
 static int belongs(const mstmm_run *run, const mstmm_run_count *saved) {
   const mstmm_run_count *c = &run->count;
   return saved->n_state == c->n_state && saved->n_events == c->n_events &&
-         saved->n_switches == c->n_switches && saved->n_memory == c->n_memory && saved->n_stages == c->n_stages &&
-         saved->n_extra == c->n_extra && saved->n_dense == c->n_dense && saved->lanes == c->lanes &&
-         saved->history >= 0 && saved->history <= 2 && saved->phase >= PHASE_START && saved->phase <= PHASE_END && saved->event >= -1 &&
-         saved->event < c->n_events + c->n_switches && saved->break_index >= 0 &&
-         saved->next_switch >= 0 && saved->next_switch <= c->n_events + c->n_switches &&
-         saved->bound_index >= 0 && saved->bound_index <= run->n_bounds &&
-         saved->break_index <= run->n_breaks && saved->output_index >= 0 &&
+         saved->n_switches == c->n_switches && saved->n_memory == c->n_memory &&
+         saved->n_stages == c->n_stages && saved->n_extra == c->n_extra &&
+         saved->n_dense == c->n_dense && saved->lanes == c->lanes && saved->history >= 0 &&
+         saved->history <= 2 && saved->phase >= PHASE_START && saved->phase <= PHASE_END &&
+         saved->event >= -1 && saved->event < c->n_events + c->n_switches &&
+         saved->break_index >= 0 && saved->next_switch >= 0 &&
+         saved->next_switch <= c->n_events + c->n_switches && saved->bound_index >= 0 &&
+         saved->bound_index <= run->n_bounds && saved->break_index <= run->n_breaks &&
+         saved->output_index >= 0 &&
          saved->output_index <= (run->n_outputs > 0 ? run->n_outputs : 0);
 }
 

@@ -1,4 +1,5 @@
-/* Arithmetic of one step: the stages of explicit Runge-Kutta methods, and everyone's dense output. */
+/* Arithmetic of one step: the stages of explicit Runge-Kutta methods, and everyone's dense
+ * output. */
 #include <math.h>
 #include <string.h>
 
@@ -82,5 +83,6 @@ MSTMM_WIDE void mstmm_dense(const mstmm_work *work, double t, double *y) {
     *(wide *)(y + i) = *(const wide *)(work->y + i) + sum;
   }
   if (work->tableau->kind == MSTMM_EXPONENTIAL) mstmm_exponential_dense(work, theta, y);
-  if (work->implicit) (void)mstmm_step_impose(work, t, y); /* who needs what fails here fails by it */
+  if (work->implicit)
+    (void)mstmm_step_impose(work, t, y); /* who needs what fails here fails by it */
 }

@@ -19,9 +19,9 @@ enum {
   PHASE_END      /* count.status is final */
 };
 
-/* What is known of an event or switch, kept as a double among the others.  Doubtful: it has just fired, and
- * reads false at the same time; only rounding perhaps, so that becoming true again counts for
- * nothing until time has passed or another event has fired. */
+/* What is known of an event or switch, kept as a double among the others.  Doubtful: it has just
+ * fired, and reads false at the same time; only rounding perhaps, so that becoming true again
+ * counts for nothing until time has passed or another event has fired. */
 #define UNWATCHED (-1.0)
 #define UNTRUE 0.0
 #define DOUBTFUL 0.5
@@ -83,8 +83,8 @@ MSTMM_INLINE int mstmm_n_watched(const mstmm_system *system) {
 int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g);
 /* Looks for the first switch in (t, t_new]; sets t_switch (INFINITY: none) and next_switch. */
 int mstmm_find_switch(const mstmm_work *work);
-/* Looks for the first event in (t_scan, t_new] up to t_switch; sets t_stop and count.event (-1: none,
- * n_events and up: the switch). */
+/* Looks for the first event in (t_scan, t_new] up to t_switch; sets t_stop and count.event (-1:
+ * none, n_events and up: the switch). */
 int mstmm_scan(const mstmm_work *work);
 
 #endif
