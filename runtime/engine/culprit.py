@@ -1,9 +1,10 @@
-"""Which expression of a scene, or quaternion, makes the motion at a state no number."""
+"""Which expression of a scene, or quaternion, makes the motion at a state no number, or its
+tangent."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.expression.drive import motion_at
 from mstmm.expression.expression import Expression, Name
+from mstmm.expression.slope import slopes
 
 from .calls import Calls, Probe
 
@@ -38,23 +40,37 @@ def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
         for kind, number in zip(("", " speed", " acceleration"), motion_at(drive, t), strict=True):
             if not math.isfinite(number):
                 return _sentence(f"{where}{kind}", drive, number, t)
-    seen = _State(engine, t, q, u)
-    for where, expression, own in _efforts(scene) if evaluated.n_values else ():
-        number = expression.evaluate(partial(seen.of, own=own))
+    for where, expression, values in _with_values(engine, t, q, u):
+        number = expression.evaluate(values)
         if not math.isfinite(number):
             return _sentence(where, expression, number, t)
-    for spring in scene.spring if evaluated.n_forces else ():
-        effort = spring.law.effort
-        if not effort.is_constant:
-            number = effort.evaluate(partial(seen.of_spring, own=spring))
-            if not math.isfinite(number):
-                return _sentence(f'spring "{spring.name}": law.effort', effort, number, t)
     return ""
 
 
-def _sentence(where: str, expression: Expression, number: float, t: float) -> str:
+def steep(engine: Calls, t: float, q: Array, u: Array) -> str:
+    """'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'; empty if
+    every slope that implicit methods ask for at a state is a number."""
+    for where, expression, values in _with_values(engine, t, q, u):
+        for name, slope in slopes(expression, values).items():
+            moves = name.text == "t" or name.quantity in ("q", "u")
+            if moves and not math.isfinite(slope):
+                return (
+                    f"{_equation(where, expression)} has no finite slope along {name.text} at "
+                    f"t = {t:.9g} s, which implicit methods ask for; make it smooth there, such as "
+                    "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or take an explicit method such as "
+                    "dop853"
+                )
+    return ""
+
+
+def _equation(where: str, expression: Expression) -> str:
     text = expression.text if len(expression.text) <= 80 else f"{expression.text[:77]}..."
-    return f'{where} = "{text}" is {number} at t = {t:.9g} s; keep it finite where the motion goes'
+    return f'{where} = "{text}"'
+
+
+def _sentence(where: str, expression: Expression, number: float, t: float) -> str:
+    found = f"{_equation(where, expression)} is {number} at t = {t:.9g} s"
+    return f"{found}; keep it finite where the motion goes"
 
 
 # --- the expressions of a scene -------------------------------------------------------------------
@@ -87,6 +103,22 @@ def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge
     for k, effort in enumerate(hinge.law.effort):
         if not effort.is_constant:
             yield f"{where}: law.effort[{k}]", effort, hinge
+
+
+def _with_values(
+    engine: Calls, t: float, q: Array, u: Array
+) -> Iterator[tuple[str, Expression, Callable[[Name], float]]]:
+    """Place and expression of every effort and load that the engine evaluates and that is no
+    constant, and what its names stand for at a state."""
+    evaluated, scene = engine.packed.model, engine.packed.described
+    seen = _State(engine, t, q, u)
+    for where, expression, own in _efforts(scene) if evaluated.n_values else ():
+        yield where, expression, partial(seen.of, own=own)
+    for spring in scene.spring if evaluated.n_forces else ():
+        effort = spring.law.effort
+        if not effort.is_constant:
+            where = f'spring "{spring.name}": law.effort'
+            yield where, effort, partial(seen.of_spring, own=spring)
 
 
 class _State:

@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-from ..engine.culprit import culprit
+from ..engine.culprit import culprit, steep
 from ..engine.engine import Engine
 from ..flexible.definiteness import is_definite_at
 from ..flexible.support import Supports
@@ -39,7 +39,10 @@ _FARTHER, _FARTHEST = 4.0, 1e-9
 def message_of(system: SceneSystem, run: Run) -> str:
     """How a run ended or stands, as a sentence."""
     failure = run.failure
-    cause = "" if failure is None else cause_of(system, failure.status, run.t, run.y, failure.time)
+    cause = ""
+    if failure is not None:
+        implicit = run.tableau.implicit
+        cause = cause_of(system, failure.status, run.t, run.y, failure.time, implicit)
     if failure is not None and failure.code and failure.status in _EVALUATIONS:
         text = cause or system.engine.failure_text(system.run.failure, failure.time)
         return f"{text}; last good state at t = {run.t:.9g} s"
@@ -53,13 +56,17 @@ def message_of(system: SceneSystem, run: Run) -> str:
     return message + (_indefinite(system, run.y) if small else "")
 
 
-def cause_of(system: SceneSystem, status: Status, t: float, y: Array, failed_at: float) -> str:
-    """The expression that stopped a run whose last good state is (t, y); empty if none did."""
+def cause_of(
+    system: SceneSystem, status: Status, t: float, y: Array, failed_at: float, implicit: bool
+) -> str:
+    """The expression that stopped a run whose last good state is (t, y); empty if none did.
+    Implicit methods are stopped by slopes as well."""
     if status not in _BY_EXPRESSIONS:
         return ""
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
-    return _culprit_ahead(engine, t, q, u, system.memory, failed_at)
+    found = _culprit_ahead(engine, t, q, u, system.memory, failed_at)
+    return found or (steep(engine, t, q, u) if implicit else "")
 
 
 def _culprit_ahead(

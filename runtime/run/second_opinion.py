@@ -148,6 +148,7 @@ class _Loop:
 
     def __init__(self, model: Compiled, settings: Settings, tell: Callable[[float], None]) -> None:
         self.system, self.settings, self.tell = Equations(model), settings, tell
+        self.implicit = METHODS[settings.method] in _IMPLICIT
         self.rows: list[tuple[float, Array, Array, int]] = []
         self.outputs = None if settings.output_times is None else deque(settings.output_times)
         self.steps = self.fired = 0
@@ -316,7 +317,7 @@ class _Loop:
     def failed(self, y: Array, text: str | None) -> _Ended:
         at = f"last good state at t = {self.t:.9g} s"
         status = Status.RHS_FAILED if self.system.failure else Status.STEP_TOO_SMALL
-        cause = cause_of(self.system.scene, status, self.t, self.last, self.t)
+        cause = cause_of(self.system.scene, status, self.t, self.last, self.t, self.implicit)
         if cause or self.system.failure:
             return _Ended(status, f"{cause or self.system.failure}; {at}")
         if not np.isfinite(y).all():

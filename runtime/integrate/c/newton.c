@@ -1,9 +1,10 @@
-/* Newton's iteration for a stage of an implicit method, with a tangent that is kept from step to step
- * as long as it serves.
+/* Newton's iteration for a stage of an implicit method, with a tangent that is kept from step to
+ * step as long as it serves.
  *
- * Where the tangent by laws alone is much cheaper it comes first: what it leaves out, slopes of inertia
- * and loads, contracts an iteration like (h w)^2, w the fastest motion that they cause.  Where that
- * contraction turns out slow, some stages are solved with exact tangents before it is tried again.
+ * Where the tangent by laws alone is much cheaper it comes first: what it leaves out, slopes of
+ * inertia and loads, contracts an iteration like (h w)^2, w the fastest motion that they cause.
+ * Where that contraction turns out slow, some stages are solved with exact tangents before it is
+ * tried again.
  *
  * Where it was taken is part of the run's state, so that a run that is continued elsewhere factors
  * the same tangent again and goes on bit for bit. */
@@ -23,17 +24,22 @@ static const double ROUNDING = 1e-10; /* of the first increment: no iteration ma
 static const double NOTHING = 1e-4;   /* of the tolerance: rounding, by which nothing is measured */
 /* The same of laws alone, which cost less to renew than an iteration */
 static const double SLOW_BY_LAWS = 0.1, CHANGED_BY_LAWS = 0.01;
-static const double TOO_SLOW = 0.25; /* contraction by new laws from which on an exact tangent pays */
+static const double TOO_SLOW = 0.25; /* contraction by new laws: an exact tangent pays from it on */
 static const double HOPELESS = 0.5;  /* and at once, in the midst of an iteration */
 enum { MOST_ITERATIONS = 10, FIRST_EXACT = 8, MOST_EXACT = 256 };
 
 /* How hard to try: with the tangent in hand, with a new one, with a new one in every iteration */
 enum { KEPT, RENEWED, EACH };
 
+static int may_take_laws(const mstmm_work *work) {
+  return work->implicit->laws && !work->tableau->one_iteration &&
+         work->run->tangents != MSTMM_EXACT_TANGENT;
+}
+
 /* Which of the two tangents to take */
 static int wants_laws(const mstmm_work *work) {
   const mstmm_run *run = work->run;
-  if (!work->implicit->laws || work->tableau->one_iteration) return 0;
+  if (!may_take_laws(work)) return 0;
   if (run->tangents != MSTMM_ANY_TANGENT) return run->tangents == MSTMM_LAWS_TANGENT;
   return work->implicit->laws_spare && run->count.exact_left == 0;
 }
@@ -150,18 +156,37 @@ static void learn(const mstmm_work *work, int effort, int solved) {
   }
 }
 
+static int attempt(const mstmm_work *work, const mstmm_newton_equations *stage, int effort,
+                   int laws) {
+  const int status = effort == KEPT ? hold(work, stage) : take(work, stage, laws);
+  return status ? status : iterate(work, stage, effort);
+}
+
+/* Laws alone may have a tangent where there is no exact one, as where an expression rises infinitely
+ * fast.  If they lead nowhere either, that there is none is the reason. */
+static int without_exact(const mstmm_work *work, const mstmm_newton_equations *stage) {
+  mstmm_run *run = work->run;
+  const int64_t code = run->count.code;
+  const double time = run->real.fail_time;
+  memcpy(work->y_stage, work->y_first, (size_t)work->row * sizeof(double));
+  if (!attempt(work, stage, RENEWED, 1)) return 0;
+  run->count.tangent_valid = 0;
+  return mstmm_note(run, MSTMM_TANGENT_FAILED, code, -1, time);
+}
+
 int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run_count *count = &work->run->count;
   int effort = serves(work, stage) && !work->tableau->one_iteration ? KEPT : RENEWED;
   int laws = wants_laws(work);
+  const int other = may_take_laws(work) && !laws;
   memcpy(work->y_first, work->y_stage, (size_t)work->row * sizeof(double));
   for (;;) {
-    int status = effort == KEPT ? hold(work, stage) : take(work, stage, laws);
-    if (!status) status = iterate(work, stage, effort);
+    const int status = attempt(work, stage, effort, laws);
     learn(work, effort, !status);
     if (!status) return 0;
     count->tangent_valid = 0;
-    if (effort == EACH) return status;
+    if (effort == EACH)
+      return other && status == MSTMM_TANGENT_FAILED ? without_exact(work, stage) : status;
     if (effort == RENEWED && laws)
       laws = 0; /* once more with an exact one */
     else
