@@ -426,7 +426,7 @@ class Run:
                 Status.STOPPED: f"stopped by {event} at t = {self.t:.9g} s",
             }.get(self.status, f"running, t = {self.t:.9g} s")
         return (
-            failure_text(fail, components, events, cause)
+            failure_text(fail, components, events, cause, self.tableau.implicit)
             + f"; last good state at t = {self.t:.9g} s"
         )
 
@@ -471,18 +471,18 @@ def failure_text(
     components: Sequence[str] | None = None,
     events: Sequence[str] | None = None,
     cause: str = "",
+    implicit: bool = False,
 ) -> str:
-    """One sentence for each failure, with a way out where there is one; names as in `message`."""
+    """One sentence for each failure, with a way out where there is one that fits the kind of
+    method; names as in `message`."""
     what = _name("component", -1 if fail.component is None else fail.component, components)
     event = _name("event", -1 if fail.event is None else fail.event, events)
     at = f"at t = {fail.time:.9g} s"
+    doubt = "jump there" if implicit else "too stiff for an explicit method"
+    pace = "fast" if implicit else "stiff"
     texts = {
         Status.STEP_TOO_SMALL: f"step too small {at}: {what} has the largest error; "
-        + (
-            cause
-            or "the motion may be singular or too stiff for an explicit method, or the "
-            "tolerance too tight"
-        ),
+        + (cause or f"the motion may be singular or {doubt}, or the tolerance too tight"),
         Status.NOT_FINITE: f"not finite {at}: {what}; "
         + (cause or "a smaller step or tolerance may help"),
         Status.RHS_FAILED: f"the equations of motion cannot be evaluated {at} (code {fail.code})",
@@ -494,8 +494,8 @@ def failure_text(
         Status.TOO_MANY_STEPS: f"more steps than allowed {at}"
         if not fail.code
         else f"no end in sight {at}: at the pace of the last steps the run would take more than "
-        "1e10 of them; the motion sticks where the right-hand side jumps, or is too stiff for the "
-        "tolerance; max_steps, if given, is the only limit",
+        "1e10 of them; the motion sticks where the right-hand side jumps, or is too "
+        f"{pace} for the tolerance; max_steps, if given, is the only limit",
         Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {at} (code "
         f"{fail.code}): the motion may be singular there, or leave an unstable position faster "
         "than the step allows; " + (cause or "a smaller step may help")

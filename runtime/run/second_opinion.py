@@ -270,7 +270,8 @@ class _Loop:
 
     def endless(self) -> _Ended:
         """At the pace of the last steps the run would never end."""
-        text = failure_text(Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1))
+        sticks = Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1)
+        text = failure_text(sticks, implicit=self.implicit)
         if self.crossings.chatter is not None:
             text += f"; {endless(self.system.scene, self.crossings.chatter)}"
         return _Ended(Status.TOO_MANY_STEPS, text)
