@@ -62,9 +62,9 @@ def compile_scene(
     compiler or it fails.
     """
     if engine not in ENGINES:
-        raise SceneError(f"engine {engine!r} is not known; there are: {', '.join(ENGINES)}")
+        raise SceneError(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}')
     if sweep not in SWEEPS:
-        raise SceneError(f"sweep {sweep!r} is not known; there are: {', '.join(SWEEPS)}")
+        raise SceneError(f'sweep "{sweep}" is not known; there are: {", ".join(SWEEPS)}')
     if not accuracy > 0:
         raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
     from ..runtime.kernels import store

@@ -67,7 +67,7 @@ def scheme_of(text: str) -> Scheme:
     name, colon, given = (text or DEFAULT).partition(":")
     if name not in SCHEMES:
         known = ", ".join(SCHEMES)
-        raise SceneError(f"scheme {text!r} does not exist; known are {known}, as in hht:0.3")
+        raise SceneError(f'scheme "{text}" does not exist; known are {known}, as in hht:0.3')
     make, usual, (least, most), called = SCHEMES[name]
     try:
         number = float(given) if colon else usual
@@ -75,7 +75,7 @@ def scheme_of(text: str) -> Scheme:
         number = float("nan")
     if not least <= number <= most:
         raise SceneError(
-            f"scheme {text!r}: expected {called} from {least:g} to {most:g}, such as "
+            f'scheme "{text}": expected {called} from {least:g} to {most:g}, such as '
             f"{name}:{usual:g}"
         )
     return make(number)

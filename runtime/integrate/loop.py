@@ -205,7 +205,7 @@ class Run:
         at = self._system.implicit
         if tableau.implicit and not at:
             raise SceneError(
-                f"method {tableau.name!r} is implicit and needs a tangent of the equations of "
+                f'method "{tableau.name}" is implicit and needs a tangent of the equations of '
                 "motion, which this system has not; take an explicit method such as dop853"
             )
         if at:
@@ -306,7 +306,7 @@ class Run:
         c_method = c_tableau(self._ffi, tableau)
         space = self._room(c_method)
         if self._lib.mstmm_run_change(self._run, c_method, space):
-            raise SceneError(f"method {tableau.name!r} cannot take this run over")
+            raise SceneError(f'method "{tableau.name}" cannot take this run over')
         self.tableau, self._space = tableau, space
 
     def _drain(self) -> None:

@@ -83,7 +83,7 @@ def checked(settings: Settings) -> Settings:
         raise SceneError(f"scheme = {settings.scheme!r}: expected a name such as hht:0.3")
     if settings.method == AUTO and settings.step is not None:
         raise SceneError(
-            f"step = {settings.step!r}: method {AUTO!r} chooses its steps; leave step out, or name "
+            f'step = {settings.step!r}: method "{AUTO}" chooses its steps; leave step out, or name '
             "a method"
         )
     _times_within(settings.output_times, t_start, t_end)

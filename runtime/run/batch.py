@@ -24,7 +24,7 @@ from mstmm.errors import MstmmError, SceneError
 
 from ..integrate.loop import Failure, Run, Status, failure_text
 from ..integrate.settings import Settings, checked
-from ..integrate.steppers import AUTO, check_size, get
+from ..integrate.steppers import AUTO, check_size, check_steps, get
 from ..pack.switches import has_switches
 from . import classical, second_opinion
 from .lanes import Lanes, run_lanes
@@ -242,11 +242,10 @@ def prepared(
     if not settings.output_times:
         raise SceneError("output_times: expected one time in s or more")
     if settings.method in (*second_opinion.METHODS, *classical.METHODS):
-        raise SceneError(f"method {settings.method!r} makes one run at a time: use simulate")
+        raise SceneError(f'method "{settings.method}" makes one run at a time: use simulate')
     tableau = get(settings.first_method)
     check_size(tableau, model.nq + model.nu)
-    if settings.step is None and not tableau.adaptive:
-        raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
+    check_steps(tableau, settings.step)
     q, u = pair("initial_states", initial)
     lead, (q_rows, u_rows) = batch(("initial q", q, model.nq), ("initial u", u, model.nu))
     if len(lead) > 1:

@@ -51,7 +51,7 @@ def integrate(
 ) -> Trajectory:
     """One run.  Raises SceneError without a step, and for what there are no matrices for."""
     if settings.step is None:
-        raise SceneError(f"method {settings.method!r} takes fixed steps: give step in s")
+        raise SceneError(f'method "{settings.method}" takes fixed steps: give step in s')
     scheme_of(settings.scheme)
     return _Run(model, settings, tell).run(q, u)
 
@@ -60,7 +60,7 @@ def refuse_options(settings: Settings) -> None:
     """SceneError for options of this method beside another one."""
     if settings.scheme or settings.iterations != 1:
         raise SceneError(
-            f"method {settings.method!r} takes neither scheme nor iterations; they are for "
+            f'method "{settings.method}" takes neither scheme nor iterations; they are for '
             f"{' and '.join(METHODS)}"
         )
 

@@ -94,7 +94,7 @@ def first_run(
     """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
     if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
-            raise SceneError(f"method {settings.method!r} keeps no checkpoints; use dop853")
+            raise SceneError(f'method "{settings.method}" keeps no checkpoints; use dop853')
         others = classical if settings.method in classical.METHODS else second_opinion
         return others.integrate(model, settings, q, u, watch.tell), None
     classical.refuse_options(settings)

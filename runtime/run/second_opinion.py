@@ -133,7 +133,7 @@ def integrate(
     Raises SceneError for a fixed step, EnvironmentFailure where the package is not installed.
     """
     if settings.step is not None:
-        raise SceneError(f"method {settings.method!r} chooses its own steps: leave step out")
+        raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
     if settings.method in sundials.METHODS:
         sundials.refuse_without(settings.method)
     alone: AbstractContextManager[object] = nullcontext()

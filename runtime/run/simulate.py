@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure
 
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
-from ..integrate.steppers import AUTO, get
+from ..integrate.steppers import AUTO, check_steps, get
 from .endings import message_of
 from .method_choice import Choice
 from .notes import unresolved, unseen
@@ -39,10 +39,7 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         system.offer_tangent()
-    if settings.step is None and not tableau.adaptive:
-        raise SceneError(
-            f"method {settings.method!r} takes fixed steps: give step in s, or use dopri5, dop853"
-        )
+    check_steps(tableau, settings.step)
     start = system.start(settings.t_start, q, u)
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(

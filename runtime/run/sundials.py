@@ -26,7 +26,7 @@ def refuse_without(method: str) -> None:
     try:
         import sksundae.cvode  # noqa: F401
     except ImportError as error:
-        raise missing("stiff", f"method {method!r}", error) from None
+        raise missing("stiff", f'method "{method}"', error) from None
 
 
 class Cvode:

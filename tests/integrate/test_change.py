@@ -68,10 +68,10 @@ def test_methods_in_turn_keep_events_outputs_and_breaks(lab: Lab, case: str) -> 
 
 def test_a_change_is_refused_where_it_makes_no_sense(lab: Lab) -> None:
     fixed = bouncing(lab).run("rk4", 1.2, START, step=0.01)
-    with pytest.raises(SceneError, match="'dop853' cannot take this run over"):
+    with pytest.raises(SceneError, match='"dop853" cannot take this run over'):
         fixed.change(get("dop853"))
     adaptive = bouncing(lab).run("dop853", 1.2, START)
-    with pytest.raises(SceneError, match="'rk4' cannot take this run over"):
+    with pytest.raises(SceneError, match='"rk4" cannot take this run over'):
         adaptive.change(get("rk4"))
     without = lab.problem("harmonic", 2, 1.0).run("dop853", 1.2, START)
     with pytest.raises(SceneError, match="needs a tangent"):

@@ -294,7 +294,7 @@ def test_unstable_positions_are_left_as_they_should(lab: Lab) -> None:
 
 
 def test_a_system_without_a_tangent_refuses(lab: Lab) -> None:
-    with pytest.raises(SceneError, match="method 'rodas4' is implicit and needs a tangent"):
+    with pytest.raises(SceneError, match='method "rodas4" is implicit and needs a tangent'):
         lab.problem("harmonic", 2, 1.0).run("rodas4", 1.0, (1, 0))
 
 

@@ -100,7 +100,7 @@ def test_quadratures_are_exact_to_their_degree() -> None:
 
 
 def test_a_radius_that_makes_no_sense_is_refused() -> None:
-    with pytest.raises(SceneError, match="method 'rodas4' takes none; those that do are genalpha"):
+    with pytest.raises(SceneError, match='method "rodas4" takes none; those that do are genalpha'):
         get("rodas4", 0.5)
 
 

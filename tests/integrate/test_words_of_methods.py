@@ -1,17 +1,20 @@
-"""What messages say of a method is true of it."""
+"""What messages say of a method is true of it: its kind, its options, what may be taken instead."""
 
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import pytest
 
 import mstmm
+from mstmm.errors import SceneError
 from mstmm.runtime.integrate.loop import Failure, Status, failure_text
 from mstmm.runtime.integrate.steppers import BUILT_IN, EXPLICIT, get
 from mstmm.runtime.model.model import Model
 
 ADAPTIVE = [method for method in BUILT_IN if get(method).adaptive]
+FIXED = [method for method in BUILT_IN if not get(method).adaptive]
 
 
 @cache
@@ -37,3 +40,41 @@ def test_explicit_methods_alone_are_called_explicit(method: str) -> None:
 def test_no_end_in_sight(implicit: bool) -> None:
     text = failure_text(Failure(Status.TOO_MANY_STEPS, 1.0, None, None, 1), implicit=implicit)
     assert ("too stiff" in text) == (not implicit) and "sticks" in text
+
+
+@pytest.mark.parametrize("method", FIXED)
+def test_a_method_of_fixed_steps_names_one_of_its_kind(method: str) -> None:
+    instead = "dopri5" if method in EXPLICIT else "genalpha"
+    words = f'method "{method}" takes fixed steps: give step in s, or take {instead},'
+    assert get(instead).adaptive
+    with pytest.raises(SceneError, match=words):
+        runaway().simulate(0.1, method)
+    with pytest.raises(SceneError, match=words):
+        runaway().simulate_batch(runaway().initial_state(), t_end=0.1, method=method)
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"tangent": "foo"}, 'tangent = "foo": expected'),
+    ({"method": "rodas4", "tangent": "laws"}, 'tangent = "laws": rodas4 falls'),
+    ({"tangent": "exact"}, 'tangent = "exact": method "dop853" takes none'),
+    ({"method": "rodas6"}, 'method "rodas6" is not known'),
+    ({"method": "rodas4", "radius": 0.5}, 'method "rodas4" takes none'),
+    ({"method": "auto", "step": 0.1}, 'method "auto" chooses its steps'),
+    ({"method": "scipy-RK45", "step": 0.1}, 'method "scipy-RK45" chooses its own steps'),
+    ({"method": "dttmm-classical"}, 'method "dttmm-classical" takes fixed steps'),
+    ({"method": "dttmm-classical", "step": 0.1, "scheme": "foo"}, 'scheme "foo" does not exist'),
+]
+
+
+@pytest.mark.parametrize("options, words", WRONG)
+def test_options_are_quoted_in_one_way(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError) as refused:
+        runaway().simulate(0.1, **options)
+    assert words in str(refused.value) and " '" not in str(refused.value)
+
+
+@pytest.mark.parametrize("option", ["engine", "sweep"])
+def test_options_of_compile_are_quoted_alike(option: str) -> None:
+    options: dict[str, Any] = {option: "foo"}
+    with pytest.raises(SceneError, match=f'{option} "foo" is not known'):
+        mstmm.compile(runaway().scene, **options)

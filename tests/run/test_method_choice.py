@@ -272,11 +272,11 @@ def test_its_error_is_estimated_as_that_of_any_method() -> None:
 def test_what_makes_no_sense_with_it_is_refused() -> None:
     model = compiled(pins(1, [0.3]))
     state = model.initial_state()
-    with pytest.raises(mstmm.SceneError, match=r"step = 0\.01: method 'auto' chooses its steps"):
+    with pytest.raises(mstmm.SceneError, match=r'step = 0\.01: method "auto" chooses its steps'):
         model.simulate(1.0, method="auto", step=0.01)
     with pytest.raises(mstmm.SceneError, match="chooses its steps"):
         model.simulate_batch(state, t_end=1.0, method="auto", step=0.01)
-    with pytest.raises(mstmm.SceneError, match="method 'auto' takes none"):
+    with pytest.raises(mstmm.SceneError, match='method "auto" takes none'):
         model.simulate(1.0, method="auto", radius=0.5)
     with pytest.raises(mstmm.SceneError, match="there are: auto, rk4"):
         model.simulate(1.0, method="automatic")

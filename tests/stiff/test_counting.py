@@ -48,7 +48,7 @@ def test_a_method_that_does_not_exist_is_left_out_with_a_word() -> None:
     case, heard = CASES["d-quarter"], list[str]()
     model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
     assert contestants.own(model, case, "nobody9", heard.append) is None
-    assert heard == ["left out: method 'nobody9' is not known"]
+    assert heard == ['left out: method "nobody9" is not known']
     assert contestants.takes_steps(model, "rk4") is True
     assert contestants.takes_steps(model, "dop853") is False
 

@@ -26,6 +26,7 @@ __all__ = [
     "Tableau",
     "check_radius",
     "check_size",
+    "check_steps",
     "check_tangent",
     "from_monomials",
     "frozen",
@@ -90,7 +91,7 @@ def check_radius(name: str, radius: float | None) -> None:
         raise SceneError(f"radius = {radius:g}: expected a spectral radius from 0 to 1")
     if name not in WITH_RADIUS:
         raise SceneError(
-            f"radius = {radius:g}: method {name!r} takes none; those that do are "
+            f'radius = {radius:g}: method "{name}" takes none; those that do are '
             + ", ".join(WITH_RADIUS)
         )
 
@@ -99,16 +100,28 @@ def check_size(tableau: Tableau, unknowns: int) -> None:
     """SceneError for more coordinates and speeds together than the method takes."""
     if tableau.most_unknowns and unknowns > tableau.most_unknowns:
         raise SceneError(
-            f"method {tableau.name!r} takes the exponential of a matrix of all coordinates and "
+            f'method "{tableau.name}" takes the exponential of a matrix of all coordinates and '
             f"speeds, at most {tableau.most_unknowns}; here there are {unknowns}: take rodas5p or, "
             "for vibration that is to stay, dop853, or bend bodies by fewer shapes"
         )
 
 
+def check_steps(tableau: Tableau, step: float | None) -> None:
+    """SceneError for a method without an estimate of its error, and no step to take."""
+    if step is not None or tableau.adaptive:
+        return
+    kin = "genalpha" if tableau.implicit else "dopri5"
+    raise SceneError(
+        f'method "{tableau.name}" takes fixed steps: give step in s, or take {kin}, which chooses '
+        "its steps by their error"
+    )
+
+
 def check_tangent(name: str, tangent: str) -> None:
     """SceneError for a tangent that there is not, or with which a method loses what it is for."""
     if tangent not in TANGENTS:
-        raise SceneError(f"tangent = {tangent!r}: expected one of {', '.join(TANGENTS)}")
+        known = ", ".join(TANGENTS)
+        raise SceneError(f'tangent = "{tangent}": expected one of {known}')
     if tangent == TANGENTS[0] or (tangent == "exact" and name in IMPLICIT):
         return
     able = (*WITHOUT_EXACT, *ITERATED)
@@ -120,7 +133,7 @@ def check_tangent(name: str, tangent: str) -> None:
             f"to the first); those that do without are {', '.join(able)}"
         )
     raise SceneError(
-        f'tangent = "{tangent}": method {name!r} takes none that could be chosen; those that do '
+        f'tangent = "{tangent}": method "{name}" takes none that could be chosen; those that do '
         f"are {', '.join(IMPLICIT)}"
     )
 
@@ -140,9 +153,11 @@ def get(name: str, radius: float | None = None) -> Tableau:
     if name in BUILT_IN:
         return _built_in(name, radius)
     if name not in _registered:
+        known = ", ".join((AUTO, *names()))
         raise SceneError(
-            f"method {name!r} is not known; there are: {', '.join((AUTO, *names()))}, and SciPy's "
-            "as scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and SUNDIALS' as "
-            "sundials-BDF, sundials-Adams; and dttmm-classical, dttmm-classical-product"
+            f'method "{name}" is not known; there are: {known}, and '
+            "SciPy's as scipy-RK45, scipy-DOP853, scipy-Radau, scipy-BDF, scipy-LSODA, and "
+            "SUNDIALS' as sundials-BDF, sundials-Adams; and dttmm-classical, "
+            "dttmm-classical-product"
         )
     return _registered[name]

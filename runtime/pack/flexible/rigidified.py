@@ -60,7 +60,7 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
         return scene
     if flexibility not in LEVELS:
         known = ", ".join(LEVELS)
-        raise SceneError(f"flexibility {flexibility!r} is not known; there are: {known}")
+        raise SceneError(f'flexibility "{flexibility}" is not known; there are: {known}')
     level = {"model": LEVELS[flexibility]}
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}
     fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
