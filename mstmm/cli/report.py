@@ -15,12 +15,19 @@ _STRETCHES = 6
 
 
 def sizes(result: Result) -> str:
-    """3 bodies on 3 hinges, 9 degrees of freedom."""
-    scene, bodies = result.model.scene, len(result.model.scene.skeleton.bodies)
-    return (
-        f"{count(bodies, 'body', 'bodies')} on {count(len(scene.hinges), 'hinge')}, "
-        f"{count(result.model.nu, 'degree')} of freedom"
-    )
+    """3 bodies on 3 hinges, 7 degrees of freedom, 2 driven."""
+    from mstmm.runtime.model.equilibrium import free_speeds
+
+    model, bodies = result.model, len(result.model.scene.skeleton.bodies)
+    free, driven = len(free_speeds(model)), len(model.packed.system.driven)
+    held = model.nu - free - driven
+    parts = [
+        f"{count(bodies, 'body', 'bodies')} on {count(len(model.scene.hinges), 'hinge')}",
+        f"{count(free, 'degree')} of freedom",
+        *([f"{driven} driven"] if driven else []),
+        *([f"{held} held until released"] if held else []),
+    ]
+    return ", ".join(parts)
 
 
 def count(n: int, one: str, many: str = "") -> str:

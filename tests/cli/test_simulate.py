@@ -39,6 +39,40 @@ def test_text_names_scene_steps_and_files(mstmm: Command) -> None:
     assert max(map(len, done.out.splitlines())) <= 80
 
 
+def test_degrees_of_freedom_are_those_that_nobody_imposes(mstmm: Command, folder: Path) -> None:
+    (folder / "arm.toml").write_text(
+        """
+        gravity = [0, -9.81, 0]
+        body = [
+            { name = "cart", mass = 1 },
+            { name = "rod", mass = 1, inertia = [1, 1, 1] },
+            { name = "hook", mass = 1, inertia = [1, 1, 1] },
+        ]
+        [[hinge]]
+        name = "rail"
+        type = "prismatic"
+        axis = [1, 0, 0]
+        inboard = "ground"
+        outboard = "cart"
+        drive = ["sin(t)"]
+        [[hinge]]
+        name = "pin"
+        type = "pin"
+        inboard = "cart"
+        outboard = "rod"
+        [[hinge]]
+        name = "latch"
+        type = "fixed"
+        inboard = "rod"
+        outboard = "hook"
+        release = "t > 5"
+        """
+    )
+    done = mstmm("simulate", "arm.toml", "--t-end", "0.01", "--no-certify")
+    expected = "3 bodies on 3 hinges, 1 degree of freedom, 1 driven, 6 held until released"
+    assert done.code == 0 and expected in done.out
+
+
 def test_the_verdict_comes_first(mstmm: Command) -> None:
     command = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv", "--certify")
     assert mstmm(*command).out.startswith("trusted: errors within 0.01 rad")
