@@ -31,6 +31,11 @@ _BY_EXPRESSIONS = (
     Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED, Status.TANGENT_FAILED,
     Status.NOT_CONVERGED,
 )  # fmt: skip
+#: What a run may end with at a switch, and how many steps before or after the last good state
+#: the motion passes it at most.
+_AT_SWITCHES = (Status.TOO_MANY_STEPS, Status.STEP_TOO_SMALL, Status.NOT_CONVERGED)
+_PASSING = 2.0
+
 #: States looked at past the last good one lie this many times farther ahead each, up to this part
 #: of the time: a run ends within rounding of the place where an expression stops being a number.
 _FARTHER, _FARTHEST = 4.0, 1e-9
@@ -47,13 +52,13 @@ def message_of(system: SceneSystem, run: Run) -> str:
         text = cause or system.engine.failure_text(system.run.failure, failure.time)
         return f"{text}; last good state at t = {run.t:.9g} s"
     message = run.message(system.components(), system.event_names, cause)
-    sticks = failure is not None and failure.status is Status.TOO_MANY_STEPS
-    if sticks and run.chatter is not None:
+    if failure is not None and failure.status in _AT_SWITCHES and run.chatter is not None:
         return f"{message}; {endless(system, run.chatter)}"
     work = failure is not None and failure.component == system.engine.nq + system.engine.nu
     message += busiest(system, run.t, run.y) if work else ""
     small = failure is not None and failure.status is Status.STEP_TOO_SMALL
-    return message + (_indefinite(system, run.y) if small else "")
+    message += _indefinite(system, run.y) if small else ""
+    return message if cause else message + _switch_at(system, run)
 
 
 def cause_of(
@@ -126,3 +131,39 @@ def busiest(system: SceneSystem, t: float, y: Array) -> str:
     if not rates.any():
         return ""
     return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"
+
+
+def _switch_at(system: SceneSystem, run: Run) -> str:
+    """The switch that the motion passes within a step or two of where the run failed, as words that
+    end a message; empty where none does."""
+    failure = run.failure
+    if failure is None or failure.status not in _AT_SWITCHES or not system.system.n_switches:
+        return ""
+    engine, t, y = system.engine, run.t, run.y
+    n_q, n = engine.nq, engine.nq + engine.nu
+    q, u = y[None, :n_q].copy(), y[None, n_q:n].copy()
+    try:
+        qdot, udot = engine.accelerations(t, q, u, system.memory[None].copy())
+    except NumericalFailure:
+        return ""
+    reach = _PASSING * max(failure.time - t, run.last_step, 4 * math.ulp(t))
+    rates = np.zeros(len(y))
+    rates[:n] = np.concatenate([qdot[0], udot[0]])
+    before, after = (_margins(system, t + s, y + s * rates) for s in (-reach, reach))
+    passed = np.flatnonzero(~(before * after > 0))
+    if not len(passed):
+        return ""
+    return (
+        f"; {system.switches[int(passed[0])].what} switches there: if the motion sticks to it, "
+        "make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the hinge's law"
+    )
+
+
+def _margins(system: SceneSystem, t: float, y: Array) -> Array:
+    """Of all switches that are watched: each is zero where it switches."""
+    calls, ffi = system.system, system.engine.ffi
+    values = np.empty(calls.n_events + calls.n_switches)
+    state = np.ascontiguousarray(y)
+    pointers = (ffi.from_buffer("double[]", x) for x in (state, values))
+    failed = calls.events(calls.context, t, *pointers)
+    return np.ones(calls.n_switches) if failed else values[calls.n_events :]

@@ -174,3 +174,27 @@ def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("mstmm.runtime.run.notes.MOST", 1)
     result = moved("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
     assert any("more than 1 conditions depend on the motion" in text for text in result.warnings)
+
+
+#: Methods that end where a motion sticks, by the status they end with; houbolt and wilson take
+#: fixed steps.
+STICKING = [
+    *((method, None) for method in ("rodas4", "kvaerno5", "esdirk436", "genalpha", "hht")),
+    *((method, 0.01) for method in ("kvaerno5", "genalpha", "newmark", "wilson", "houbolt")),
+]
+
+
+@pytest.mark.parametrize("method, step", STICKING)
+@pytest.mark.parametrize("effort", ["-sign(u)", "sin(t) - 2*sign(u)"])
+def test_implicit_methods_name_what_a_motion_sticks_to(
+    effort: str, method: str, step: float | None
+) -> None:
+    result = moved(effort, 5.0, u=0.3, method=method, step=step, max_steps=5000)
+    assert result.status in (Status.TOO_MANY_STEPS, Status.NOT_CONVERGED), result.message
+    assert "'sign(u)' (effort of hinge \"h\") switches" in result.message
+    assert result.message.count("make it smooth") == 1
+
+
+def test_a_switch_far_from_the_end_is_not_blamed() -> None:
+    result = moved("-1e-3*sign(u) - q", 50.0, u=1.0, method="kvaerno5", max_steps=20)
+    assert result.status is Status.TOO_MANY_STEPS and "switches" not in result.message
