@@ -209,7 +209,7 @@ def simulate(
     if plan.plot is not None:
         names = plan.quantities or report.default_panels(result)
         result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
-    _report(plan, result, seconds, json)
+    _report(plan, result, seconds + result.trajectory.before, json)
     if interrupted(result):
         raise typer.Exit(130)
     if not result.success:

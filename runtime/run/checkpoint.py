@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 State = Mapping[str, Any]
 
-_FORMAT = "mstmm checkpoint 4"
+_FORMAT = "mstmm checkpoint 5"
 _ROWS = ("t", "y", "memory", "event")
 
 #: Name, kind of numbers and axes of what a file holds.
 _STATE = (
     ("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0),
-    ("methods", "U", 0),
+    ("methods", "U", 0), ("seconds", "f", 0),
 )  # fmt: skip
 _SAMPLES = (("t", "f", 1), ("y", "f", 2), ("memory", "f", 2), ("event", "i", 1))
 
@@ -89,6 +89,8 @@ class Checkpoint:
                     "run without resume to start again"
                 )
         state = {name: self._taken(data, name, kind, ndim) for name, kind, ndim in _STATE}
+        if not 0.0 <= state["seconds"] < np.inf:
+            raise self.damaged("a time that no run can have taken")
         rows = [self._taken(data, name, kind, ndim) for name, kind, ndim in _SAMPLES]
         times = rows[0]
         if len({len(row) for row in rows}) > 1 or not np.all(times[1:] >= times[:-1]):

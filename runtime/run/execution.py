@@ -47,7 +47,8 @@ class Watch:
         self.checkpoint: Checkpoint | None = None
         self.engine = compiled_run.LOOPED
         self.choice: Choice | None = None
-        self._saved = time.monotonic()
+        self.before = 0.0  # s of wall time that earlier processes spent on the run
+        self._begun = self._saved = time.monotonic()
 
     def tell(self, t: float) -> None:
         """The run is at time t.  A callback that raises is not called again; the run goes on."""
@@ -76,6 +77,7 @@ class Watch:
                 methods = "" if self.choice is None else self.choice.state()
                 said = {"engine": self.engine, "message": message, "methods": methods}
                 words = {name: np.array(text) for name, text in said.items()}
+                words["seconds"] = np.array(self.before + time.monotonic() - self._begun)
                 self.checkpoint.save({**run.state(), **words}, _joined(earlier, run.samples))
             except (MstmmError, MemoryError) as error:
                 note = f"no checkpoint: {error or 'there is not enough memory'}"
@@ -109,6 +111,7 @@ def first_run(
     message = "" if run.status is Status.RUNNING else said(system, run, run.status)
     if state is not None and earlier is not None and watch.checkpoint is not None:
         message = _restored(run, state, earlier, watch.checkpoint, watch.choice)
+        watch.before = float(state["seconds"])
     look = 0 if compiled else compiled_run.look_after(model, settings)
     status: Status | None = run.status
     if status is Status.RUNNING and run.statistics.steps < look:
@@ -124,6 +127,7 @@ def first_run(
     if status is Status.RUNNING:
         status, message = _advanced(system, run, watch, earlier)
     found = trajectory(system, run, settings, status, message, earlier)
+    found = replace(found, before=watch.before)
     if watch.choice is not None:
         found = replace(found, methods=tuple(watch.choice.stretches))
     if step is not None and status is not None and not found.success:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli.commands import Command
 
@@ -50,9 +51,14 @@ def test_a_result_that_cannot_be_saved(
         done = mstmm(*RUN, *options)
     assert done.code == code and said in done.err and KEPT in done.err
     assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv.checkpoint"}
+    with np.load(folder / "a.csv.checkpoint") as file:
+        data = {key: file[key] for key in file.files}
+    with (folder / "a.csv.checkpoint").open("wb") as kept:
+        np.savez(kept, **(data | {"seconds": np.array(5000.0)}))
     with monkeypatch.context() as patch:
         patch.setattr(execution, "_advanced", fail)  # nothing is computed again
-        assert mstmm(*RUN, "--resume").code == 0
+        again = mstmm(*RUN, "--resume", "--json")
+    assert again.code == 0 and json.loads(again.out)["seconds"] > 5000
     assert (folder / "a.csv").read_bytes() == whole
     assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv"}
 

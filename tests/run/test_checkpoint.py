@@ -165,6 +165,7 @@ EDITS: dict[str, Callable[[Any], Any]] = {
     "integer": lambda integer: np.where(np.arange(len(integer)) == 8, 999, integer),
     "engine": lambda engine: np.zeros(3),
     "message": lambda message: np.array(7),
+    "seconds": lambda seconds: seconds - 1e9,
 }
 
 
@@ -181,6 +182,29 @@ def test_a_checkpoint_that_was_edited(tmp_path: Path, name: str) -> None:
     np.savez(path, **data)
     with pytest.raises(mstmm.SceneError, match=r"damaged|another scene, method or version"):
         model.simulate(1.0, checkpoint=path, resume=True)
+
+
+def spend(path: Path, seconds: float) -> None:
+    """Let the run of a checkpoint have taken so long."""
+    with np.load(path) as file:
+        data = {key: file[key] for key in file.files}
+    np.savez(path, **(data | {"seconds": np.array(seconds)}))
+
+
+def test_the_time_of_all_pieces_is_kept(
+    tmp_path: Path, heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
+    for at in (1.0, 2.0):
+        with monkeypatch.context() as patch:
+            interrupted(patch, at)
+            run = model.simulate(5.0, checkpoint=path, resume=at > 1, step=0.01, method="rk4")
+        with np.load(path) as file:
+            assert file["seconds"] > (5000.0 if at > 1 else 0.0)
+        assert run.trajectory.before == (5000.0 if at > 1 else 0.0)
+        spend(path, 5000.0)
+    run = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
+    assert run.success and run.trajectory.before == 5000.0
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.97])
