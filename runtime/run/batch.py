@@ -29,6 +29,7 @@ from ..pack.switches import has_switches
 from . import classical, second_opinion
 from .lanes import Lanes, run_lanes
 from .simulate import advance, choice_of, make_run, said, settled, trajectory
+from .stretches import Stretch
 from .system import SceneCode, SceneSystem
 from .threads import on_threads
 
@@ -49,6 +50,8 @@ class BatchResult:
         messages: n sentences; for a failure cause, time and element.
         evaluations: (n,) calls of the right-hand side.
         engine: how it was computed, in words.
+        methods: n times what each run did, where runs choose among methods ("auto"); empty for
+            those of one method.
     """
 
     t: Array
@@ -58,6 +61,7 @@ class BatchResult:
     messages: tuple[str, ...]
     evaluations: NDArray[np.int64]
     engine: str
+    methods: tuple[tuple[Stretch, ...], ...]
 
     def __repr__(self) -> str:
         return f"<BatchResult: {int(self.success.sum())} of {len(self.success)} runs succeeded>"
@@ -71,6 +75,7 @@ class _Rows:
     success: NDArray[np.bool_]
     messages: list[str]
     evaluations: NDArray[np.int64]
+    methods: list[tuple[Stretch, ...]]
 
 
 def simulate_batch(
@@ -89,7 +94,7 @@ def simulate_batch(
     count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(
         np.full((n, len(times), model.nq + model.nu), np.nan),
-        np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64),
+        np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64), [()] * n,
     )  # fmt: skip
     ours = np.array([library is not None and m.fusion.lanes is library for m in models], bool)
     if library is not None and ours.any():
@@ -102,6 +107,7 @@ def simulate_batch(
     return BatchResult(
         times, rows.samples[..., :nq].copy(), rows.samples[..., nq:].copy(), rows.success,
         tuple(rows.messages), rows.evaluations, f"{how} on {count} threads",
+        tuple(rows.methods),
     )  # fmt: skip
 
 
@@ -222,12 +228,14 @@ def _alone(
 ) -> None:  # fmt: skip
     system = SceneSystem(model.looped, compiled, with_power=False)
     run = make_run(system, settings, q, u)
-    status = advance(run, look, choice=choice_of(system, settings, run))
+    choice = choice_of(system, settings, run)
+    status = advance(run, look, choice=choice)
     found = trajectory(system, run, settings, status, said(system, run, status))
     places = np.searchsorted(np.asarray(settings.output_times), found.t)
     rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
     rows.success[i], rows.messages[i] = found.success, found.message
     rows.evaluations[i] = found.statistics.evaluations
+    rows.methods[i] = () if choice is None else tuple(choice.stretches)
 
 
 def prepared(

@@ -251,6 +251,11 @@ def test_trajectories_of_a_batch_choose_for_themselves() -> None:
         assert batch.q[i] == pytest.approx(run.q, abs=1e-4)
         one = model.simulate_batch((q[i : i + 1], u[:1]), t_end=0.4, **options)
         assert same_bits(one.q, batch.q[i : i + 1])
+        assert one.methods == batch.methods[i : i + 1]
+        assert [stretch.method for stretch in batch.methods[i]] == names(run)
+        assert [stretch.why for stretch in batch.methods[i]] == [s.why for s in run.methods]
+    plain = model.simulate_batch((q, u), t_end=0.01)
+    assert plain.methods == ((), (), ())
 
 
 def test_what_it_did_is_saved_with_the_result(tmp_path: Path) -> None:
