@@ -126,7 +126,7 @@ def test_an_iteration_by_laws_is_a_residual_and_a_solution() -> None:
         assert counts.tangents == 1
         assert counts.laws_tangents == (tangent == "laws")
         assert counts.iterations == counts.solves == 2 * steps
-        assert counts.residuals == counts.solves + steps  # and the power at the end of every step
+        assert counts.residuals == counts.solves + 2 * steps  # the power amid a step and at its end
 
 
 @pytest.mark.parametrize(

@@ -60,11 +60,33 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
   return status ? status : mstmm_check_finite(work, t, slope);
 }
 
-/* Rates of the quadratures at a state inside the step */
-static int rates_of_quadratures(const mstmm_work *work, double t, double *row, double *to) {
-  const int rest = mstmm_n_rest(work), kind = work->tableau->kind;
-  if (kind != MSTMM_ROSENBROCK && kind != MSTMM_EXPONENTIAL)
-    return mstmm_step_residual(work, t, row, to);
+/* Accelerations at part c of a step of Newmark's family, to a row of its dense output: the slopes
+ * of the speeds, so that the work of drives is what the speeds take up.  A fixed step may be far
+ * too long for a vibration, between whose ends dense output swings: there speeds lie on a straight
+ * line. */
+static int take_accelerations(const mstmm_work *work, double c, double t, double *row) {
+  const int n_q = work->implicit->n_q, fixed = work->run->fixed_step > 0.0;
+  const double *first = work->k + n_q, *last = first + work->tableau->n_stages * work->row;
+  double *a = mstmm_row_a(work, row);
+  for (int j = 0; j < work->implicit->n_u; j++) {
+    const double change = work->y_new[n_q + j] - work->y[n_q + j];
+    const double mean = change / work->run->real.h;
+    if (fixed) row[n_q + j] = work->y[n_q + j] + c * change;
+    a[j] = fixed ? mean
+                 : 6.0 * c * (1.0 - c) * mean + (1.0 - c) * (1.0 - 3.0 * c) * first[j] +
+                       c * (3.0 * c - 2.0) * last[j];
+  }
+  return mstmm_step_impose(work, t, row);
+}
+
+/* Rates of the quadratures at a state within the part c of the step */
+static int rates_of_quadratures(const mstmm_work *work, double c, double *row, double *to) {
+  const int rest = mstmm_n_rest(work);
+  const double t = mstmm_time_in(work->run, c);
+  if (work->tableau->kind == MSTMM_ALPHA) {
+    const int status = take_accelerations(work, c, t, row);
+    return status ? status : mstmm_step_residual(work, t, row, to);
+  }
   const int status = mstmm_evaluate(work, t, row, work->y_event);
   memcpy(to, work->y_event + work->system->n_state - rest, (size_t)rest * sizeof *to);
   return status ? status : mstmm_check_finite(work, t, work->y_event);
@@ -128,8 +150,7 @@ static int integrate_quadratures(const mstmm_work *work) {
   for (int l = 1; l < n - 1; l++) {
     const double c = tableau->inner[l - 1];
     mstmm_dense(work, work->run->real.t + c * h, work->y_stage);
-    const int status = rates_of_quadratures(work, mstmm_time_in(work->run, c), work->y_stage,
-                                            work->nodes + l * rest);
+    const int status = rates_of_quadratures(work, c, work->y_stage, work->nodes + l * rest);
     if (status) return status;
   }
   for (int i = 0; i < rest; i++) {

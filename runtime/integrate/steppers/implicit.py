@@ -24,7 +24,7 @@ from .tableau import Tableau, divided_difference, frozen, hermite, integrals_in_
 ROSENBROCK, DIRK, ALPHA, EXPONENTIAL = 1, 2, 3, 4  # as in `c/integrate.h`
 
 #: Nodes between the ends of a step of the rules of Lobatto, by the order that is asked for.
-_LOBATTO = {2: (), 4: (0.5,), 6: ((1 - math.sqrt(0.2)) / 2, (1 + math.sqrt(0.2)) / 2)}
+_LOBATTO = {4: (0.5,), 6: ((1 - math.sqrt(0.2)) / 2, (1 + math.sqrt(0.2)) / 2)}
 
 
 def numbers(text: str) -> Array:
@@ -65,7 +65,7 @@ class Implicit(Tableau):
     @property
     def inner(self) -> Array:
         """Nodes between a step's ends at which rates of quadratures are taken."""
-        wanted = 2 if self.order <= 2 else 4 if self.order <= 4 else 6
+        wanted = 4 if self.order <= 4 else 6
         return frozen(_LOBATTO[wanted])
 
     @property
