@@ -204,7 +204,7 @@ class Calls:
             )
         if reason == Failed.TANGENT:
             name = self.hinge_name(element) if element >= 0 else ""
-            what = f'hinge "{name}"' if name else "the springs and loads across the tree"
+            what = f'hinge "{name}"' if name else "what acts between bodies"
             if int(failure.code) == NEGATIVE:
                 return (
                     f"{what} {at}: a motion leaves by itself faster than the step allows (a "
