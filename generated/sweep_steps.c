@@ -2062,6 +2062,14 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
     if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
     mstmm_frames_opposite(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
+    memset(d_A_F, 0, 9 * sizeof(real));
+    memset(d_x_F, 0, 3 * sizeof(real));
+    memset(d_v_F, 0, 3 * sizeof(real));
+    memset(d_w_F, 0, 3 * sizeof(real));
+    memset(d_A_T, 0, 9 * sizeof(real));
+    memset(d_x_T, 0, 3 * sizeof(real));
+    memset(d_v_T, 0, 3 * sizeof(real));
+    memset(d_w_T, 0, 3 * sizeof(real));
     for (int c = 0; c < 9; c++) {
         mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c);
         mstmm_frames_placed_pose(
@@ -2069,31 +2077,44 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
             .d_A = d_block + MSTMM_BLOCK_A, .d_x = d_block + MSTMM_BLOCK_X,
             .d_v = d_block + MSTMM_BLOCK_V);
         memcpy(d_block + MSTMM_BLOCK_E, place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
-        mstmm_frames_point_slope(
-            .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
-            .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
-            .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
-            .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION,
-            .d_x_K = d_x_F, .d_v_K = d_v_F);
-        mstmm_frames_turning_slope(
-            .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-            .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION,
-            .d_w_K = d_w_F);
-        mstmm_frames_end_frame_slope(
-            .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
-            .d_A_end = d_A_F);
-        mstmm_frames_point_slope(
-            .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
-            .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
-            .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
-            .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
-            .d_v_K = d_v_T);
-        mstmm_frames_turning_slope(
-            .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-            .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
-        mstmm_frames_end_frame_slope(
-            .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
-            .d_A_end = d_A_T);
+        if (force->body_f >= 0) {
+            mstmm_frames_point_slope(
+                .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+                .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .offset = force->offset_f, .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_x = d_from + MSTMM_BLOCK_X, .d_v = d_from + MSTMM_BLOCK_V,
+                .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F, .d_v_K = d_v_F);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_turning_slope(
+                .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION,
+                .delta = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_end_frame_slope(
+                .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_A_end = d_A_F);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_point_slope(
+                .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+                .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .offset = force->offset_t, .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A,
+                .d_x = d_to + MSTMM_BLOCK_X, .d_v = d_to + MSTMM_BLOCK_V,
+                .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T, .d_v_K = d_v_T);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_turning_slope(
+                .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION,
+                .d_w_K = d_w_T);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_end_frame_slope(
+                .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+                .d_A_end = d_A_T);
+        }
         d_effort[0] = 0;
         if (force->effort) {
             mstmm_frames_length_slope(
@@ -2113,14 +2134,18 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
         mstmm_frames_opposite_slope(
             .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
             .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
-        mstmm_frames_applied_load_slope(
-            .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
-            .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
-            .d_e = d_to + MSTMM_BLOCK_E);
-        mstmm_frames_applied_load_slope(
-            .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
-            .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
-            .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        if (force->body_t >= 0) {
+            mstmm_frames_applied_load_slope(
+                .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t,
+                .F = F, .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F,
+                .d_M = d_M, .d_e = d_to + MSTMM_BLOCK_E);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_applied_load_slope(
+                .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
+                .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
+                .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        }
         memcpy(place + MSTMM_PLACE_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
     }
     mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1);
@@ -2130,31 +2155,44 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
     for (int c = 0; c < 3; c++) {
         mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c);
         memcpy(d_block + MSTMM_BLOCK_E, tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
-        mstmm_frames_point_slope(
-            .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
-            .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
-            .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
-            .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION,
-            .d_x_K = d_x_F, .d_v_K = d_v_F);
-        mstmm_frames_turning_slope(
-            .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-            .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION,
-            .d_w_K = d_w_F);
-        mstmm_frames_end_frame_slope(
-            .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
-            .d_A_end = d_A_F);
-        mstmm_frames_point_slope(
-            .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
-            .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
-            .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
-            .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
-            .d_v_K = d_v_T);
-        mstmm_frames_turning_slope(
-            .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-            .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
-        mstmm_frames_end_frame_slope(
-            .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
-            .d_A_end = d_A_T);
+        if (force->body_f >= 0) {
+            mstmm_frames_point_slope(
+                .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+                .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .offset = force->offset_f, .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_x = d_from + MSTMM_BLOCK_X, .d_v = d_from + MSTMM_BLOCK_V,
+                .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F, .d_v_K = d_v_F);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_turning_slope(
+                .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION,
+                .delta = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_end_frame_slope(
+                .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .d_A = d_from + MSTMM_BLOCK_A,
+                .d_A_end = d_A_F);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_point_slope(
+                .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+                .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .offset = force->offset_t, .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A,
+                .d_x = d_to + MSTMM_BLOCK_X, .d_v = d_to + MSTMM_BLOCK_V,
+                .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T, .d_v_K = d_v_T);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_turning_slope(
+                .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+                .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION,
+                .d_w_K = d_w_T);
+        }
+        if (force->body_t >= 0) {
+            mstmm_frames_end_frame_slope(
+                .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .d_A = d_to + MSTMM_BLOCK_A,
+                .d_A_end = d_A_T);
+        }
         d_effort[0] = 0;
         if (force->effort) {
             mstmm_frames_length_slope(
@@ -2174,14 +2212,18 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
         mstmm_frames_opposite_slope(
             .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
             .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
-        mstmm_frames_applied_load_slope(
-            .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
-            .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F, .d_M = d_M,
-            .d_e = d_to + MSTMM_BLOCK_E);
-        mstmm_frames_applied_load_slope(
-            .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
-            .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
-            .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        if (force->body_t >= 0) {
+            mstmm_frames_applied_load_slope(
+                .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t,
+                .F = F, .M = M, .d_A = d_to + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F,
+                .d_M = d_M, .d_e = d_to + MSTMM_BLOCK_E);
+        }
+        if (force->body_f >= 0) {
+            mstmm_frames_applied_load_slope(
+                .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f,
+                .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
+                .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+        }
         memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
     }
     mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1);

@@ -7,6 +7,8 @@ differentiated passes of the loads themselves, along every entry of the body's p
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .flexible import DRAG
 from .loads import FORCES, LOADS
 from .slope import D, sloped, slopes, still
@@ -71,13 +73,25 @@ def _moves(step: Step) -> bool:
     return isinstance(step, (Copy, Add, Gather, Evaluate)) and step.to.startswith(D)
 
 
+def _of_its_end(step: Step) -> Step:
+    """A step about one end alone, where that end is not on the ground."""
+    slots = [slot for _, slot in step.ports] if isinstance(step, Call) else []
+    for role in ("from", "to"):
+        if any(slot.startswith(f"{role}.") for slot in slots):
+            return replace(step, when=f"{role}_body")
+    return step
+
+
 _FORCE = tuple(slopes(FORCES.steps))
-_FORCE_MOVED = tuple(filter(_moves, _FORCE))
+_FORCE_MOVED = tuple(map(_of_its_end, filter(_moves, _FORCE)))
+#: What is known of the end on the ground.
+_GROUNDED = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
 
 FORCES_BY_PLACE = Pass(
     "forces_by_place", "force", "Change of an element to the ground as its body moves.",
     (
         *(step for step in _FORCE if not _moves(step)),
+        *_GROUNDED,
         *_along("place", *_added("place.S", *_FORCE_MOVED)),
         Along(of="spin", steps=_added("tangent.S", *_FORCE_MOVED)),
     ),

@@ -289,6 +289,8 @@ TRAITS: dict[str, str] = {
     "flexible": "there are flexible bodies",
     "placed": "loads on the body or outboard of it change with its place and nothing else",
     "own_load": "the load changes with the place of its body and nothing else",
+    "from_body": "its end F is on a body, not on the ground",
+    "to_body": "its end T is on a body, not on the ground",
     "own_force": "the element is between a body and the ground",
     "posed": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
