@@ -29,6 +29,7 @@ from .errors import (
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from .atlas.atlas import Atlas, stability
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
     from .runtime.model.loading import load_result
@@ -47,12 +48,14 @@ _LAZY = {
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
     "load_result": (".runtime.model.loading", "load_result"),
+    "stability": (".atlas.atlas", "stability"),
+    "Atlas": (".atlas.atlas", "Atlas"),
 }
 
 __all__ = [
-    "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
+    "Atlas", "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
     "NumericalFailure", "Result", "Scene", "SceneError", "compile",
-    "generate_file", "load_result", "load_scene", "register",
+    "generate_file", "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 
 

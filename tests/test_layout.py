@@ -25,7 +25,7 @@ SETUPTOOLS = PROJECT["tool"]["setuptools"]
 ROOMS = ("derive", "templates", "generated", "runtime")
 
 # The rooms of mstmm that join derivation and numbers, and the face that names what they offer.
-BRIDGES = {"bridge", "cli"}
+BRIDGES = {"atlas", "bridge", "cli"}
 
 
 def room_folder(package: str) -> Path:

@@ -17,6 +17,7 @@ from .generate import generate
 from .listing import list_elements
 from .show import show
 from .simulate import simulate
+from .stability import stability
 
 
 class Commands(TyperGroup):
@@ -71,6 +72,7 @@ app.command("simulate")(simulate)
 app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)
+app.command("stability")(stability)
 app.command("generate")(generate)
 app.command("cache")(cache)
 app.command("doctor")(doctor)

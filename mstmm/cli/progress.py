@@ -29,14 +29,17 @@ class Bar:
             self._bar.reset(self._task, description=text)
 
     def __call__(self, t: float, t_end: float) -> None:
+        self.share(t / t_end if t_end > 0 else 1.0, f"t = {t:.4g} of {t_end:.4g} s")
+
+    def share(self, part: float, state: str) -> None:
+        """So much of all is done, 0 to 1, and what says so in words."""
         if not self._shown:
             return
         if self._bar is None:
             if time.monotonic() - self._begin < PATIENCE:
                 return
             self._start()
-        share = t / t_end if t_end > 0 else 1.0
-        self._bar.update(self._task, completed=share, state=f"t = {t:.4g} of {t_end:.4g} s")
+        self._bar.update(self._task, completed=part, state=state)
 
     def _start(self) -> None:
         from rich.console import Console

@@ -1,0 +1,87 @@
+"""The atlas: its cases measured, as data, as pictures and as a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError
+from ..runtime.host.files import replacing
+from . import cases as known
+from .case import Case, measure
+
+#: Values of a coarse grid, and how close a bracket is brought, as a part of the parameter.
+POINTS, TOLERANCE = 13, 0.01
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """Cases in the order in which they were asked for."""
+
+    cases: tuple[Case, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """{"cases": [...]}, plain data."""
+        return {"cases": [case.to_dict() for case in self.cases]}
+
+    def plot(self, folder: str | Path) -> list[Path]:
+        """A picture NAME.png of each case in a folder that is there; their paths.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        paths = [Path(folder) / f"{case.name}.png" for case in self.cases]
+        for case, path in zip(self.cases, paths, strict=True):
+            case.plot(path)
+        return paths
+
+    def save(self, folder: str | Path, pictures: bool = True) -> list[Path]:
+        """`atlas.json`, the page `index.md` and, if wanted, a picture of each case; their paths.
+
+        The folder is made if its parent is there.  Raises EnvironmentFailure where nothing can be
+        written.
+        """
+        from .page import page
+
+        place = Path(folder)
+        place.mkdir(exist_ok=True)
+        data, text = place / "atlas.json", place / "index.md"
+        with replacing(data) as temporary:
+            temporary.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        with replacing(text) as temporary:
+            temporary.write_text(page(self.cases, pictures), encoding="utf-8")
+        return [data, text, *(self.plot(place) if pictures else ())]
+
+
+def stability(
+    cases: Iterable[str] | None = None,
+    *,
+    points: int = POINTS,
+    tolerance: float = TOLERANCE,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Atlas:
+    """Find where methods fail, and how far their remedies hold.
+
+    Args:
+        cases: names (`mstmm stability --list`); all if not given.
+        points: values of the coarse grid along each parameter, 3 or more.
+        tolerance: how close the two ends of a frontier are brought, as a part of the parameter.
+        progress: called with a case's name, its number from 0 and how many there are.
+
+    Raises SceneError for a name that there is not and for settings that make no sense.
+    """
+    if isinstance(cases, str):
+        raise SceneError(f'cases = "{cases:.60}": expected a list of names')
+    if isinstance(points, bool) or not isinstance(points, int) or not 3 <= points <= 1000:
+        raise SceneError(f"points = {points!r}: expected a whole number from 3 to 1000")
+    if not 0 < tolerance < 1:
+        raise SceneError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
+    found = []
+    definitions = known.chosen(None if cases is None else list(cases))
+    for number, definition in enumerate(definitions):
+        if progress is not None:
+            progress(definition.name, number, len(definitions))
+        found.append(measure(definition, points, tolerance))
+    return Atlas(tuple(found))

@@ -1,0 +1,110 @@
+"""A picture of a case: both methods along the parameter, the limit, and the side that fails."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SceneError
+from ..extras import missing
+from ..runtime.host.files import replacing
+
+if TYPE_CHECKING:
+    from .found import Found
+    from .frontier import Points
+
+#: Colours that stay apart in grey and for colour-blind readers (Okabe and Ito, 2008).
+_FAILING, _REMEDY, _SIDE = "#D55E00", "#0072B2", "#fbe6da"
+
+_STYLE: dict[str, Any] = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.edgecolor": "#555555",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "savefig.dpi": 110,
+}
+
+#: What is measured is drawn between these powers of ten.
+_LEAST, _MOST = 1e-17, 1e6
+
+
+def draw(case: Found, path: Path | None) -> Any:
+    """See `Case.plot`."""
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise missing("plot", "a picture", error) from None
+    style: Any = _STYLE
+    with mpl.rc_context(style):
+        figure = Figure(figsize=(6.4, 3.7), layout="constrained")
+        _fill(figure.subplots(), case)
+        if path is not None:
+            _write(figure, path)
+    return figure
+
+
+def _fill(axis: Any, case: Found) -> None:
+    if case.scale != "linear":
+        axis.set_xscale("log")
+    axis.set_yscale("log")
+    everything = (*case.points, *case.remedy_points)
+    left, right = min(everything)[0], max(everything)[0]
+    low, high = _heights(everything, case.limit)
+    top = math.sqrt(_room(low, high)) * high
+    axis.set_ylim(low / _room(low, high), high * _room(low, high) ** 2)
+    axis.axvspan(case.fails_at, right if case.fails == "above" else left, color=_SIDE, zorder=0)
+    axis.axvline(case.fails_at, color=_FAILING, linewidth=1.0, linestyle=":")
+    axis.axhline(case.limit, color="#555555", linewidth=1.0, linestyle="--")
+    _curve(axis, case.points, top, color=_FAILING, marker="o", label=case.method)
+    _curve(axis, case.remedy_points, top, color=_REMEDY, marker="s", label=case.remedy)
+    _name_frontier(axis, case.fails_at)
+    axis.set_title(case.title, loc="left", fontsize=10, fontweight="bold")
+    axis.set_xlabel(f"{case.parameter} in {case.unit}" if case.unit else case.parameter)
+    axis.set_ylabel(case.measured)
+    axis.figure.legend(loc="outside lower center", ncols=2, handlelength=1.6)
+
+
+def _name_frontier(axis: Any, at: float) -> None:
+    """Its parameter, at the foot of the line, on the side that has more room."""
+    left, _ = axis.transAxes.inverted().transform(axis.transData.transform((at, 1.0)))
+    axis.annotate(
+        f"fails at {at:.3g}", (at, 0.02), xycoords=("data", "axes fraction"),
+        xytext=(-4 if left > 0.5 else 4, 0), textcoords="offset points", color=_FAILING,
+        ha="right" if left > 0.5 else "left",
+    )  # fmt: skip
+
+
+def _heights(points: Points, limit: float) -> tuple[float, float]:
+    """The least and the largest of what is finite and of the limit, within `_LEAST` and `_MOST`."""
+    found = [min(max(m, _LEAST), _MOST) for _, m in points if math.isfinite(m)]
+    return min(*found, limit), max(*found, limit)
+
+
+def _room(low: float, high: float) -> float:
+    """The factor that is left free at either end of the axis of what is measured."""
+    return max((high / low) ** 0.06, 1.3)
+
+
+def _curve(axis: Any, points: Points, top: float, **look: Any) -> None:
+    """A line through what was measured; arrows at the top where there was no answer."""
+    shown = [(at, max(m, _LEAST)) for at, m in points if m <= _MOST]
+    axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **look)
+    lost = [at for at, m in points if not m <= _MOST]
+    axis.plot(
+        lost, [top] * len(lost), color=look["color"], marker=10, linestyle="none", markersize=5
+    )
+
+
+def _write(figure: Any, path: Path) -> None:
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise SceneError(f'picture "{path}": expected a name that ends in .png, .svg or .pdf')
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind)

@@ -1,0 +1,50 @@
+"""Scenes that several cases share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..bridge.compilation import compile_scene
+from ..runtime.model.model import Model
+from ..scene import Scene
+
+#: Moments of inertia of a uniform rod of 1 m and 1 kg, along it and across, kg*m2.
+THIN, ROD = 0.001, 1 / 12
+
+
+def model(scene: dict[str, Any], **options: Any) -> Model:
+    """A scene by the looped engine: no compiler, the same numbers everywhere."""
+    return compile_scene(Scene(**scene), engine="looped", **options)
+
+
+def rod(name: str, mass: float = 1.0, inertia: Sequence[float] | None = None) -> dict[str, Any]:
+    """A uniform rod of 1 m along x from its input end to its end `tip`."""
+    moments = inertia or (THIN, ROD, ROD)
+    return {
+        "name": name, "mass": mass, "center_of_mass": [0.5, 0, 0],
+        "inertia": [mass * value for value in moments], "ends": {"tip": [1, 0, 0]},
+    }  # fmt: skip
+
+
+def chain(count: int, kind: str = "pin", skew: float = 0.0, **of_rods: Any) -> dict[str, Any]:
+    """Equal rods on hinges of one kind in a row, `skew` rad about their own axes between
+    neighbours' hinges; gravity along -y."""
+    return {
+        "gravity": [0, -9.81, 0],
+        "chain": [{
+            "name": "c", "count": count, "inboard": "ground",
+            "body": {key: value for key, value in rod("", **of_rods).items() if key != "name"}
+            | {"ends": {"tip": {"position": [1, 0, 0], "orientation": [skew, 0, 0]}}},
+            "hinge": {"type": kind},
+        }],
+    }  # fmt: skip
+
+
+def drawn_pins(count: int) -> list[tuple[Array, Array]]:
+    """Three states of pins, angles and rates within +-1, the same in every run."""
+    rng = np.random.default_rng(1)
+    return [(rng.uniform(-1, 1, count), rng.uniform(-1, 1, count)) for _ in range(3)]

@@ -1,0 +1,115 @@
+"""`mstmm stability`: where methods fail, found anew, and how far their remedies hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mstmm.errors import EnvironmentFailure, MstmmError
+
+from .options import Json, output_file
+
+if TYPE_CHECKING:
+    from mstmm.atlas.atlas import Atlas
+
+
+def stability(
+    case: Annotated[
+        list[str] | None,
+        typer.Option("--case", metavar="NAME", help="This case; may be given again. [all]"),
+    ] = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", metavar="DIR", help="Where atlas.json, index.md and pictures go."),
+    ] = None,
+    only_list: Annotated[
+        bool, typer.Option("--list", help="List the cases; nothing is computed.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Find where methods fail, name the remedies and show how far they hold."""
+    if only_list:
+        _list(case, json)
+        return
+    if out is None:
+        raise typer.BadParameter("give the folder of the pictures, --out DIR, or --list")
+    from mstmm.atlas import cases
+
+    from . import output
+    from .extras import install, missing
+
+    cases.chosen(case)  # before a folder is made
+    folder, lacking = _folder(out), missing("plot")
+    atlas = _found(case)
+    files = atlas.save(folder, pictures=not lacking)
+    if json:
+        output.emit_json({**atlas.to_dict(), "files": [str(file) for file in files]})
+        return
+    _tell(atlas)
+    output.say(f"{folder}: {', '.join(file.name for file in files)}")
+    if lacking:
+        output.say(f"no pictures: they need {', '.join(lacking)}: {install('plot')}")
+
+
+def _list(wanted: list[str] | None, json: bool) -> None:
+    from mstmm.atlas import cases
+
+    from . import output
+
+    found = cases.chosen(wanted)
+    if json:
+        keys = ("name", "title", "parameter", "unit", "measured", "limit", "source")
+        rows = [
+            {key: getattr(one, key) for key in keys}
+            | {"method": one.method.name, "remedy": one.remedy.name}
+            for one in found
+        ]
+        output.emit_json({"cases": rows})
+        return
+    lines = [(one.name, one.title, one.parameter, one.remedy.name) for one in found]
+    output.console().print(output.table("", ("case", "what", "parameter", "remedy"), lines))
+
+
+def _folder(text: str) -> Path:
+    """The folder, made if its parent is there; something can be written in it."""
+    place = Path(text)
+    try:
+        if "\0" in text or not text or (place.exists() and not place.is_dir()):
+            raise MstmmError(f"--out {text}: this is not a folder; take another name")
+        if not place.parent.is_dir():
+            raise MstmmError(f"--out {text}: there is no folder {place.parent}; create it first")
+        place.mkdir(exist_ok=True)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"--out {text}: the folder cannot be made ({error.strerror}); take another place"
+        ) from None
+    output_file(str(place / "atlas.json"), (), "--out")
+    return place
+
+
+def _found(wanted: list[str] | None) -> Atlas:
+    from mstmm.atlas.atlas import stability as measured
+
+    from .progress import bar
+
+    with bar() as shown:
+
+        def progress(name: str, number: int, count: int) -> None:
+            shown.label(f"case {name}")
+            shown.share(number / count, f"{number} of {count} cases")
+
+        return measured(wanted, progress=progress)
+
+
+def _tell(atlas: Atlas) -> None:
+    from mstmm.atlas.page import frontier, held_to, in_unit
+
+    from . import output
+
+    columns = ("case", "parameter", "fails", "remedy", "holds to>")
+    rows = [
+        (one.name, in_unit(one), frontier(one), one.remedy, held_to(one)) for one in atlas.cases
+    ]
+    output.console().print(output.table("", columns, rows))

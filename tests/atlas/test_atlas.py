@@ -1,0 +1,88 @@
+"""The atlas as data, as files and as pictures, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mstmm
+from mstmm.errors import SceneError
+
+
+@pytest.fixture(scope="module")
+def atlas() -> mstmm.Atlas:
+    return mstmm.stability(["product-pivot", "product-angle"], points=3, tolerance=0.3)
+
+
+def test_cases_come_in_the_order_in_which_they_are_asked_for(atlas: mstmm.Atlas) -> None:
+    assert [case.name for case in atlas.cases] == ["product-pivot", "product-angle"]
+
+
+def test_plain_data(atlas: mstmm.Atlas) -> None:
+    data = json.loads(json.dumps(atlas.to_dict(), allow_nan=False))
+    first = data["cases"][0]
+    assert {"name", "parameter", "fails_at", "remedy", "remedy_holds_to", "source"} <= set(first)
+    assert first["fails_at"] == atlas.cases[0].fails_at
+    assert [1e-10, None] in first["points"]
+
+
+def test_what_is_saved(atlas: mstmm.Atlas, tmp_path: Path) -> None:
+    folder = tmp_path / "found"
+    files = atlas.save(folder)
+    assert sorted(path.name for path in files) == sorted(path.name for path in folder.iterdir())
+    assert json.loads((folder / "atlas.json").read_text()) == atlas.to_dict()
+    page = (folder / "index.md").read_text()
+    for case in atlas.cases:
+        picture = folder / f"{case.name}.png"
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert 5_000 < picture.stat().st_size < 60_000
+        assert f"]({picture.name})" in page
+        assert f"| {case.remedy} |" in page
+
+
+def test_without_pictures_the_page_names_none(atlas: mstmm.Atlas, tmp_path: Path) -> None:
+    files = atlas.save(tmp_path, pictures=False)
+    assert [path.name for path in files] == ["atlas.json", "index.md"]
+    assert ".png" not in files[1].read_text()
+
+
+def test_a_picture_shows_both_methods_and_the_frontier(atlas: mstmm.Atlas) -> None:
+    case = atlas.cases[0]
+    figure = case.plot()
+    (axes,) = figure.axes
+    labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert labels == [case.method, case.remedy]
+    assert f"{case.fails_at:.3g}" in [text.get_text().split()[-1] for text in axes.texts]
+    assert axes.get_title(loc="left") == case.title
+
+
+def test_a_picture_of_another_kind_is_refused(atlas: mstmm.Atlas, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"ends in \.png, \.svg or \.pdf"):
+        atlas.cases[0].plot(tmp_path / "picture.gif")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"cases": ["product-lenght"]}, 'did you mean "product-length"'),
+        ({"cases": "product-length"}, "expected a list of names"),
+        ({"points": 2}, "points = 2"),
+        ({"points": 3.5}, "points = 3.5"),
+        ({"tolerance": 0.0}, "tolerance = 0"),
+        ({"tolerance": float("nan")}, "tolerance = nan"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        mstmm.stability(**arguments)
+
+
+def test_progress_is_told() -> None:
+    seen: list[tuple[str, int, int]] = []
+    mstmm.stability(
+        ["product-angle"], points=3, tolerance=0.3, progress=lambda *one: seen.append(one)
+    )
+    assert seen == [("product-angle", 0, 1)]
