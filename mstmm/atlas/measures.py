@@ -11,6 +11,10 @@ from ..arrays import Array
 from ..errors import NumericalFailure
 from ..runtime.model.model import Model
 from ..runtime.result.result import Result
+from .scenes import LET_GO, sprung_rod, stiffness_of_rate
+
+#: Step of the vibrations of a sprung rod, s.
+STEP = 1e-3
 
 
 def finished(run: Result) -> Result:
@@ -38,3 +42,28 @@ def correction(model: Model, states: Iterable[tuple[Array, Array]]) -> float:
         change = model.solve(q, model.inverse_dynamics(q, u, udot))
         worst = max(worst, float(np.abs(change).max() / np.abs(udot - change).max()))
     return worst
+
+
+def growth(model: Model, step: float, steps: int, method: str, **options: Any) -> float:
+    """Largest coordinate over so many fixed steps, as a part of the start's largest."""
+    times = np.arange(steps + 1) * step
+    run = simulated(model, times[-1], method, step, output_times=times, **options)
+    return float(np.abs(run.q).max() / np.abs(run.q[0]).max())
+
+
+def energy_gain(run: Result, exchanged: float) -> float:
+    """The energy exchanged (J) with what comes from nowhere, as a part of it: 1 if nothing does."""
+    energy = np.asarray(run.energy())
+    return 1 + float((energy - energy[0]).max()) / exchanged
+
+
+def amplitude(rate: float, steps: int, method: str, **options: Any) -> Array:
+    """Amplitude of a sprung rod's vibration after each step, as a part of the start's: angle and
+    speed over frequency together.  `rate` is the step times the angular frequency."""
+    run_rate = rate / STEP
+    times = np.arange(steps + 1) * STEP
+    rod = sprung_rod(stiffness_of_rate(run_rate))
+    run = simulated(
+        rod, times[-1], method, STEP, rtol=1e-10, atol=1e-14, output_times=times, **options
+    )
+    return np.hypot(run.q[:, 0], run.u[:, 0] / run_rate) / LET_GO

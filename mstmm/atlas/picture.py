@@ -33,6 +33,12 @@ _STYLE: dict[str, Any] = {
 #: What is measured is drawn between these powers of ten.
 _LEAST, _MOST = 1e-17, 1e6
 
+#: Beyond such a ratio the axis of what is measured is logarithmic.
+_DECADE = 10.0
+
+#: Parts of the axis below and of what is measured, and where arrows stand.
+_FOOT, _FILLED, _ARROWS = 0.05, 0.73, 0.84
+
 
 def draw(case: Found, path: Path | None) -> Any:
     """See `Case.plot`."""
@@ -51,19 +57,16 @@ def draw(case: Found, path: Path | None) -> Any:
 
 
 def _fill(axis: Any, case: Found) -> None:
-    if case.scale != "linear":
-        axis.set_xscale("log")
-    axis.set_yscale("log")
     everything = (*case.points, *case.remedy_points)
     left, right = min(everything)[0], max(everything)[0]
-    low, high = _heights(everything, case.limit)
-    top = math.sqrt(_room(low, high)) * high
-    axis.set_ylim(low / _room(low, high), high * _room(low, high) ** 2)
+    if case.scale != "linear":
+        axis.set_xscale("log")
+    _heights(axis, everything, case.limit)
     axis.axvspan(case.fails_at, right if case.fails == "above" else left, color=_SIDE, zorder=0)
     axis.axvline(case.fails_at, color=_FAILING, linewidth=1.0, linestyle=":")
     axis.axhline(case.limit, color="#555555", linewidth=1.0, linestyle="--")
-    _curve(axis, case.points, top, color=_FAILING, marker="o", label=case.method)
-    _curve(axis, case.remedy_points, top, color=_REMEDY, marker="s", label=case.remedy)
+    _curve(axis, case.points, color=_FAILING, marker="o", label=case.method)
+    _curve(axis, case.remedy_points, color=_REMEDY, marker="s", label=case.remedy)
     _name_frontier(axis, case.fails_at)
     axis.set_title(case.title, loc="left", fontsize=10, fontweight="bold")
     axis.set_xlabel(f"{case.parameter} in {case.unit}" if case.unit else case.parameter)
@@ -71,35 +74,39 @@ def _fill(axis: Any, case: Found) -> None:
     axis.figure.legend(loc="outside lower center", ncols=2, handlelength=1.6)
 
 
+def _heights(axis: Any, points: Points, limit: float) -> None:
+    """Scale and ends of the axis of what is measured: all that is finite, and room above it."""
+    found = [min(max(m, _LEAST), _MOST) for _, m in points if math.isfinite(m)]
+    low, high = min(*found, limit), max(*found, limit)
+    if high > _DECADE * low:
+        axis.set_yscale("log")
+        room = (high / low) ** (1 / _FILLED)
+        axis.set_ylim(low / room**_FOOT, low / room**_FOOT * room)
+    else:
+        room = (high - low) / _FILLED
+        axis.set_ylim(low - _FOOT * room, low - _FOOT * room + room)
+
+
 def _name_frontier(axis: Any, at: float) -> None:
-    """Its parameter, at the foot of the line, on the side that has more room."""
+    """Its parameter at the head of the line, on the side that has more room."""
+    axis.autoscale_view()  # or the transformation is still that of an empty axis
     left, _ = axis.transAxes.inverted().transform(axis.transData.transform((at, 1.0)))
     axis.annotate(
-        f"fails at {at:.3g}", (at, 0.02), xycoords=("data", "axes fraction"),
+        f"fails at {at:.3g}", (at, 0.985), xycoords=("data", "axes fraction"),
         xytext=(-4 if left > 0.5 else 4, 0), textcoords="offset points", color=_FAILING,
-        ha="right" if left > 0.5 else "left",
+        ha="right" if left > 0.5 else "left", va="top",
     )  # fmt: skip
 
 
-def _heights(points: Points, limit: float) -> tuple[float, float]:
-    """The least and the largest of what is finite and of the limit, within `_LEAST` and `_MOST`."""
-    found = [min(max(m, _LEAST), _MOST) for _, m in points if math.isfinite(m)]
-    return min(*found, limit), max(*found, limit)
-
-
-def _room(low: float, high: float) -> float:
-    """The factor that is left free at either end of the axis of what is measured."""
-    return max((high / low) ** 0.06, 1.3)
-
-
-def _curve(axis: Any, points: Points, top: float, **look: Any) -> None:
-    """A line through what was measured; arrows at the top where there was no answer."""
+def _curve(axis: Any, points: Points, **look: Any) -> None:
+    """A line through what was measured; arrows above where there was no answer."""
     shown = [(at, max(m, _LEAST)) for at, m in points if m <= _MOST]
     axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **look)
     lost = [at for at, m in points if not m <= _MOST]
     axis.plot(
-        lost, [top] * len(lost), color=look["color"], marker=10, linestyle="none", markersize=5
-    )
+        lost, [_ARROWS] * len(lost), transform=axis.get_xaxis_transform(), color=look["color"],
+        marker=10, linestyle="none", markersize=5,
+    )  # fmt: skip
 
 
 def _write(figure: Any, path: Path) -> None:

@@ -15,6 +15,12 @@ from ..scene import Scene
 #: Moments of inertia of a uniform rod of 1 m and 1 kg, along it and across, kg*m2.
 THIN, ROD = 0.001, 1 / 12
 
+#: What two rods exchange that fall from the horizontal, J: 1 kg by 0.5 m, 1 kg by 1.5 m.
+FALL = 9.81 * 2.0
+
+#: Angle at which a sprung rod is let go, rad.
+LET_GO = 1e-3
+
 
 def model(scene: dict[str, Any], **options: Any) -> Model:
     """A scene by the looped engine: no compiler, the same numbers everywhere."""
@@ -48,3 +54,33 @@ def drawn_pins(count: int) -> list[tuple[Array, Array]]:
     """Three states of pins, angles and rates within +-1, the same in every run."""
     rng = np.random.default_rng(1)
     return [(rng.uniform(-1, 1, count), rng.uniform(-1, 1, count)) for _ in range(3)]
+
+
+def sprung_rod(stiffness: float, damping: float = 0.0) -> Model:
+    """A rod on a pin with spring and damper (N*m/rad, N*m*s/rad), let go at 1e-3 rad; no weight."""
+    hinge = {
+        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
+        "law": {"stiffness": stiffness, "damping": damping}, "initial": {"q": [LET_GO]},
+    }  # fmt: skip
+    return model({"gravity": [0, 0, 0], "body": [rod("rod")], "hinge": [hinge]})
+
+
+def stiffness_of_rate(rate: float) -> float:
+    """The stiffness, N*m/rad, of which a rod has this angular frequency."""
+    return rate**2 * float(sprung_rod(1.0).mass_matrix([0.0])[0, 0])
+
+
+def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Model:
+    """Two rods that fall from the horizontal, on pins, or on undamped bushings of this stiffness
+    (N/m), of which the first begins stretched (m)."""
+    names = ("upper", "lower")
+    kind: dict[str, Any] = {"type": "pin"}
+    if stiffness is not None:
+        kind = {"type": "elastic", "law": {"stiffness": [stiffness] * 3 + [0.0] * 3}}
+    first = {} if stiffness is None else {"initial": {"q": [stretch, 0, 0, 1, 0, 0, 0]}}
+    hinges = [
+        {"name": "shoulder", "inboard": "ground", "outboard": "upper", **kind, **first},
+        {"name": "elbow", "inboard": "upper.tip", "outboard": "lower", **kind},
+    ]
+    bodies = [rod(name, inertia=(0.01, ROD, ROD)) for name in names]
+    return model({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})

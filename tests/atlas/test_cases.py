@@ -19,6 +19,21 @@ EXPECTED = {
     "product-length": ((16, 25), 1e5),
     "product-angle": ((80.0, 89.0), 90.0),
     "product-pivot": ((1e-2, 0.1), 1e-10),
+    # h omega = sqrt 8, omega = sqrt(3 k) of a rod
+    "rk4-stiffness": ((0.95 * 8e6 / 3, 1.06 * 8e6 / 3), 1e12),
+    # h lambda = 2.785, lambda = 3 c of a rod whose spring does not count
+    "rk4-damping": ((0.95 * 928.4, 1.06 * 928.4), 1e10),
+    # from below h omega = 3, where collocation at 1.4 h sees less than half a period, to 3
+    "wilson-overshoot": ((1.0, 3.2), 1e6),
+    "genalpha-overshoot": ((10.0, 100.0), 1e6),
+    # amplitude left after ten periods: 0.995 at h omega = 0.5, 0.967 at 1; of rodas5p 0.9989 at 1
+    "numerical-damping": ((0.5, 1.0), 1.0),
+    # docs/theory/classical-steps.md: lost at 6.0 s
+    "newmark-constraints": ((4.0, 6.1), 60.0),
+    "one-iteration": ((2e4, 1e6), 1e6),
+    "classical-iteration": ((1e4, 1e6), 1e6),
+    "iterated-steps": ((2e6, 1e8), 1e10),
+    "order-reduction": ((1e3, 1e5), 1e10),
 }
 
 #: Quick settings: frontiers to 3 %.
@@ -66,6 +81,26 @@ def test_a_case_says_what_a_reader_needs(name: str) -> None:
     assert len(case.title) < 75
     assert case.method.name != case.remedy.name
     assert case.reach >= case.high or case.reach <= case.low
+
+
+#: Case -> power of the parameter by which what is measured grows beyond the frontier, and from
+#: where to where that is asked.
+POWERS = {
+    "wilson-overshoot": (2.0, 9.0, 2e3),
+    "genalpha-overshoot": (1.0, 900.0, 2e5),
+    "numerical-damping": (3.0, 0.03, 0.4),
+}
+
+
+@pytest.mark.parametrize("name", POWERS)
+def test_failures_grow_by_the_power_that_is_known(name: str) -> None:
+    """Overshoot of displacements by the square of step times frequency, of speeds by the first
+    power; the loss of a second-order method by the third."""
+    power, low, high = POWERS[name]
+    inside = [(at, m) for at, m in measured(name).points if low <= at <= high]
+    (first, least), (last, most) = inside[0], inside[-1]
+    assert last > 5 * first
+    assert math.log(most / least) / math.log(last / first) == pytest.approx(power, abs=0.1)
 
 
 def test_same_numbers_every_time() -> None:

@@ -1,0 +1,28 @@
+"""Generalised-alpha in its first steps from a stretched spring."""
+
+from __future__ import annotations
+
+from ..definition import Definition, Method
+from ..measures import amplitude
+from ..scale import LOG
+
+STEPS = 20
+
+
+def _overshoot(rate: float, method: str) -> float:
+    return float(amplitude(rate, STEPS, method).max())
+
+
+CASE = Definition(
+    name="genalpha-overshoot",
+    title="Generalised-alpha: speeds after a stretched spring",
+    why="Displacements do not overshoot, but speeds do, in proportion to step times frequency: the "
+    "acceleration of a stretched spring is carried into the next step as if it lasted. Relax "
+    "such a start, resolve it, or take a method that carries no accelerations over.",
+    parameter="step times angular frequency", unit="", low=0.1, high=1e5, scale=LOG,
+    measured="largest amplitude in 20 steps, of the start's", limit=1.05,
+    method=Method("genalpha", lambda rate: _overshoot(rate, "genalpha")),
+    remedy=Method("rodas4p2", lambda rate: _overshoot(rate, "rodas4p2")), reach=1e6,
+    source="Hilber, Hughes, Earthquake Engineering and Structural Dynamics 6, 1978; Chung, "
+    "Hulbert, Journal of Applied Mechanics 60, 1993",
+)  # fmt: skip
