@@ -84,3 +84,12 @@ def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Mod
     ]
     bodies = [rod(name, inertia=(0.01, ROD, ROD)) for name in names]
     return model({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})
+
+
+def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
+    """A body with three different moments of inertia that turns about its mass centre on a hinge of
+    this kind, without weight; `spin` is its angular velocity at the start (rad/s)."""
+    top = {"name": "top", "mass": 1.0, "center_of_mass": [0, 0, 0], "inertia": [0.3, 0.4, 0.5]}
+    foot = {"name": "foot", "type": kind, "inboard": "ground", "outboard": "top"}
+    initial = {} if not any(spin) else {"initial": {"u": list(spin)}}
+    return model({"gravity": [0, 0, 0], "body": [top], "hinge": [foot | initial]})

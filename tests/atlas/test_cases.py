@@ -34,6 +34,12 @@ EXPECTED = {
     "classical-iteration": ((1e4, 1e6), 1e6),
     "iterated-steps": ((2e6, 1e8), 1e10),
     "order-reduction": ((1e3, 1e5), 1e10),
+    # the length falls by (h w / 2)^6 / 144 a step, w = 1.98 rad/s: 1e-6 of 50 s at h = 0.078
+    "quaternion-drift": ((0.074, 0.083), 0.5),
+    "gimbal-passage": ((1e-3, 3e-2), 1e-8),
+    "narrow-pulse": ((3e-3, 0.3), 1e-8),
+    # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s
+    "linear-beam": ((0.8 * 3.798, 3.798), 16.0),
 }
 
 #: Quick settings: frontiers to 3 %.

@@ -1,0 +1,50 @@
+"""Three angles on the way past the attitude at which they fail."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ..definition import Definition, Method
+from ..measures import simulated
+from ..scale import LOG
+from ..scenes import spinning_top
+
+STEP, T_END = 1e-3, 2.0
+
+
+def _end(kind: str, distance: float, *method: str | float, **options: float) -> Array:
+    """Attitude, as a quaternion, of a body that turns at about 1 rad/s, by way of an attitude whose
+    second angle is `distance` rad before 90 degrees."""
+    half = distance / 2
+    start = [0.0, 0.0, distance] if kind == "gimbal" else [np.cos(half), 0.0, 0.0, np.sin(half)]
+    turning = [np.sin(distance), np.cos(distance), 0.0]
+    model = spinning_top(kind)
+    run = simulated(
+        model, T_END, *method, initial=(start, turning), output_times=[T_END], **options
+    )
+    return np.asarray(run.orientation("top")[-1])
+
+
+def _error(distance: float, kind: str) -> float:
+    exact = _end("ball", distance, rtol=1e-13, atol=1e-15)
+    found = _end(kind, distance, "rk4", STEP)
+    return float(min(np.abs(found - exact).max(), np.abs(found + exact).max()))
+
+
+CASE = Definition(
+    name="gimbal-passage",
+    title="Three angles: the attitude at which they fail",
+    why="Where the second of three angles passes 90 degrees the axes of the first and the third "
+    "are one, and their rates grow without bound; steps that were fine everywhere else lose all "
+    "digits. Whether a step hits or jumps the place is luck. The quaternion of a ball hinge has "
+    "no such place.",
+    parameter="distance of the second angle from 90 degrees", unit="rad", low=1e-5, high=0.5,
+    scale=LOG,
+    measured="error of the attitude after 2 s", limit=1e-6,
+    method=Method("gimbal, rk4 with h = 1 ms", lambda distance: _error(distance, "gimbal")),
+    remedy=Method("ball, rk4 with h = 1 ms", lambda distance: _error(distance, "ball")),
+    reach=1e-8,
+    source="Shabana, Dynamics of Multibody Systems, 2020, ch. 2 (singularity of Euler angles); "
+    "matrices of ball hinges: Rui, Wang, Zhang, 2019, ch. 5 (5.49)",
+)  # fmt: skip

@@ -1,0 +1,46 @@
+"""A force that is narrow in the motion, under control of the error."""
+
+from __future__ import annotations
+
+import math
+
+from ..definition import Definition, Method
+from ..measures import simulated
+from ..scale import LOG
+from ..scenes import model, rod
+
+#: Where the pulse lies, rad, and its work, J.
+PLACE, WORK = 5.0, 0.5
+
+
+def _error(width: float, switched: bool) -> float:
+    """Of the speed at the end, which the work of the pulse tells."""
+    strength = WORK / (width * math.sqrt(math.pi))
+    effort = f"{strength!r}*exp(-((q - {PLACE})/{width!r})^2)"
+    if switched:
+        low, high = PLACE - 6 * width, PLACE + 6 * width
+        effort = f"where(q > {low!r}, where(q < {high!r}, {effort}, 0), 0)"
+    hinge = {
+        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
+        "law": {"effort": effort}, "initial": {"u": [1.0]},
+    }  # fmt: skip
+    pushed = model({"gravity": [0, 0, 0], "body": [rod("rod")], "hinge": [hinge]})
+    run = simulated(pushed, 10.0, output_times=[10.0])
+    inertia = float(pushed.mass_matrix([0.0])[0, 0])
+    return abs(float(run.u[-1, 0]) / math.sqrt(1 + 2 * WORK / inertia) - 1)
+
+
+CASE = Definition(
+    name="narrow-pulse",
+    title="Narrow pulses: what lies between the stages of a step",
+    why="A method sees a force at the stages of its steps and nowhere else. Where nothing else "
+    "happens steps grow, and a smooth force that is narrow in the motion is passed over, its work "
+    "with it, while every estimated error is zero. Said with a comparison, the same force is "
+    "located on the way however narrow it is; max_step helps as well, at its price.",
+    parameter="width of the pulse", unit="rad", low=1e-4, high=1.0, scale=LOG,
+    measured="error of the speed behind it, relative", limit=1e-6,
+    method=Method("dop853, rtol 1e-9", lambda width: _error(width, False)),
+    remedy=Method("dop853, the pulse within where()", lambda width: _error(width, True)),
+    reach=1e-8,
+    source="Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 1993, II.6",
+)  # fmt: skip
