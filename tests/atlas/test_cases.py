@@ -19,6 +19,9 @@ EXPECTED = {
     "product-length": ((16, 25), 1e5),
     "product-angle": ((80.0, 89.0), 90.0),
     "product-pivot": ((1e-2, 0.1), 1e-10),
+    "product-masses": ((0.02, 0.2), 1e-6),
+    # docs/theory/classical-steps.md: 4 welded beams of three shapes at h = 0.001
+    "product-beams": ((3, 4), 40),
     # h omega = sqrt 8, omega = sqrt(3 k) of a rod
     "rk4-stiffness": ((0.95 * 8e6 / 3, 1.06 * 8e6 / 3), 1e12),
     # h lambda = 2.785, lambda = 3 c of a rod whose spring does not count
@@ -36,6 +39,8 @@ EXPECTED = {
     "order-reduction": ((1e3, 1e5), 1e10),
     # the length falls by (h w / 2)^6 / 144 a step, w = 1.98 rad/s: 1e-6 of 50 s at h = 0.078
     "quaternion-drift": ((0.074, 0.083), 0.5),
+    "laws-tangent": ((0.1, 1.0), 1e3),
+    "stiffened-mass": ((0.03, 0.12), 0.6),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
     # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s
