@@ -41,6 +41,10 @@ EXPECTED = {
     "quaternion-drift": ((0.074, 0.083), 0.5),
     "laws-tangent": ((0.1, 1.0), 1e3),
     "stiffened-mass": ((0.03, 0.12), 0.6),
+    "unstable-motion": ((0.1, 1.0), 8.0),
+    # half the square of the slope, 0.5 F L^2/EI, is some hundredths at F L^2/EI = 0.6
+    "single-frame": ((0.3, 1.5), 10.0),
+    "one-way": ((5.0, 100.0), 0.1),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
     # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s

@@ -1,4 +1,4 @@
-"""One file a case, each with its `CASE`; the folder is the list."""
+"""One file a case, each with its `CASE`; the folders are the list."""
 
 from __future__ import annotations
 
@@ -10,11 +10,23 @@ from ...errors import SceneError
 from ...scene.rules.messages import near
 from ..definition import Definition
 
+#: The folders, in the order of the page.
+GROUPS = ("products", "steps", "rotations", "flexible")
+
+
+def _files() -> dict[str, str]:
+    """Name of every case -> its module."""
+    found = {}
+    for group in GROUPS:
+        folder = import_module(f".{group}", __name__)
+        for file in sorted(module.name for module in pkgutil.iter_modules(folder.__path__)):
+            found[file.replace("_", "-")] = f".{group}.{file}"
+    return found
+
 
 def names() -> tuple[str, ...]:
     """The names of all cases."""
-    files = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return tuple(file.replace("_", "-") for file in files)
+    return tuple(_files())
 
 
 def chosen(wanted: Sequence[str] | None) -> tuple[Definition, ...]:
@@ -22,12 +34,12 @@ def chosen(wanted: Sequence[str] | None) -> tuple[Definition, ...]:
 
     Raises SceneError with the nearest name for one that there is not.
     """
-    known = names()
+    files = _files()
     for name in wanted or ():
-        if name not in known:
+        if name not in files:
             raise SceneError(
-                f'case "{name:.60}": the atlas has no such case{near(name, known)} '
+                f'case "{name:.60}": the atlas has no such case{near(name, files)} '
                 "(mstmm stability --list shows all)"
             )
-    files = (name.replace("-", "_") for name in dict.fromkeys(wanted or known))
-    return tuple(import_module(f".{file}", __name__).CASE for file in files)
+    each = dict.fromkeys(wanted or files)
+    return tuple(import_module(files[name], __name__).CASE for name in each)

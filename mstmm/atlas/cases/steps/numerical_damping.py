@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..definition import Definition, Method
-from ..measures import amplitude
-from ..scale import LOG
+from ...definition import Definition, Method
+from ...measures import amplitude
+from ...scale import LOG
 
 PERIODS = 10
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import spinning_top
+from ....arrays import Array
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import spinning_top
 
 STEP, T_END = 1e-3, 2.0
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..definition import Definition, Method
-from ..measures import correction
-from ..scale import LOG
-from ..scenes import drawn_pins, model, rod
+from ...definition import Definition, Method
+from ...measures import correction
+from ...scale import LOG
+from ...scenes import drawn_pins, model, rod
 
 RODS = 8
 

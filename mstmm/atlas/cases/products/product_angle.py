@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import correction
-from ..scale import LINEAR
-from ..scenes import chain, drawn_pins, model
+from ...definition import Definition, Method
+from ...measures import correction
+from ...scale import LINEAR
+from ...scenes import chain, drawn_pins, model
 
 RODS = 6
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import model, rod
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model, rod
 
 #: Where the pulse lies, rad, and its work, J.
 PLACE, WORK = 5.0, 0.5

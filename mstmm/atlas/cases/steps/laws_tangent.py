@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import growth
-from ..scale import LOG
-from ..scenes import LET_GO, model, rod
+from ...definition import Definition, Method
+from ...measures import growth
+from ...scale import LOG
+from ...scenes import LET_GO, model, rod
 
 STEP, STEPS = 0.01, 400
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ..definition import Definition, Method
-from ..measures import correction
-from ..scale import LOG
-from ..scenes import chain, drawn_pins, model
+from ...definition import Definition, Method
+from ...measures import correction
+from ...scale import LOG
+from ...scenes import chain, drawn_pins, model
 
 RODS = 6
 

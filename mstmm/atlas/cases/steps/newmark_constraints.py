@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import double_pendulum
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import double_pendulum
 
 STEP = 0.01
 

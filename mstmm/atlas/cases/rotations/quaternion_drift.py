@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import spinning_top
-from ..variants import raw_quaternions
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import spinning_top
+from ...variants import raw_quaternions
 
 #: Length of a run, s, and the angular velocity of the body, rad/s.
 T_END, SPIN = 50.0, (0.4, 1.6, 1.1)

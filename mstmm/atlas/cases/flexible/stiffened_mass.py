@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import model
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model
 
 SHAPES = 4
 

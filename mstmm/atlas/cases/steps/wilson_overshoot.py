@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..definition import Definition, Method
-from ..measures import amplitude
-from ..scale import LOG
+from ...definition import Definition, Method
+from ...measures import amplitude
+from ...scale import LOG
 
 STEPS = 20
 

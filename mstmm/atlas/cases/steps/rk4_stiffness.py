@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..definition import Definition, Method
-from ..measures import growth
-from ..scale import LOG
-from ..scenes import sprung_rod
+from ...definition import Definition, Method
+from ...measures import growth
+from ...scale import LOG
+from ...scenes import sprung_rod
 
 STEP, STEPS = 1e-3, 400
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from ..definition import Definition, Method
-from ..measures import simulated
-from ..scale import LOG
-from ..scenes import model
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model
 
 #: Spun up within 15 s, then turning; s.
 RAMP, T_END = 15.0, 30.0

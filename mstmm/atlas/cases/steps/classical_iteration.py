@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..definition import Definition, Method
-from ..measures import energy_gain, simulated
-from ..scale import LOG
-from ..scenes import FALL, double_pendulum
+from ...definition import Definition, Method
+from ...measures import energy_gain, simulated
+from ...scale import LOG
+from ...scenes import FALL, double_pendulum
 
 STEP, STRETCH = 0.01, 1e-3
 

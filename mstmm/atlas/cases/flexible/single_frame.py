@@ -1,0 +1,56 @@
+"""One floating frame for a beam that bends far."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ....arrays import Array
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model
+
+
+@cache
+def _tip(load: float, pieces: int, shapes: int) -> Array:
+    """Where the tip of a clamped beam of 1 m and 1 N m2 rests under a load across it (N)."""
+    beam = {
+        "length": 1 / pieces, "mass_per_length": 1.0, "bending_stiffness": 1.0,
+        "modes": {"y": shapes},
+    }  # fmt: skip
+    names = [f"piece{i}" for i in range(pieces)]
+    welds = [
+        {"name": f"weld{i}", "type": "fixed", "outboard": name,
+         "inboard": f"{names[i - 1]}.tip" if i else "ground"}
+        for i, name in enumerate(names)
+    ]  # fmt: skip
+    end = f"{names[-1]}.tip"
+    bent = model({
+        "gravity": [0, 0, 0], "beam": [beam | {"name": name} for name in names], "hinge": welds,
+        "load": [{"on": end, "force": [0, load, 0]}],
+    })  # fmt: skip
+    rest = bent.equilibrium(), np.zeros(bent.nu)
+    run = simulated(bent, 1e-9, initial=rest, output_times=[0.0, 1e-9])
+    return np.asarray(run.position(end)[0])
+
+
+def _error(load: float, pieces: int, shapes: int) -> float:
+    return float(np.abs(_tip(load, pieces, shapes) - _tip(load, 12, 2)).max())
+
+
+CASE = Definition(
+    name="single-frame",
+    title="One floating frame: a beam that bends far",
+    why="Shapes are small deflections from a frame, and one frame serves a beam only as long as "
+    "its sections turn little against it: half the square of the slope is lost of the deflection. "
+    "More shapes change nothing; welded pieces with frames of their own do.",
+    parameter="load across the tip of a clamped beam, of EI/L²", unit="", low=0.02, high=10.0,
+    scale=LOG,
+    measured="error of the tip's place, of the length", limit=0.01,
+    method=Method("one beam, 3 shapes", lambda load: _error(load, 1, 3)),
+    remedy=Method("6 welded pieces, 2 shapes each", lambda load: _error(load, 6, 2)), reach=10.0,
+    source="Shabana, Dynamics of Multibody Systems, 2020, ch. 5 and 6; Rui, Wang, Zhang, Transfer "
+    "Matrix Method for Multibody Systems, 2019, ch. 8",
+)  # fmt: skip
