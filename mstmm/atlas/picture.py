@@ -61,6 +61,8 @@ def _fill(axis: Any, case: Found) -> None:
     left, right = min(everything)[0], max(everything)[0]
     if case.scale != "linear":
         axis.set_xscale("log")
+    if case.scale == "count":
+        _whole_ticks(axis, left, right)
     _heights(axis, everything, case.limit)
     axis.axvspan(case.fails_at, right if case.fails == "above" else left, color=_SIDE, zorder=0)
     axis.axvline(case.fails_at, color=_FAILING, linewidth=1.0, linestyle=":")
@@ -72,6 +74,16 @@ def _fill(axis: Any, case: Found) -> None:
     axis.set_xlabel(f"{case.parameter} in {case.unit}" if case.unit else case.parameter)
     axis.set_ylabel(case.measured)
     axis.figure.legend(loc="outside lower center", ncols=2, handlelength=1.6)
+
+
+def _whole_ticks(axis: Any, left: float, right: float) -> None:
+    """Whole numbers along a short axis, powers of ten along a long one."""
+    steps = (1, 2, 5) if right < 300 * left else (1,)
+    powers = range(int(math.log10(left)), int(math.log10(right)) + 1)
+    ticks = [step * 10**power for power in powers for step in steps]
+    shown = [tick for tick in ticks if left <= tick <= right]
+    axis.set_xticks(shown, [f"{tick:,}".replace(",", " ") for tick in shown])
+    axis.minorticks_off()
 
 
 def _heights(axis: Any, points: Points, limit: float) -> None:

@@ -45,6 +45,11 @@ EXPECTED = {
     # half the square of the slope, 0.5 F L^2/EI, is some hundredths at F L^2/EI = 0.6
     "single-frame": ((0.3, 1.5), 10.0),
     "one-way": ((5.0, 100.0), 0.1),
+    # eps e^beta is some thousandths, beta = (n - 1/2) pi
+    "mode-shapes": ((9, 13), 1000),
+    "end-moment": ((4, 20), 2),
+    # h omega_n = sqrt 8 with omega_n = beta^2 sqrt(EI): beta = 20.0, between 17.28 and 20.42
+    "rk4-shapes": ((6, 7), 20),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
     # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s

@@ -1,0 +1,51 @@
+"""Shapes that carry no moment at the end of a beam, under a moment there."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import COUNT
+from ...scenes import model
+
+MOMENT = 0.05
+
+
+@cache
+def _deflection(basis: str, shapes: int) -> float:
+    """Of the tip of a clamped beam of 1 m and 1 N m2 at rest under a moment at its tip, m."""
+    beam = {
+        "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
+        "modes": {"y": shapes}, "basis": basis, "frame": "tangent", "stiffening": False,
+    }  # fmt: skip
+    wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "beam"}
+    load = {"on": "beam.tip", "moment": [0, 0, MOMENT]}
+    bent = model({"gravity": [0, 0, 0], "beam": [beam], "hinge": [wall], "load": [load]})
+    rest = bent.equilibrium(), np.zeros(bent.nu)
+    run = simulated(bent, 1e-9, initial=rest, output_times=[0.0, 1e-9])
+    return float(run.deflection("beam", "tip")[0, 1])
+
+
+def _error(shapes: float, basis: str) -> float:
+    exact = _deflection("static+fixed-interface", 6)
+    return abs(_deflection(basis, int(shapes)) / exact - 1)
+
+
+CASE = Definition(
+    name="end-moment",
+    title="Shapes of a free end where there is a moment",
+    why="The eigenfunctions of a beam with a free end have no curvature there. A moment at that "
+    "end, or a body welded to it, asks for one, and their sum comes to it slowly, however many. "
+    "Two static shapes of the loads at the end have it at once; the basis `auto` takes them where "
+    "hinges ask for it.",
+    parameter="number of shapes", unit="", low=2, high=40, scale=COUNT,
+    measured="error of the deflection, relative", limit=1e-3,
+    method=Method("clamped-free", lambda n: _error(n, "clamped-free")),
+    remedy=Method("static+fixed-interface", lambda n: _error(n, "static+fixed-interface")),
+    reach=2,
+    source="Craig, Bampton, AIAA Journal 6, 1968; Shabana, Dynamics of Multibody Systems, 2020, "
+    "ch. 5",
+)  # fmt: skip

@@ -1,0 +1,41 @@
+"""Bending shapes of ever higher number, by hyperbolic functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ....arrays import Array
+from ....runtime.flexible.beam.gauss import gauss_between
+from ....runtime.flexible.beam.shapes import Eigenfunction
+from ...definition import Definition, Method
+from ...scale import COUNT
+from ...variants import textbook_shapes
+
+
+def _stable(number: int, xi: Array) -> Array:
+    return Eigenfunction("clamped-free", number, 0.0, 1.0)(xi)
+
+
+def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
+    """Of the square of the shape over the length, which its scale makes 1."""
+    xi, weights = gauss_between((0.0, 1.0), lambda a, b: number + 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return abs(float(weights @ shape(int(number), xi) ** 2) - 1)
+
+
+CASE = Definition(
+    name="mode-shapes",
+    title="Mode shapes by hyperbolic functions: their number",
+    why="Printed with cosh and sinh a shape is the difference of two numbers that grow by 23 with "
+    "every half-wave and cancel but for the shape. At the end of the eleventh or so nothing is "
+    "left of it. The same shape written with exponentials that decay from either end keeps all "
+    "digits.",
+    parameter="number of the shape", unit="", low=1, high=60, scale=COUNT,
+    measured="error of the shape's square over the length", limit=1e-4,
+    method=Method("cosh and sinh", lambda n: _error(n, textbook_shapes.clamped_free)),
+    remedy=Method("decaying exponentials", lambda n: _error(n, _stable)), reach=1000,
+    source="Rao, Vibration of Continuous Systems, 2019, ch. 11; stable form: Tang, Journal of "
+    "Sound and Vibration 261, 2003",
+)  # fmt: skip

@@ -1,0 +1,39 @@
+"""Explicit Runge-Kutta steps of a beam with ever more shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import COUNT
+from ...scenes import model
+
+STEP, T_END = 1e-3, 0.2
+
+
+def _deflection(shapes: float, method: str) -> float:
+    """Largest of the tip of a clamped beam of 1 m that begins to bend under its weight, m."""
+    beam = {
+        "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
+        "modes": {"y": int(shapes)}, "stiffening": False,
+    }  # fmt: skip
+    wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "beam"}
+    falling = model({"gravity": [0, -9.81, 0], "beam": [beam], "hinge": [wall]})
+    run = simulated(falling, T_END, method, STEP)
+    return float(np.abs(run.deflection("beam", "tip")[:, 1]).max())
+
+
+CASE = Definition(
+    name="rk4-shapes",
+    title="Explicit steps: shapes of a beam",
+    why="Frequencies of shapes grow with the square of their number, and an explicit step must "
+    "resolve the highest, though the motion is that of the first. Take few shapes and good ones, "
+    "or implicit steps, which forget what they do not resolve.",
+    parameter="shapes of a clamped beam", unit="", low=1, high=20, scale=COUNT,
+    measured="largest deflection of the tip, of the length", limit=0.1,
+    method=Method("rk4, h = 1 ms", lambda n: _deflection(n, "rk4")),
+    remedy=Method("rodas4p2, h = 1 ms", lambda n: _deflection(n, "rodas4p2")), reach=20,
+    source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2; shapes: Rao, "
+    "Vibration of Continuous Systems, 2019, ch. 11",
+)  # fmt: skip
