@@ -38,7 +38,7 @@ class Atlas:
         return paths
 
     def save(self, folder: str | Path, pictures: bool = True) -> list[Path]:
-        """`atlas.json`, the page `index.md` and, if wanted, a picture of each case; their paths.
+        """`atlas.json`, the page `atlas.md` and, if wanted, a picture of each case; their paths.
 
         The folder is made if its parent is there.  Raises EnvironmentFailure where nothing can be
         written.
@@ -47,7 +47,7 @@ class Atlas:
 
         place = Path(folder)
         place.mkdir(exist_ok=True)
-        data, text = place / "atlas.json", place / "index.md"
+        data, text = place / "atlas.json", place / "atlas.md"
         with replacing(data) as temporary:
             temporary.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
         with replacing(text) as temporary:

@@ -43,7 +43,3 @@ class Definition:
     remedy: Method
     reach: float
     source: str
-
-    def holds(self, measured: float) -> bool:
-        """Whether that is no failure; what is not a number is one."""
-        return measured <= self.limit

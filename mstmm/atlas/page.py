@@ -37,6 +37,14 @@ def _row(case: Found) -> dict[str, str]:
     }
 
 
+def number(value: float, digits: int = 3) -> str:
+    """A number as one writes it: 2.67e6, 100 000 as 1e5, and short ones in full."""
+    if value == round(value) and abs(value) < 1000:
+        return f"{value:.0f}"
+    mantissa, _, power = f"{value:.{digits}g}".partition("e")
+    return f"{mantissa}e{int(power)}" if power else mantissa
+
+
 def in_unit(case: Found) -> str:
     """The parameter with its unit."""
     return f"{case.parameter} in {case.unit}" if case.unit else case.parameter
@@ -44,13 +52,13 @@ def in_unit(case: Found) -> str:
 
 def frontier(case: Found) -> str:
     """What fails, and from where on."""
-    step = "from" if case.fails == "above" else "down from"
-    return f"{case.method}, {step} {case.fails_at:.3g} on"
+    step = "up" if case.fails == "above" else "down"
+    return f"{case.method}, from {number(case.fails_at)} {step}"
 
 
 def held_to(case: Found) -> str:
     """How far the remedy holds; with a plus where that is only as far as it was tried."""
-    return f"{case.remedy_holds_to:.3g}" + (" (end)" if case.remedy_fails_at is None else "")
+    return number(case.remedy_holds_to) + (" (end)" if case.remedy_fails_at is None else "")
 
 
 def _part(case: Found, pictures: bool) -> str:
@@ -62,14 +70,12 @@ def _part(case: Found, pictures: bool) -> str:
 
 
 def _judged(case: Found) -> str:
-    said = (
-        f"Measured: {case.measured}; a failure above {case.limit:g}. {case.method}: holds at "
-        f"{case.holds_at:.4g}, fails at {case.fails_at:.4g}. {case.remedy}: "
+    chance = "" if case.monotone else "; beyond it holds here and there by chance"
+    end = case.remedy_fails_at
+    beyond = "the end of what is tried" if end is None else f"fails at {number(end, 4)}"
+    return (
+        f"- measured: {case.measured}; a failure above {number(case.limit)}\n"
+        f"- {case.method}: holds at {number(case.holds_at, 4)}, fails at "
+        f"{number(case.fails_at, 4)}{chance}\n"
+        f"- {case.remedy}: holds to {number(case.remedy_holds_to, 4)}, {beyond}"
     )
-    if case.remedy_fails_at is None:
-        said += f"holds to {case.remedy_holds_to:.4g}, the end of what is tried."
-    else:
-        said += f"holds to {case.remedy_holds_to:.4g}, fails at {case.remedy_fails_at:.4g}."
-    if not case.monotone:
-        said += " Beyond the frontier the method holds here and there by chance."
-    return said

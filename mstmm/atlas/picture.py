@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import SceneError
 from ..extras import missing
 from ..runtime.host.files import replacing
+from .page import number
 
 if TYPE_CHECKING:
     from .found import Found
@@ -104,7 +105,7 @@ def _name_frontier(axis: Any, at: float) -> None:
     axis.autoscale_view()  # or the transformation is still that of an empty axis
     left, _ = axis.transAxes.inverted().transform(axis.transData.transform((at, 1.0)))
     axis.annotate(
-        f"fails at {at:.3g}", (at, 0.985), xycoords=("data", "axes fraction"),
+        f"fails at {number(at)}", (at, 0.985), xycoords=("data", "axes fraction"),
         xytext=(-4 if left > 0.5 else 4, 0), textcoords="offset points", color=_FAILING,
         ha="right" if left > 0.5 else "left", va="top",
     )  # fmt: skip

@@ -22,7 +22,7 @@ def stability(
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", metavar="DIR", help="Where atlas.json, index.md and pictures go."),
+        typer.Option("--out", metavar="DIR", help="Where atlas.json, atlas.md and pictures go."),
     ] = None,
     only_list: Annotated[
         bool, typer.Option("--list", help="List the cases; nothing is computed.")

@@ -9,7 +9,17 @@ from typing import Any
 import pytest
 
 import mstmm
+from mstmm.atlas.page import number
 from mstmm.errors import SceneError
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(2.6735e6, "2.67e6"), (1e5, "1e5"), (90.0, "90"), (12, "12"), (0.06543, "0.0654"),
+     (3.4e-5, "3.4e-5"), (1e-10, "1e-10"), (8.0, "8"), (1234.5, "1.23e3"), (0.0, "0")],
+)  # fmt: skip
+def test_numbers_as_one_writes_them(value: float, shown: str) -> None:
+    assert number(value) == shown
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +44,7 @@ def test_what_is_saved(atlas: mstmm.Atlas, tmp_path: Path) -> None:
     files = atlas.save(folder)
     assert sorted(path.name for path in files) == sorted(path.name for path in folder.iterdir())
     assert json.loads((folder / "atlas.json").read_text()) == atlas.to_dict()
-    page = (folder / "index.md").read_text()
+    page = (folder / "atlas.md").read_text()
     for case in atlas.cases:
         picture = folder / f"{case.name}.png"
         assert picture.read_bytes().startswith(b"\x89PNG")
@@ -45,7 +55,7 @@ def test_what_is_saved(atlas: mstmm.Atlas, tmp_path: Path) -> None:
 
 def test_without_pictures_the_page_names_none(atlas: mstmm.Atlas, tmp_path: Path) -> None:
     files = atlas.save(tmp_path, pictures=False)
-    assert [path.name for path in files] == ["atlas.json", "index.md"]
+    assert [path.name for path in files] == ["atlas.json", "atlas.md"]
     assert ".png" not in files[1].read_text()
 
 
@@ -55,7 +65,7 @@ def test_a_picture_shows_both_methods_and_the_frontier(atlas: mstmm.Atlas) -> No
     (axes,) = figure.axes
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert labels == [case.method, case.remedy]
-    assert f"{case.fails_at:.3g}" in [text.get_text().split()[-1] for text in axes.texts]
+    assert f"fails at {number(case.fails_at)}" in [text.get_text() for text in axes.texts]
     assert axes.get_title(loc="left") == case.title
 
 

@@ -29,7 +29,7 @@ def test_every_case_is_on_the_page(kept: list[dict[str, Any]]) -> None:
 
 def test_the_page_says_what_the_data_do(kept: list[dict[str, Any]]) -> None:
     text = page([Found(**case) for case in kept], pictures=True)
-    assert (FOLDER / "index.md").read_text() == text, AGAIN
+    assert (FOLDER / "atlas.md").read_text() == text, AGAIN
 
 
 def test_its_frontiers_lie_where_they_are_expected(kept: list[dict[str, Any]]) -> None:

@@ -14,7 +14,7 @@ def test_a_case_is_measured_told_and_drawn(mstmm: Command, folder: Path) -> None
     assert "product-angle" in done.out
     assert "Riccati sweep" in done.out
     found = sorted(path.name for path in (folder / "found").iterdir())
-    assert found == ["atlas.json", "index.md", "product-angle.png"]
+    assert found == ["atlas.json", "atlas.md", "product-angle.png"]
 
 
 def test_json_holds_what_the_folder_does(mstmm: Command, folder: Path) -> None:
@@ -22,7 +22,7 @@ def test_json_holds_what_the_folder_does(mstmm: Command, folder: Path) -> None:
     data = json.loads(done.out)
     assert data["cases"] == json.loads((folder / "found/atlas.json").read_text())["cases"]
     assert [Path(name).name for name in data["files"]] == [
-        "atlas.json", "index.md", "product-angle.png",
+        "atlas.json", "atlas.md", "product-angle.png",
     ]  # fmt: skip
 
 

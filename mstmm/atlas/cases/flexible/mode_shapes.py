@@ -36,6 +36,6 @@ CASE = Definition(
     measured="error of the shape's square over the length", limit=1e-4,
     method=Method("cosh and sinh", lambda n: _error(n, textbook_shapes.clamped_free)),
     remedy=Method("decaying exponentials", lambda n: _error(n, _stable)), reach=1000,
-    source="Rao, Vibration of Continuous Systems, 2019, ch. 11; stable form: Tang, Journal of "
-    "Sound and Vibration 261, 2003",
+    source="Rao, Vibration of Continuous Systems, 2019, ch. 11; high numbers: Goncalves, "
+    "Brennan, Elliott, Journal of Sound and Vibration 301, 2007",
 )  # fmt: skip

@@ -23,7 +23,7 @@ CASE = Definition(
     why="The trapezoidal rule in absolute coordinates with one linear solution a step throws the "
     "bodies about by what the first solution errs. A scheme that forgets fast motion, iterated, "
     "holds to about a hundred times that stiffness.",
-    parameter="stiffness of bushings, stretched by 1 mm", unit="N/m", low=1e3, high=1e9, scale=LOG,
+    parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
     measured="largest energy in 2 s, of that exchanged", limit=1.05,
     method=Method(
         "dttmm-classical, newmark, one solution", lambda k: _gained(k, scheme="newmark")

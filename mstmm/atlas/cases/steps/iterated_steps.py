@@ -21,10 +21,10 @@ CASE = Definition(
     "spring may be thousands of times what the motion needs, and even converged steps then throw "
     "the bodies about. Rodas4P2 is L-stable stage by stage: it drops what it cannot resolve, and "
     "the spring's energy with it.",
-    parameter="stiffness of bushings, stretched by 1 mm", unit="N/m", low=1e3, high=1e9, scale=LOG,
+    parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
     measured="largest energy in 2 s, of that exchanged", limit=1.05,
     method=Method("genalpha, h = 10 ms", lambda k: _gained(k, "genalpha")),
     remedy=Method("rodas4p2, h = 10 ms", lambda k: _gained(k, "rodas4p2")), reach=1e10,
     source="Chung, Hulbert, Journal of Applied Mechanics 60, 1993; Steinebach, in Progress in "
-    "Industrial Mathematics, Mathematics in Industry 37, 2020",
+    "Differential-Algebraic Equations II, 2020",
 )  # fmt: skip

@@ -42,5 +42,5 @@ CASE = Definition(
     method=Method("dop853, rtol 1e-9", lambda width: _error(width, False)),
     remedy=Method("dop853, the pulse within where()", lambda width: _error(width, True)),
     reach=1e-8,
-    source="Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 1993, II.6",
+    source="Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 1993, II.4",
 )  # fmt: skip

@@ -21,7 +21,7 @@ CASE = Definition(
     "the predicted motion is one about the wrong place: energy appears from nowhere. Iterating "
     "to the end, the remedy, holds as long as the iteration finds its way; a step in hinge "
     "coordinates from a slack spring never meets this.",
-    parameter="stiffness of bushings, stretched by 1 mm", unit="N/m", low=1e3, high=1e9, scale=LOG,
+    parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
     measured="largest energy in 2 s, of that exchanged", limit=1.05,
     method=Method("dttmm, h = 10 ms", lambda k: _gained(k, "dttmm")),
     remedy=Method("genalpha, iterated", lambda k: _gained(k, "genalpha")), reach=1e9,

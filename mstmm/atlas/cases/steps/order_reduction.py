@@ -37,11 +37,11 @@ CASE = Definition(
     "base and no longer that of the motion: of fourth order on paper, the table is of second "
     "order here, and the load in the spring wrong by a hundred times. Tables made for it, such as "
     "Rodas4P2, keep theirs.",
-    parameter="stiffness of the spring of 1 kg, critically damped", unit="N/m",
+    parameter="stiffness of the spring (of 1 kg, critically damped)", unit="N/m",
     low=10.0, high=1e7, scale=LOG,
     measured="error of the spring's load, relative", limit=2e-6,
     method=Method("rodas4, h = 50 ms", lambda k: _error(k, "rodas4")),
     remedy=Method("rodas4p2, h = 50 ms", lambda k: _error(k, "rodas4p2")), reach=1e10,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, VI.4; Steinebach, "
-    "Mathematics in Industry 37, 2020",
+    "in Progress in Differential-Algebraic Equations II, 2020",
 )  # fmt: skip
