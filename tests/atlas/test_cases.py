@@ -50,6 +50,7 @@ EXPECTED = {
     "end-moment": ((4, 20), 2),
     # h omega_n = sqrt 8 with omega_n = beta^2 sqrt(EI): beta = 20.0, between 17.28 and 20.42
     "rk4-shapes": ((6, 7), 20),
+    "friction-steps": ((1e-5, 3e-4), 5e-6),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
     # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s

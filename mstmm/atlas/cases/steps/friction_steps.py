@@ -1,0 +1,51 @@
+"""Rosenbrock steps across ever sharper friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....arrays import Array
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model
+
+STEP, FINE, T_END = 0.01, 5e-4, 3.0
+TIMES = np.linspace(0.0, T_END, 31)
+
+
+def _path(velocity: float, method: str, step: float) -> Array:
+    """Of 1 kg with friction of 1 N, pulled by a spring of 10 N/m whose end moves at 0.3 m/s."""
+    law = {
+        "effort": "10*(0.3*t - q)",
+        "friction": {"coulomb": 1.0, "regularisation_velocity": velocity},
+    }
+    slide = {
+        "name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+        "outboard": "mass", "law": law,
+    }  # fmt: skip
+    mass = {"name": "mass", "mass": 1.0}
+    pulled = model({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
+    return np.asarray(simulated(pulled, T_END, method, step, output_times=TIMES).q[:, 0])
+
+
+def _error(velocity: float, method: str) -> float:
+    exact = _path(velocity, "esdirk436", FINE)
+    return float(np.abs(_path(velocity, method, STEP) - exact).max())
+
+
+CASE = Definition(
+    name="friction-steps",
+    title="Linearised friction: a body that sticks and slips",
+    why="Methods of Rosenbrock's kind linearise friction where a step begins. A body that sticks "
+    "has a slope there that is gone as soon as it slips, and nothing in the step sees it: it is "
+    "held too long. Methods that iterate look where they arrive, until their iteration finds no way "
+    "through the bend; then they say so.",
+    parameter="velocity over which friction is regularised", unit="m/s", low=1e-7, high=0.1,
+    scale=LOG,
+    measured="error of the way, m", limit=1e-4,
+    method=Method("rodas4p2, h = 10 ms", lambda velocity: _error(velocity, "rodas4p2")),
+    remedy=Method("esdirk436, h = 10 ms", lambda velocity: _error(velocity, "esdirk436")),
+    reach=1e-7,
+    source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7 and IV.8",
+)  # fmt: skip
