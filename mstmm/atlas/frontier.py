@@ -58,8 +58,7 @@ def bracketed(tried: Tried, values: Sequence[float], scale: Scale, tolerance: fl
     if not sides[0] or sides[-1]:
         said = "holds" if sides[0] else "fails"
         raise NumericalFailure(
-            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {said} at both, "
-            "or the other way round than expected"
+            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {said} at both"
         )
     return _first(tried, values, sides, scale, tolerance)
 

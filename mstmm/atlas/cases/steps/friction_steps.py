@@ -39,8 +39,8 @@ CASE = Definition(
     title="Linearised friction: a body that sticks and slips",
     why="Methods of Rosenbrock's kind linearise friction where a step begins. A body that sticks "
     "has a slope there that is gone as soon as it slips, and nothing in the step sees it: it is "
-    "held too long. Methods that iterate look where they arrive, until their iteration finds no way "
-    "through the bend; then they say so.",
+    "held too long. Methods that iterate look where they arrive, until their iteration finds no "
+    "way through the bend; then they say so.",
     parameter="velocity over which friction is regularised", unit="m/s", low=1e-7, high=0.1,
     scale=LOG,
     measured="error of the way, m", limit=1e-4,
