@@ -170,7 +170,7 @@ def compare(
         for kind in ("q", "u")
     )
     path = first.q if start is None or len(first.q) > 1 else np.vstack([start, first.q])
-    moved = _excursions(layout, path)
+    moved = excursions(layout, path)
     horizon = _horizon(t, q, moved, first.settings.t_start)
     return ErrorEstimate(t, q, u, horizon, _tenfold(t, [*q.values()]), reference, moved)
 
@@ -178,7 +178,7 @@ def compare(
 def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
     """(unit, running maximum of SAFETY times the difference) for each unit."""
     found: dict[str, Array] = {}
-    for unit, difference in _differences(layout, a, b, kind):
+    for unit, difference in differences(layout, a, b, kind):
         ahead = np.concatenate([difference, np.zeros(AHEAD)])
         near = np.lib.stride_tricks.sliding_window_view(ahead, AHEAD + 1).max(axis=1)
         error = np.maximum.accumulate(SAFETY * near)
@@ -186,7 +186,7 @@ def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str
     yield from found.items()
 
 
-def _differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
+def differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
     """(unit, largest difference (n,)) of one coordinate of a hinge, or of all that repeat it; of
     every modal coordinate."""
     for group in layout.groups:
@@ -213,10 +213,10 @@ def rotation_between(a: Array, b: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
 
 
-def _excursions(layout: Layout, q: Array) -> dict[str, float]:
+def excursions(layout: Layout, q: Array) -> dict[str, float]:
     """Unit -> largest excursion from the first sample of any coordinate of that unit."""
     found: dict[str, float] = {}
-    for unit, difference in _differences(layout, q, q[:1], "q"):
+    for unit, difference in differences(layout, q, q[:1], "q"):
         if len(difference):
             found[unit] = max(found.get(unit, 0.0), float(difference.max()))
     return found

@@ -1,0 +1,80 @@
+"""Cost against accuracy of a scene: compiles its levels of model for `runtime.chart`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import SceneError
+from ..scene import Scene
+from .compilation import compile_scene
+
+if TYPE_CHECKING:
+    from ..runtime.chart.chart import Chart
+    from ..runtime.model.model import Model
+
+#: Seconds of the clock, error for which a setting is recommended, samples, rounds of times.
+BUDGET, WANTED, SAMPLES, ROUNDS = 60.0, 1e-3, 101, 3
+
+
+def chart(
+    scene: Scene | Model,
+    t_end: float = 10.0,
+    *,
+    quantities: Sequence[str] = (),
+    methods: Sequence[str] | None = None,
+    models: bool = False,
+    error: float = WANTED,
+    budget: float = BUDGET,
+    samples: int = SAMPLES,
+    rounds: int = ROUNDS,
+    engine: str = "auto",
+    title: str = "",
+    progress: Callable[[str], None] | None = None,
+    state: Callable[[str], None] | None = None,
+) -> Chart:
+    """What accuracy costs: every method over its tolerances or steps, and which one to take.
+
+    Args:
+        scene: a scene, or a model of one.
+        t_end: end of every run, s.
+        quantities: names such as "rod.tip.position": errors are of this quantity in its unit, of
+            several each in parts of its largest excursion; otherwise of all coordinates, or with
+            `models` of the places of all bodies and ends, scaled as `reference.scaling` says.
+        methods: names; otherwise every method that `simulate` knows.
+        models: also every level of model of the flexible bodies: rigid, one-way, linear and
+            stiffened with 1 to n shapes, planar where nothing leaves the plane.  Errors are then
+            against the richest level.
+        error: for which the cheapest setting is recommended.
+        budget: s of the clock that all of it may take; what did not fit in is told.
+        samples: times from 0 to t_end at which errors are looked at; the largest counts.
+        rounds: how often the processor times are taken again, all points in turn.
+        engine: as in `compile`, for what is compiled here.
+        title: of the pictures.
+        progress: called with a sentence before every run.
+        state: called with the plan of the time, and with what the reference is.
+
+    The reference is a run at tight tolerances that agrees with one of another method; its own error
+    is stated, and points below three times that are marked.
+
+    Raises SceneError for arguments that make no sense, NumericalFailure where no reference is found
+    within its part of the budget.
+    """
+    from ..runtime.chart.charting import charted, request
+
+    asked = request(t_end, quantities, methods, models, error, budget, samples, rounds)
+
+    def compiled(one: Scene) -> Model:
+        return compile_scene(one, engine=engine)
+
+    if isinstance(scene, Scene):
+        model = compiled(scene)
+    elif hasattr(scene, "simulate"):
+        model = scene
+    else:
+        raise SceneError(f"scene = {scene!r:.60}: expected a Scene, or a Model of one")
+    return charted(model, asked, compiled, title, progress or _quiet, state or _quiet)
+
+
+def _quiet(_: str) -> None:
+    """Nobody listens."""

@@ -1,0 +1,198 @@
+"""From a model to its chart: reference, levels of model, settings, rounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import real, whole
+from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.scene import Scene
+
+from .budget import REFERENCE, Budget
+from .chart import Chart
+from .converged import Converged, Tell, converged
+from .families import checked_methods
+from .front import judged
+from .measure import Measure, measure_of
+from .models import Variant, directions, ladder, modes_of, planar
+from .point import LeftOut, Level, Reference, Setting
+from .rounds import repeated
+from .survey import Curve, Found, curve, survey
+from .trial import Runs, Trial, error_of
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+#: Part of the budget by which the levels' own errors are to be found.
+_LEVELS = 0.45
+#: Coordinates that stay below this part of the largest one of their body do not move.
+_STILL = 1e-9
+#: The name of the only level of a chart without levels of model.
+AS_GIVEN = "as given"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for, checked."""
+
+    t_end: float
+    quantities: tuple[str, ...]
+    methods: tuple[str, ...]
+    models: bool
+    error: float
+    budget: float
+    samples: int
+    rounds: int
+
+
+def request(
+    t_end: float, quantities: Sequence[str], methods: Sequence[str] | None, models: bool,
+    error: float, budget: float, samples: int, rounds: int,
+) -> Request:  # fmt: skip
+    """SceneError naming the first argument that makes no sense."""
+    if isinstance(quantities, str) or isinstance(methods, str):
+        raise SceneError('quantities and methods: expected lists of names, as in ["tip.position"]')
+    return Request(
+        _above_zero("t_end", t_end, "a time in s"), tuple(quantities), checked_methods(methods),
+        bool(models), _above_zero("error", error, "an error"),
+        _above_zero("budget", budget, "a time in s"),
+        whole("samples", samples, 2, "a whole number of samples, 2 or more"),
+        whole("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
+    )  # fmt: skip
+
+
+def _above_zero(name: str, value: float, what: str) -> float:
+    found = real(name, value, f"{what} above 0")
+    if not found > 0 or not math.isfinite(found):
+        raise SceneError(f"{name} = {found:g}: expected {what} above 0")
+    return found
+
+
+def charted(
+    model: Model, asked: Request, compile: Callable[[Scene], Model], title: str, tell: Tell,
+    state: Callable[[str], None], budget: Budget | None = None,
+) -> Chart:  # fmt: skip
+    """The chart of a model; `compile` makes models of its other levels.
+
+    `state` hears the plan and what becomes of it, `tell` every step.  Raises SceneError for an
+    unknown quantity, NumericalFailure where there is no reference.
+    """
+    return _Charting(model, asked, compile, tell, state, budget or Budget(asked.budget)).chart(title)
+
+
+class _Charting:
+    def __init__(
+        self, model: Model, asked: Request, compile: Callable[[Scene], Model], tell: Tell,
+        state: Callable[[str], None], budget: Budget,
+    ) -> None:  # fmt: skip
+        self.model, self.asked, self.compile = model, asked, compile
+        self.tell, self.state, self.budget = tell, state, budget
+        times = np.linspace(0.0, asked.t_end, asked.samples)
+        self.runs = Runs(asked.t_end, times, budget)
+        self.left_out: list[LeftOut] = []
+        self.levels: list[Level] = []
+
+    def chart(self, title: str) -> Chart:
+        asked = self.asked
+        variants = ladder(self.model) if asked.models else ()
+        top = self._top(variants)
+        start = top.simulate(0.0, method="dop853")
+        measure = measure_of(top, start, asked.quantities, asked.models)
+        self.state(self.budget.plan(len(asked.methods) * max(1, len(variants))))
+        name = variants[-1].name if variants else AS_GIVEN
+        best = converged(top, name, measure, self.runs, self.tell)
+        reference = Reference(
+            best.error, best.made_by, name, measure.name, measure.unit, measure.scaling
+        )
+        self.state(f"reference by {best.made_by}: its own error is {best.error:.1e}")
+        curves = self._curves(variants, top, best, measure, reference)
+        found = survey(curves, best.run, measure, self.runs, self.tell)
+        points, partial = repeated(
+            found.points, found.models, asked.rounds, self.runs, self.tell
+        )
+        if partial:
+            why = f"{partial} of {asked.rounds} rounds of times were not whole: no time was left"
+            self.left_out.append(LeftOut("", "", "", why, False))
+        return Chart(
+            title, asked.t_end, asked.samples, reference, judged(points, reference),
+            tuple(self.levels), (*self.left_out, *found.left_out), asked.error, asked.budget,
+            self.budget.spent,
+        )  # fmt: skip
+
+    def _top(self, variants: Sequence[Variant]) -> Model:
+        """The model of the richest level."""
+        if not variants or variants[-1].scene == self.model.scene:
+            return self.model
+        return self.compile(variants[-1].scene)
+
+    def _curves(
+        self, variants: Sequence[Variant], top: Model, best: Converged, measure: Measure,
+        reference: Reference,
+    ) -> list[Curve]:  # fmt: skip
+        """All methods on all levels, the richest one last."""
+        models: list[tuple[str, Model, float | None]] = []
+        others = list(variants[:-1])
+        if variants and (flat := self._planar(variants[-1], top, best)) is not None:
+            others.append(flat)
+        for variant in others:
+            found = self._level(variant, best, measure)
+            if found is not None:
+                models.append((variant.name, *found))
+        models.append((reference.model, top, None))
+        self.levels.append(
+            Level(reference.model, reference.error, top.nu, top.engine)
+        )
+        return [
+            curve(method, level, model, self.asked.t_end, reference.floor, own)
+            for level, model, own in models
+            for method in self.asked.methods
+        ]
+
+    def _planar(self, richest: Variant, top: Model, best: Converged) -> Variant | None:
+        """The richest level without the directions in which its beams stay straight."""
+        modes = modes_of(top)
+        still = [
+            direction
+            for direction, own in directions(modes)
+            if not moves(top, best.run, own)
+        ]  # fmt: skip
+        return planar(richest, modes, still)
+
+    def _level(
+        self, variant: Variant, best: Converged, measure: Measure
+    ) -> tuple[Model, float | None] | None:
+        """The model of a level and its own error; None, with the reason kept, where it does not
+        apply."""
+        self.tell(f"level {variant.name}")
+        tight = best.run.setting
+        setting = Setting(tight.method, variant.name, tight.value, tight.fixed)
+        try:
+            model = self.compile(variant.scene)
+            own = self.runs.trial(model, setting, measure, self.budget.share(_LEVELS))
+        except MstmmError as error:
+            self.left_out.append(LeftOut("", variant.name, "", str(error), True))
+            return None
+        if own.numbers is None and not own.late:
+            self.left_out.append(LeftOut("", variant.name, "", own.failure, True))
+            return None
+        error = own.failure if own.late else error_of(own, best.run, measure)
+        if isinstance(error, str):
+            why = f"its own error was not found: {error}"
+            self.left_out.append(LeftOut("", variant.name, "", why, False))
+            error = math.nan
+        known = None if math.isnan(error) else error
+        self.levels.append(Level(variant.name, known, model.nu, model.engine))
+        return model, known
+
+
+def moves(model: Model, run: Trial, coordinates: Sequence[str]) -> bool:
+    """Whether modal coordinates of one body, such as ("blade.z1",), move beside its others."""
+    slots = model.layout.modal[coordinates[0].rpartition(".")[0]]
+    sizes = np.abs(run.q[:, slots.q_slice]).max(axis=0)
+    own = [f"{slots.name}.{name}" in coordinates for name in slots.q_names]
+    return bool(sizes[own].max(initial=0.0) > _STILL * sizes.max(initial=0.0))

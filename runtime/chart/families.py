@@ -1,0 +1,67 @@
+"""Methods of a chart: which there are, to which family they belong, and their settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from mstmm.errors import SceneError
+from mstmm.scene.rules.messages import near
+
+from ..integrate.steppers import AUTO, get, names
+from ..integrate.steppers.implicit import ALPHA, DIRK, EXPONENTIAL, ROSENBROCK
+from ..run import classical, second_opinion, sundials
+from .point import Setting
+
+#: Relative tolerances, loose to tight.
+TOLERANCES = tuple(10.0**-k for k in range(2, 13))
+#: Fixed steps in parts of the run, long to short: two to a decade.
+STEPS = tuple(1.0 / round(10 ** (k / 2)) for k in range(3, 13))
+
+#: Families in the order of legends.
+FAMILIES = (
+    "choice", "explicit", "Rosenbrock", "diagonally implicit", "Newmark's", "exponential",
+    "classical", "SciPy", "SUNDIALS",
+)  # fmt: skip
+_KINDS = {ROSENBROCK: 2, DIRK: 3, ALPHA: 4, EXPONENTIAL: 5}
+
+
+def every_method() -> tuple[str, ...]:
+    """All that `simulate` knows: own ones, the choice among them, the classical ones, others'."""
+    return (*names(), AUTO, *classical.METHODS, *second_opinion.METHODS)
+
+
+def checked_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
+    """These methods, once each, or all.  SceneError, with the nearest name, for an unknown one."""
+    known = every_method()
+    for name in methods or ():
+        if name not in known:
+            raise SceneError(f"method {name!r} is not known{near(str(name), known)}")
+    return tuple(dict.fromkeys(methods)) if methods else known
+
+
+def family(method: str) -> str:
+    """One of FAMILIES."""
+    if method == AUTO:
+        return FAMILIES[0]
+    if method in classical.METHODS:
+        return FAMILIES[6]
+    if method in sundials.METHODS:
+        return FAMILIES[8]
+    if method in second_opinion.METHODS:
+        return FAMILIES[7]
+    return FAMILIES[_KINDS.get(getattr(get(method), "kind", 0), 1)]
+
+
+def takes_fixed_steps(method: str) -> bool:
+    """Whether it can make fixed steps only."""
+    if method == AUTO or method in second_opinion.METHODS:
+        return False
+    return method in classical.METHODS or not get(method).adaptive
+
+
+def settings(method: str, model: str, t_end: float) -> Iterator[Setting]:
+    """Its settings from cheap to accurate."""
+    if takes_fixed_steps(method):
+        yield from (Setting(method, model, part * t_end, fixed=True) for part in STEPS)
+    else:
+        yield from (Setting(method, model, tolerance) for tolerance in TOLERANCES)

@@ -1,0 +1,73 @@
+"""Which points count: sure errors, Pareto's front, and the cheapest for an error.
+
+Pareto's front is of (sure error, processor time): a point is on it if no other is as accurate and
+as cheap, and better in one of the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from mstmm.errors import NumericalFailure, SceneError
+
+from .point import Point, Reference
+
+
+def judged(points: Sequence[Point], reference: Reference) -> tuple[Point, ...]:
+    """The points with their sure errors, and marked where the reference limits them.
+
+    Tighter settings that failed have no error and do not count.
+    """
+    found = []
+    for point in points:
+        if point.error is None:
+            found.append(point)
+            continue
+        sure = max(
+            other.error
+            for other in points
+            if other.curve == point.curve and other.setting.value <= point.setting.value
+            and other.error is not None
+        )  # fmt: skip
+        limited = point.error <= reference.floor
+        found.append(replace(point, sure_error=sure, limited=limited))
+    return tuple(found)
+
+
+def front(points: Iterable[Point], floor: float = 0.0) -> tuple[Point, ...]:
+    """Pareto's front, cheapest first; below `floor` no two errors can be told apart."""
+    best: list[Point] = []
+    for point in sorted(
+        (p for p in points if p.sure_error is not None and p.cpu_s is not None),
+        key=lambda p: (p.cpu_s, _sure(p, floor)),
+    ):
+        if not best or _sure(point, floor) < _sure(best[-1], floor):
+            best.append(point)
+    return tuple(best)
+
+
+def _sure(point: Point, floor: float) -> float:
+    assert point.sure_error is not None
+    return max(point.sure_error, floor)
+
+
+def recommended(points: Iterable[Point], error: float, reference: Reference) -> Point:
+    """The cheapest point that errs by at most `error`, as all tighter settings of its curve do.
+
+    SceneError for an error that is not above 0, NumericalFailure where the reference cannot judge
+    so small an error, or no point meets it.
+    """
+    if not error > 0:
+        raise SceneError(f"error = {error!r}: expected a number above 0")
+    if error < reference.floor:
+        raise NumericalFailure(
+            f"the reference itself errs by up to {reference.error:.1e}: it cannot judge errors "
+            f"below {reference.floor:.1e}"
+        )
+    found = front(points, reference.floor)
+    for point in found:
+        if point.sure_error is not None and point.sure_error <= error:
+            return point
+    best = f"; the best that ran errs by {found[-1].sure_error:.1e}" if found else ""
+    raise NumericalFailure(f"no setting errs by at most {error:.1e}{best}")

@@ -1,0 +1,53 @@
+"""Processor times taken again in alternating rounds, each point once in every round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from .budget import OutOfTime
+from .point import Point
+from .trial import Runs
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+#: Processor time (s) that short runs fill with calls in one round, and how many calls at most.
+_FILLED, _CALLS = 5e-3, 5
+
+
+def repeated(
+    points: list[Point], models: list[Model], rounds: int, runs: Runs, tell: Callable[[str], None]
+) -> tuple[list[Point], int]:
+    """The points with the least time of all their runs; and how many rounds were not whole.
+
+    A round takes the cheap points first and leaves out those that no longer fit into the budget.
+    """
+    timed = list(points)
+    order = [i for i, point in enumerate(points) if point.cpu_s is not None]
+    order.sort(key=lambda i: (points[i].cpu_s, i))
+    partial = 0
+    for number in range(rounds):
+        tell(f"times taken again, round {number + 1} of {rounds}")
+        left = sum(not _again(timed, i, models[i], runs) for i in order)
+        partial += bool(left)
+    return timed, partial
+
+
+def _again(timed: list[Point], i: int, model: Model, runs: Runs) -> bool:
+    """Time one point again; False where there is no time for it."""
+    point = timed[i]
+    assert point.cpu_s is not None
+    left, once = runs.budget.left(), max(point.cpu_s, 1e-6)
+    calls = max(1, min(_CALLS, int(_FILLED / once)))
+    if calls * once > left:
+        return False
+    try:
+        spent = [runs.simulate(model, point.setting, left)[1] for _ in range(calls)]
+    except OutOfTime:
+        return False
+    timed[i] = replace(
+        point, cpu_s=min(point.cpu_s, *spent), repeats=point.repeats + len(spent)
+    )
+    return True

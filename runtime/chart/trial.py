@@ -1,0 +1,125 @@
+"""One run of a chart: what it gave, what it cost, or why it gave nothing."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+
+from ..result.one_way.result import OneWayResult
+from ..run import second_opinion
+from .budget import Budget, OutOfTime
+from .measure import Measure
+from .point import Setting
+
+if TYPE_CHECKING:
+    from ..integrate.loop import Statistics
+    from ..model.model import Model
+    from ..result.result import Result
+
+#: Longest sentence of a reason.
+_LONGEST = 200
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A setting that was run.
+
+    Attributes:
+        setting: which.
+        t: (n,) samples that were reached, s.
+        q: (n, nq) coordinates there.
+        numbers: (n, k) of the measure there; None where there are none.
+        cpu_s: processor time of the call of `simulate`, s.
+        statistics: counts.
+        failure: why there are no numbers.
+        refused: the scene or the machine does not allow the method.
+        late: it was ended because it took too long.
+    """
+
+    setting: Setting
+    t: Array
+    q: Array
+    numbers: Array | None
+    cpu_s: float
+    statistics: Statistics | None = None
+    failure: str = ""
+    refused: bool = False
+    late: bool = False
+
+
+class Runs:
+    """Makes runs of models to `t_end` (s), sampled at `times` (s)."""
+
+    def __init__(self, t_end: float, times: Array, budget: Budget) -> None:
+        self.t_end, self.times, self.budget = t_end, tuple(times.tolist()), budget
+
+    def simulate(self, model: Model, setting: Setting, limit: float) -> tuple[Result, float]:
+        """The result and the processor time of the call, s.
+
+        OutOfTime after `limit` s of the clock, KeyboardInterrupt after an interrupt.
+        """
+        alarm = self.budget.alarm(limit)
+        begin = time.process_time()
+        result = model.simulate(
+            self.t_end, output_times=self.times, progress=alarm, **setting.options
+        )
+        if isinstance(result, OneWayResult) and result.success:
+            _ = result.cost  # makes the elastic response, which is part of what such a run is for
+        spent = time.process_time() - begin
+        if result.status is None:
+            raise KeyboardInterrupt
+        return result, spent
+
+    def trial(self, model: Model, setting: Setting, measure: Measure, limit: float) -> Trial:
+        """One run, whatever becomes of it."""
+        begin = time.process_time()
+
+        def without(why: str, refused: bool = False, late: bool = False) -> Trial:
+            spent = time.process_time() - begin
+            return Trial(setting, np.zeros(0), np.zeros((0, 0)), None, spent, None, _short(why), refused, late)
+
+        try:
+            result, spent = self.simulate(model, setting, limit)
+            if not result.success:
+                return without(result.message)
+            numbers = measure.read(result)
+        except OutOfTime:
+            return without(f"ended after {limit:.2g} s of the clock", late=True)
+        except (SceneError, EnvironmentFailure) as error:
+            return without(str(error), refused=True)
+        except (MstmmError, ArithmeticError, np.linalg.LinAlgError) as error:
+            return without(str(error))
+        if not np.isfinite(numbers).all():
+            return without("not all of its numbers are finite")
+        return Trial(setting, result.t, result.q, numbers, spent, result.statistics)
+
+
+def factorizations(setting: Setting, statistics: Statistics | None) -> int | None:
+    """How many tangents a run factored; None where the integrator of others does not tell."""
+    if statistics is None or setting.method in second_opinion.METHODS:
+        return None
+    return statistics.tangents
+
+
+def error_of(trial: Trial, reference: Trial, measure: Measure) -> float | str:
+    """Largest error over the samples that both reached, or why there is none.
+
+    Runs that an event stops may part by one sample.
+    """
+    assert trial.numbers is not None and reference.numbers is not None
+    n = min(len(trial.t), len(reference.t))
+    if abs(len(trial.t) - len(reference.t)) > 1 or not n:
+        at = [f"{run.t[-1]:.6g} s" if len(run.t) else "the start" for run in (trial, reference)]
+        return f"it ended at {at[0]}, the reference at {at[1]}"
+    return float(measure.apart(trial.numbers[:n], reference.numbers[:n]).max())
+
+
+def _short(text: str) -> str:
+    line = (text.strip().splitlines() or ["no reason given"])[0]
+    return line if len(line) <= _LONGEST else line[: _LONGEST - 3] + "..."
