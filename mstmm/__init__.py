@@ -30,6 +30,7 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .atlas.atlas import Atlas, stability
+    from .bridge.charting import chart
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
     from .runtime.model.loading import load_result
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
+    "chart": (".bridge.charting", "chart"),
     "compile": (".bridge.compilation", "compile_scene"),
     "register": (".bridge.compilation", "register"),
     "generate_file": (".bridge.compilation", "generate_file"),
@@ -54,8 +56,8 @@ _LAZY = {
 
 __all__ = [
     "Atlas", "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
-    "NumericalFailure", "Result", "Scene", "SceneError", "compile",
-    "generate_file", "load_result", "load_scene", "register", "stability",
+    "NumericalFailure", "Result", "Scene", "SceneError", "chart", "compile", "generate_file",
+    "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 
 

@@ -5,3 +5,7 @@ METHOD = "dop853"
 
 #: Relative and absolute tolerance (the latter in the units of q and u).
 RTOL, ATOL = 1e-9, 1e-12
+
+#: A chart: seconds of the clock, error for which a setting is recommended, times at which errors
+#: are looked at, rounds in which processor times are taken again.
+CHART_BUDGET, CHART_ERROR, CHART_SAMPLES, CHART_ROUNDS = 60.0, 1e-3, 101, 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from ..defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
 from ..errors import SceneError
 from ..scene import Scene
 from .compilation import compile_scene
@@ -12,9 +13,6 @@ from .compilation import compile_scene
 if TYPE_CHECKING:
     from ..runtime.chart.chart import Chart
     from ..runtime.model.model import Model
-
-#: Seconds of the clock, error for which a setting is recommended, samples, rounds of times.
-BUDGET, WANTED, SAMPLES, ROUNDS = 60.0, 1e-3, 101, 3
 
 
 def chart(
@@ -24,10 +22,10 @@ def chart(
     quantities: Sequence[str] = (),
     methods: Sequence[str] | None = None,
     models: bool = False,
-    error: float = WANTED,
-    budget: float = BUDGET,
-    samples: int = SAMPLES,
-    rounds: int = ROUNDS,
+    error: float = CHART_ERROR,
+    budget: float = CHART_BUDGET,
+    samples: int = CHART_SAMPLES,
+    rounds: int = CHART_ROUNDS,
     engine: str = "auto",
     title: str = "",
     progress: Callable[[str], None] | None = None,
@@ -49,7 +47,8 @@ def chart(
         budget: s of the clock that all of it may take; what did not fit in is told.
         samples: times from 0 to t_end at which errors are looked at; the largest counts.
         rounds: how often the processor times are taken again, all points in turn.
-        engine: as in `compile`, for what is compiled here.
+        engine: as in `compile`, for what is compiled here; "auto" is "looped" with `models`, so
+            that all levels run alike and no compiler takes the time.
         title: of the pictures.
         progress: called with a sentence before every run.
         state: called with the plan of the time, and with what the reference is.
@@ -64,8 +63,10 @@ def chart(
 
     asked = request(t_end, quantities, methods, models, error, budget, samples, rounds)
 
+    chosen = "looped" if models and engine == "auto" else engine
+
     def compiled(one: Scene) -> Model:
-        return compile_scene(one, engine=engine)
+        return compile_scene(one, engine=chosen)
 
     if isinstance(scene, Scene):
         model = compiled(scene)

@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from mstmm.errors import Interrupted
 
 from .cache import cache
+from .chart import chart
 from .check import check
 from .demo import demo
 from .doctor import doctor
@@ -69,6 +70,7 @@ def mstmm(
 
 app.command("demo")(demo)
 app.command("simulate")(simulate)
+app.command("chart")(chart)
 app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)

@@ -16,11 +16,11 @@ PATIENCE = 0.7
 class Bar:
     """Appears once a run has lasted `PATIENCE`; call it with (t, t_end) in s of the simulation."""
 
-    def __init__(self, shown: bool) -> None:
+    def __init__(self, shown: bool, label: str = "simulating") -> None:
         self._shown, self._begin = shown, time.monotonic()
         self._bar: Any = None
         self._task: Any = None
-        self._label = "simulating"
+        self._label = label
 
     def label(self, text: str) -> None:
         """Name what follows, such as a second run."""
@@ -62,9 +62,9 @@ class Bar:
 
 
 @contextmanager
-def bar() -> Iterator[Bar]:
+def bar(label: str = "simulating") -> Iterator[Bar]:
     """A bar that is gone when the block ends, however it ends."""
-    made = Bar(sys.stderr.isatty())
+    made = Bar(sys.stderr.isatty(), label)
     try:
         yield made
     finally:

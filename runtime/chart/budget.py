@@ -10,8 +10,9 @@ from dataclasses import dataclass
 #: for repeating runs.
 REFERENCE, SETTINGS, ALL = 0.35, 0.8, 1.0
 
-#: Of the time left one run may take at most this part: others want to be tried too.
-ONE_RUN = 6.0
+#: One run may take a part of the time left, for others want to be tried too: a sixth, and less
+#: where more than thirty curves wait.
+_FEW, _WAITING = 6.0, 5.0
 
 
 class OutOfTime(BaseException):
@@ -41,9 +42,9 @@ class Budget:
         """Seconds until so much of the budget is spent, 0 or more."""
         return max(0.0, part * self.seconds - self.spent)
 
-    def share(self, part: float) -> float:
-        """Seconds that one run may take now."""
-        return self.left(part) / ONE_RUN
+    def share(self, part: float, waiting: int = 1) -> float:
+        """Seconds that one run may take now, of so many curves that wait."""
+        return self.left(part) / max(_FEW, waiting / _WAITING)
 
     def alarm(self, seconds: float) -> Callable[[float, float], None]:
         """What ends a run after so many seconds: to be given to `simulate` as `progress`."""

@@ -12,7 +12,7 @@ from mstmm.errors import EnvironmentFailure, MstmmError
 
 from ..host.files import replacing
 from . import front as fronts
-from .point import Level, LeftOut, Point, Reference
+from .point import LeftOut, Level, Point, Reference
 
 #: Errors for which the cheapest setting is told.
 ASKED = tuple(10.0**-k for k in range(1, 11))

@@ -10,24 +10,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import real, whole
-from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.errors import MstmmError, SceneError
 from mstmm.scene import Scene
 
-from .budget import REFERENCE, Budget
+from ..integrate.steppers import AUTO
+from .budget import Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
-from .families import checked_methods
+from .families import checked_methods, promising_first
 from .front import judged
 from .measure import Measure, measure_of
 from .models import Variant, directions, ladder, modes_of, planar
 from .point import LeftOut, Level, Reference, Setting
 from .rounds import repeated
-from .survey import Curve, Found, curve, survey
+from .survey import Curve, Survey, curve
 from .trial import Runs, Trial, error_of
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
+#: Relative tolerance of the runs, by the choice among methods, for the levels' own errors.
+_TIGHT = 1e-8
 #: Part of the budget by which the levels' own errors are to be found.
 _LEVELS = 0.45
 #: Coordinates that stay below this part of the largest one of their body do not move.
@@ -82,7 +85,9 @@ def charted(
     `state` hears the plan and what becomes of it, `tell` every step.  Raises SceneError for an
     unknown quantity, NumericalFailure where there is no reference.
     """
-    return _Charting(model, asked, compile, tell, state, budget or Budget(asked.budget)).chart(title)
+    return _Charting(model, asked, compile, tell, state, budget or Budget(asked.budget)).chart(
+        title
+    )
 
 
 class _Charting:
@@ -111,10 +116,8 @@ class _Charting:
         )
         self.state(f"reference by {best.made_by}: its own error is {best.error:.1e}")
         curves = self._curves(variants, top, best, measure, reference)
-        found = survey(curves, best.run, measure, self.runs, self.tell)
-        points, partial = repeated(
-            found.points, found.models, asked.rounds, self.runs, self.tell
-        )
+        found = Survey(best.run, measure, self.runs, self.tell).make(curves)
+        points, partial = repeated(found.points, found.models, asked.rounds, self.runs, self.tell)
         if partial:
             why = f"{partial} of {asked.rounds} rounds of times were not whole: no time was left"
             self.left_out.append(LeftOut("", "", "", why, False))
@@ -125,10 +128,8 @@ class _Charting:
         )  # fmt: skip
 
     def _top(self, variants: Sequence[Variant]) -> Model:
-        """The model of the richest level."""
-        if not variants or variants[-1].scene == self.model.scene:
-            return self.model
-        return self.compile(variants[-1].scene)
+        """The model of the richest level; with others beside it compiled as they are."""
+        return self.compile(variants[-1].scene) if variants else self.model
 
     def _curves(
         self, variants: Sequence[Variant], top: Model, best: Converged, measure: Measure,
@@ -144,13 +145,11 @@ class _Charting:
             if found is not None:
                 models.append((variant.name, *found))
         models.append((reference.model, top, None))
-        self.levels.append(
-            Level(reference.model, reference.error, top.nu, top.engine)
-        )
+        self.levels.append(Level(reference.model, reference.error, top.nu, top.engine))
         return [
             curve(method, level, model, self.asked.t_end, reference.floor, own)
+            for method in promising_first(self.asked.methods)
             for level, model, own in models
-            for method in self.asked.methods
         ]
 
     def _planar(self, richest: Variant, top: Model, best: Converged) -> Variant | None:
@@ -169,23 +168,21 @@ class _Charting:
         """The model of a level and its own error; None, with the reason kept, where it does not
         apply."""
         self.tell(f"level {variant.name}")
-        tight = best.run.setting
-        setting = Setting(tight.method, variant.name, tight.value, tight.fixed)
+        setting = Setting(AUTO, variant.name, _TIGHT)
         try:
             model = self.compile(variant.scene)
-            own = self.runs.trial(model, setting, measure, self.budget.share(_LEVELS))
-        except MstmmError as error:
-            self.left_out.append(LeftOut("", variant.name, "", str(error), True))
+            run = self.runs.trial(model, setting, measure, self.budget.share(_LEVELS))
+        except MstmmError as problem:
+            self.left_out.append(LeftOut("", variant.name, "", str(problem), True))
             return None
-        if own.numbers is None and not own.late:
-            self.left_out.append(LeftOut("", variant.name, "", own.failure, True))
+        if run.numbers is None and not run.late:
+            self.left_out.append(LeftOut("", variant.name, "", run.failure, True))
             return None
-        error = own.failure if own.late else error_of(own, best.run, measure)
-        if isinstance(error, str):
-            why = f"its own error was not found: {error}"
+        own = "it took too long" if run.late else error_of(run, best.run, measure)
+        if isinstance(own, str):
+            why = f"no error of its own was found: {own}"
             self.left_out.append(LeftOut("", variant.name, "", why, False))
-            error = math.nan
-        known = None if math.isnan(error) else error
+        known = None if isinstance(own, str) else own
         self.levels.append(Level(variant.name, known, model.nu, model.engine))
         return model, known
 

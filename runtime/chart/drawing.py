@@ -46,7 +46,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Label:
-    """A word beside a point: `place` of the point, `at` (points right, down) of the word's middle."""
+    """A word beside the point at `place`; its middle is `at` points to the right and down of it."""
 
     text: str
     place: Place
@@ -158,10 +158,12 @@ def _by_level(
 ) -> list[Line]:
     """For every level of model its own front, joined, before the rest of its points."""
     colours, found = of_levels(levels), []
+    own_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.levels}
+    own_errors[chart.reference.model] = 0.0
     for strong in (False, True):
         for level in levels:
             own = [p for p in points if p.model == level]
-            edge = {id(p) for p in front(own, chart.reference.floor)}
+            edge = {id(p) for p in front(own, max(own_errors[level], chart.reference.floor))}
             for mark in dict.fromkeys(mark_of(p.method) for p in own):
                 some = tuple(
                     (placed[id(p)], p)
@@ -182,11 +184,10 @@ def _ordered(methods: Iterable[str]) -> list[str]:
     return sorted(names, key=lambda name: FAMILIES.index(family(name)))
 
 
-def _labels(
-    places: Sequence[Place], words: Sequence[str], x: Place, y: Place
-) -> list[Label]:
+def _labels(places: Sequence[Place], words: Sequence[str], x: Place, y: Place) -> list[Label]:
     """A word where the front takes up a method (or level), if it finds room beside the point; again
     only far from where it stood last."""
+
     def on_plane(at: Place) -> Place:
         right = (at[0] - x[0]) / (x[1] - x[0]) * _PLANE[0]
         return right, (y[1] - at[1]) / (y[1] - y[0]) * _PLANE[1]
@@ -204,8 +205,12 @@ def _labels(
             a, b = points[i][0] + right, points[i][1] + down
             box = (a - wide, b - high, a + wide, b + high)
             inside = box[0] > 0 and box[2] < _PLANE[0] and box[1] > 0 and box[3] < _PLANE[1]
-            if inside and not any(_meet(box, other) for other in boxes) and not any(
-                box[0] < px < box[2] and box[1] - 3 < py < box[3] + 3 for px, py in points
+            if (
+                inside
+                and not any(_meet(box, other) for other in boxes)
+                and not any(
+                    box[0] < px < box[2] and box[1] - 3 < py < box[3] + 3 for px, py in points
+                )
             ):
                 boxes.append(box)
                 last[word] = points[i][0]
@@ -218,9 +223,7 @@ def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _legend(
-    lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str]
-) -> list[Entry]:
+def _legend(lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str]) -> list[Entry]:
     """Methods below their families; or levels of model, and the marks of families."""
     if len(levels) > 1:
         colours = of_levels(levels)
@@ -231,6 +234,7 @@ def _legend(
         return [
             *found, Entry("methods"),
             *(Entry(name, Look("#555555", marks[name])) for name in families),
+            Entry("bars below: errors of levels"),
         ]  # fmt: skip
     found = []
     known = {line.name: line for line in lines}

@@ -47,7 +47,9 @@ def ladder(model: Compiled) -> tuple[Variant, ...]:
     ):  # fmt: skip
         for n in counts:
             cut = reduced(scene, modes, n, stiffening)
-            found.append(Variant(f"{word}, {n} shape{'s' if n > 1 else ''}", with_level(cut, level)))
+            found.append(
+                Variant(f"{word}, {n} shape{'s' if n > 1 else ''}", with_level(cut, level))
+            )
     return tuple(found)
 
 

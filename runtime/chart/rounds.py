@@ -13,6 +13,10 @@ from .trial import Runs
 if TYPE_CHECKING:
     from ..model.model import Model
 
+#: Runs that take more than this part of the time for all rounds are not made again: their times
+#: vary little, and others would lose theirs.
+_LONG = 50.0
+
 #: Processor time (s) that short runs fill with calls in one round, and how many calls at most.
 _FILLED, _CALLS = 5e-3, 5
 
@@ -22,11 +26,13 @@ def repeated(
 ) -> tuple[list[Point], int]:
     """The points with the least time of all their runs; and how many rounds were not whole.
 
-    A round takes the cheap points first and leaves out those that no longer fit into the budget.
+    A round takes the cheap points first and leaves out those that no longer fit into the budget;
+    runs so long that a few of them would fill it have no part in rounds.
     """
     timed = list(points)
-    order = [i for i, point in enumerate(points) if point.cpu_s is not None]
-    order.sort(key=lambda i: (points[i].cpu_s, i))
+    longest = runs.budget.left() / _LONG
+    times = {i: p.cpu_s for i, p in enumerate(points) if p.cpu_s is not None}
+    order = sorted((i for i in times if times[i] <= longest), key=lambda i: (times[i], i))
     partial = 0
     for number in range(rounds):
         tell(f"times taken again, round {number + 1} of {rounds}")
@@ -47,7 +53,5 @@ def _again(timed: list[Point], i: int, model: Model, runs: Runs) -> bool:
         spent = [runs.simulate(model, point.setting, left)[1] for _ in range(calls)]
     except OutOfTime:
         return False
-    timed[i] = replace(
-        point, cpu_s=min(point.cpu_s, *spent), repeats=point.repeats + len(spent)
-    )
+    timed[i] = replace(point, cpu_s=min(point.cpu_s, *spent), repeats=point.repeats + len(spent))
     return True

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from .budget import SETTINGS
-from .families import family, settings
+from .families import settings
 from .measure import Measure
 from .point import LeftOut, Point, Setting
 from .trial import Runs, Trial, error_of, factorizations
@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 #: The next setting costs this many times the last one where a curve has one point, and at most
 #: and at least so many times where it has two.
 _GROWTH, _MOST, _LEAST = 2.0, 10.0, 1.0
+
+#: Processor time (s) beside which the loading of a method does not count.
+_LOADING = 0.1
+
+#: Why a curve ends before its last setting.
+_NO_TIME = "it would have taken more than its part of the time left"
 
 #: A level of model errs by so much that settings nearer to its own error show nothing more.
 _NEAR = 1.1
@@ -72,51 +78,60 @@ class Found:
     left_out: list[LeftOut] = field(default_factory=list)
 
 
-def survey(
-    curves: list[Curve], reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None]
-) -> Found:
-    """Run them all within their part of the budget."""
-    found = Found()
-    while curves:
-        curves = [one for one in curves if _advance(one, reference, measure, runs, tell, found)]
-    return found
+class Survey:
+    """Runs curves against a reference within their part of the budget; `found` fills."""
+
+    def __init__(
+        self, reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None]
+    ) -> None:
+        self.reference, self.measure, self.runs, self.tell = reference, measure, runs, tell
+        self.found = Found()
+
+    def make(self, curves: list[Curve]) -> Found:
+        """All of them, a setting of each at a time."""
+        while curves:
+            waiting = len(curves)
+            curves = [one for one in curves if self._advance(one, waiting)]
+        return self.found
+
+    def _advance(self, one: Curve, waiting: int) -> bool:
+        """One setting of one curve; False where the curve ends."""
+        setting = next(one.ahead, None)
+        if setting is None:
+            return False
+        limit = self.runs.budget.share(SETTINGS, waiting)
+        if not limit or one.expected > limit:
+            self._left(one, f"{setting} and on", _NO_TIME)
+            return False
+        self.tell(f"{one.level}: {one.method}, {setting}")
+        trial = self.runs.trial(one.model, setting, self.measure, limit)
+        if not one.costs and trial.numbers is not None and _may_be_first(trial, one.model):
+            trial = self.runs.trial(one.model, setting, self.measure, limit)
+        one.costs.append(trial.cpu_s)
+        if trial.refused:
+            self._left(one, "", trial.failure, refused=True)
+            return False
+        point = point_of(trial, self.reference, self.measure)
+        self.found.points.append(point)
+        self.found.models.append(one.model)
+        return not (trial.late or self._enough(one, point))
+
+    def _enough(self, one: Curve, point: Point) -> bool:
+        """Whether tighter settings would show nothing more."""
+        if point.error is None or point.error > one.enough:
+            return False
+        following = next(one.ahead, None)
+        if following is not None:
+            self._left(one, f"{following} and on", one.why_enough)
+        return True
+
+    def _left(self, one: Curve, setting: str, why: str, refused: bool = False) -> None:
+        self.found.left_out.append(LeftOut(one.method, one.level, setting, why, refused))
 
 
-def _advance(
-    one: Curve, reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None],
-    found: Found,
-) -> bool:  # fmt: skip
-    """One setting of one curve; False where the curve ends."""
-    setting = next(one.ahead, None)
-    if setting is None:
-        return False
-    limit = runs.budget.share(SETTINGS)
-    if not limit or one.expected > limit:
-        left, took = runs.budget.left(SETTINGS), f"about {one.expected:.2g} s"
-        why = f"it would take {took} of the {left:.2g} s left" if limit else "no time was left"
-        found.left_out.append(LeftOut(one.method, one.level, f"{setting} and on", why, False))
-        return False
-    tell(f"{one.level}: {one.method}, {setting}" if len(found.models) else one.method)
-    trial = runs.trial(one.model, setting, measure, limit)
-    if not one.costs and trial.numbers is not None:  # the first call also loads and compiles
-        trial = runs.trial(one.model, setting, measure, limit)
-    one.costs.append(trial.cpu_s)
-    if trial.refused:
-        found.left_out.append(LeftOut(one.method, one.level, "", trial.failure, True))
-        return False
-    point = point_of(trial, reference, measure)
-    found.points.append(point)
-    found.models.append(one.model)
-    if trial.late:
-        return False
-    if point.error is not None and point.error <= one.enough:
-        nothing = next(one.ahead, None)
-        if nothing is not None:
-            found.left_out.append(
-                LeftOut(one.method, one.level, f"{nothing} and on", one.why_enough, False)
-            )
-        return False
-    return True
+def _may_be_first(trial: Trial, model: Model) -> bool:
+    """Whether the time of a first call may be that of loading a method, or of compiling for it."""
+    return trial.cpu_s < _LOADING or model.engine != "looped"
 
 
 def point_of(trial: Trial, reference: Trial, measure: Measure) -> Point:
@@ -131,8 +146,3 @@ def point_of(trial: Trial, reference: Trial, measure: Measure) -> Point:
         None if counts is None else counts.evaluations, factorizations(trial.setting, counts),
         None if counts is None else counts.steps,
     )  # fmt: skip
-
-
-def family_order(method: str) -> tuple[str, str]:
-    """For tables: by family, then by name."""
-    return family(method), method

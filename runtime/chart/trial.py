@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,10 +32,10 @@ class Trial:
 
     Attributes:
         setting: which.
+        cpu_s: processor time of the call of `simulate`, s.
         t: (n,) samples that were reached, s.
         q: (n, nq) coordinates there.
         numbers: (n, k) of the measure there; None where there are none.
-        cpu_s: processor time of the call of `simulate`, s.
         statistics: counts.
         failure: why there are no numbers.
         refused: the scene or the machine does not allow the method.
@@ -43,10 +43,10 @@ class Trial:
     """
 
     setting: Setting
-    t: Array
-    q: Array
-    numbers: Array | None
     cpu_s: float
+    t: Array = field(default_factory=lambda: np.zeros(0))
+    q: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    numbers: Array | None = None
     statistics: Statistics | None = None
     failure: str = ""
     refused: bool = False
@@ -82,7 +82,8 @@ class Runs:
 
         def without(why: str, refused: bool = False, late: bool = False) -> Trial:
             spent = time.process_time() - begin
-            return Trial(setting, np.zeros(0), np.zeros((0, 0)), None, spent, None, _short(why), refused, late)
+            why = _short(why)
+            return Trial(setting, spent, failure=why, refused=refused, late=late)
 
         try:
             result, spent = self.simulate(model, setting, limit)
@@ -97,7 +98,7 @@ class Runs:
             return without(str(error))
         if not np.isfinite(numbers).all():
             return without("not all of its numbers are finite")
-        return Trial(setting, result.t, result.q, numbers, spent, result.statistics)
+        return Trial(setting, spent, result.t, result.q, numbers, result.statistics)
 
 
 def factorizations(setting: Setting, statistics: Statistics | None) -> int | None:

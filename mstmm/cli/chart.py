@@ -1,0 +1,143 @@
+"""`mstmm chart`: what accuracy costs in a scene, by every method and level of model."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
+from mstmm.errors import EnvironmentFailure, MstmmError
+
+from .extras import install, missing
+from .options import Json, output_file, positive, quoted
+from .progress import Bar, bar
+from .simulate import compiled, use_files
+
+if TYPE_CHECKING:
+    from mstmm.runtime.chart.chart import Chart
+
+
+#: Curves that are named beside the reason for which they were left out.
+_NAMED = 4
+
+
+def chart(
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
+    out: Annotated[
+        str, typer.Option("--out", metavar="DIR", help="Folder for chart.png, .html and .json.")
+    ],
+    t_end: Annotated[
+        float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the runs, s.")
+    ] = 10.0,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option("--quantity", "-q", metavar="NAME", help="What errors are errors of, such as "
+                     "rod1.tip.position; may be repeated. All coordinates unless given."),
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", "-m", metavar="NAME", help="Method to chart; may be repeated. All "
+                     "of them unless given."),
+    ] = None,
+    models: Annotated[
+        bool, typer.Option("--models", help="Also every level of model of the flexible bodies.")
+    ] = False,
+    error: Annotated[
+        float, typer.Option("--error", metavar="E", parser=positive, help="Error for which to "
+                            "recommend the cheapest setting.")
+    ] = CHART_ERROR,
+    budget: Annotated[
+        float, typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that all of "
+                            "it may take, s of the clock.")
+    ] = CHART_BUDGET,
+    samples: Annotated[
+        int, typer.Option("--times", metavar="N", help="Times from 0 to the end at which errors "
+                          "are looked at; the largest counts.")
+    ] = CHART_SAMPLES,
+    rounds: Annotated[
+        int, typer.Option("--rounds", metavar="N", help="How often times are taken again.")
+    ] = CHART_ROUNDS,
+    engine: Annotated[
+        str, typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled "
+                          "for this scene.")
+    ] = "auto",
+    hinge: Annotated[
+        list[str] | None,
+        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
+                     "be repeated. The file is executed."),
+    ] = None,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """Chart cost against accuracy: every method over its settings, and which one to take."""
+    from . import output
+
+    folder = _folder(out)
+    use_files(hinge or [])
+    import mstmm
+
+    alike = "looped" if models and engine == "auto" else engine
+    model = compiled(scene, mstmm.load_scene(scene), engine=alike)
+    with bar("charting") as shown:
+        made = mstmm.chart(
+            model, t_end, quantities=quantity or (), methods=method, models=models, error=error,
+            budget=budget, samples=samples, rounds=rounds, engine=engine, title=Path(scene).stem,
+            progress=_follow(shown, budget), state=output.note,
+        )  # fmt: skip
+    files = [str(path) for path in made.save(folder)]
+    if json:
+        output.emit_json({**made.to_dict(), "scene": scene, "files": files})
+    else:
+        _say(made, files)
+
+
+def _folder(text: str) -> Path:
+    """The folder, made, and checked before anything is computed.
+
+    MstmmError for something else of that name, EnvironmentFailure where nothing can be written.
+    """
+    if not text or "\0" in text:
+        raise MstmmError(f"--out: expected the name of a folder, found {quoted(text)}")
+    path = Path(text)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise MstmmError(f"--out {text}: this is not a folder; take another name") from None
+    except OSError as error:
+        raise EnvironmentFailure(f"--out {text}: it cannot be made: {error.strerror}") from None
+    output_file(str(path / "chart.json"), (), "--out")
+    return path
+
+
+def _follow(shown: Bar, budget: float) -> Callable[[str], None]:
+    """What goes on, beside the time that is gone."""
+    begin = time.monotonic()
+
+    def tell(text: str) -> None:
+        shown.label(text)
+        shown(min(time.monotonic() - begin, budget), budget)
+
+    return tell
+
+
+def _say(made: Chart, files: list[str]) -> None:
+    from mstmm.runtime.chart.tables import advice, levels, recommendation, told
+
+    from . import output
+
+    console = output.console()
+    output.say(recommendation(made))
+    for title, (head, numbers, rows) in (("", advice(made)), ("levels of model", levels(made))):
+        if rows:
+            columns = [name + ">" * (i in numbers) for i, name in enumerate(head)]
+            console.print(output.table(title, columns, rows))
+            output.say()
+    for refused, word in ((True, "does not apply"), (False, "not run")):
+        for text in told(made.left_out, refused, _NAMED):
+            output.say(f"{word}: {text}")
+    if missing("plot"):
+        output.say(f"no picture: it needs {', '.join(missing('plot'))}: {install('plot')}")
+    output.say(f"wrote {' and '.join(files)}")

@@ -1,0 +1,110 @@
+"""What a chart says in words and tables, on the terminal and in its page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from mstmm.errors import MstmmError
+
+from .point import LeftOut
+
+if TYPE_CHECKING:
+    from .chart import Chart
+
+#: Headings, the columns that hold numbers, rows.
+Table = tuple[Sequence[str], Sequence[int], Sequence[Sequence[str]]]
+
+
+def recommendation(chart: Chart) -> str:
+    """The cheapest setting for the error wanted, or why there is none."""
+    asked = f"for an error of {chart.wanted:.2g}{_unit(chart)}"
+    try:
+        best = chart.recommended()
+    except MstmmError as problem:
+        return f"{asked}: nothing to recommend, {problem}"
+    level = f" on the model {best.model}" if len(chart.levels) > 1 else ""
+    return (
+        f"{asked}: {best.method}, {best.setting}{level}, {time_of(best.cpu_s or 0.0)} CPU, error "
+        f"{best.error:.1e}"
+    )
+
+
+def advice(chart: Chart) -> Table:
+    """The cheapest setting for every power of ten that one meets."""
+    head = ("error asked", "method", "setting", "model", "CPU time", "error")
+    rows = [
+        (f"{e:.0e}", p.method, str(p.setting), p.model, time_of(p.cpu_s or 0.0), f"{p.error:.1e}")
+        for e, p in chart.advice()
+    ]
+    return head, (0, 4, 5), rows
+
+
+def levels(chart: Chart) -> Table:
+    """Levels of model and their own errors; no rows where there is but one."""
+    head = ("level", "its own error", "degrees of freedom", "engine")
+    rows = [
+        (
+            level.name, "not found" if level.error is None else f"{level.error:.1e}",
+            str(level.degrees_of_freedom), level.engine,
+        )
+        for level in chart.levels
+    ]  # fmt: skip
+    return head, (1, 2), rows if len(rows) > 1 else []
+
+
+def points(chart: Chart) -> Table:
+    """Every run."""
+    head = (
+        "model", "method", "setting", "error", "CPU time", "runs", "steps", "evaluations",
+        "factorizations", "note",
+    )  # fmt: skip
+    rows = [
+        (
+            p.model, p.method, str(p.setting), "" if p.error is None else f"{p.error:.2e}",
+            "" if p.cpu_s is None else time_of(p.cpu_s), str(p.repeats or ""), _count(p.steps),
+            _count(p.evaluations), _count(p.factorizations),
+            p.failure or ("limited by the reference" if p.limited else ""),
+        )
+        for p in chart.points
+    ]  # fmt: skip
+    return head, (3, 4, 5, 6, 7, 8), rows
+
+
+def told(entries: Iterable[LeftOut], refused: bool, most: int = 1000) -> list[str]:
+    """A sentence for each reason, with at most so many of the curves that it holds for."""
+    reasons: dict[str, dict[str, list[str]]] = {}
+    for one in entries:
+        if one.refused == refused:
+            what = ", ".join(word for word in (one.method, one.setting) if word)
+            reasons.setdefault(one.reason, {}).setdefault(what, []).append(one.model)
+    return [f"{reason}{_curves(curves, most)}" for reason, curves in reasons.items()]
+
+
+def _curves(curves: Mapping[str, Sequence[str]], most: int) -> str:
+    """: "dop853, rtol 1e-09 and on (3 levels)"; rk4 ..."""
+    texts = []
+    for what, models in curves.items():
+        several = len(models) > 1
+        on = f" ({len(models)} levels)" if several and what else ""
+        texts.append(f"{what}{on}" if what else ", ".join(models))
+    texts = [text for text in texts if text]
+    if len(texts) > most:
+        texts[most:] = [f"and {len(texts) - most} more"]
+    return ": " + "; ".join(texts) if texts else ""
+
+
+def time_of(seconds: float) -> str:
+    """0.00123 s as 1.23 ms."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def _unit(chart: Chart) -> str:
+    return "" if chart.reference.unit == "1" else f" {chart.reference.unit}"
+
+
+def _count(number: int | None) -> str:
+    return "" if number is None else str(number)
