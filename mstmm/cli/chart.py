@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from mstmm.runtime.chart.chart import Chart
 
 
+#: Longest title of a picture.
+_LONGEST = 60
+
 #: Curves that are named beside the reason for which they were left out.
 _NAMED = 4
 
@@ -84,7 +87,7 @@ def chart(
     with bar("charting") as shown:
         made = mstmm.chart(
             model, t_end, quantities=quantity or (), methods=method, models=models, error=error,
-            budget=budget, samples=samples, rounds=rounds, engine=engine, title=Path(scene).stem,
+            budget=budget, samples=samples, rounds=rounds, engine=engine, title=_title(scene),
             progress=_follow(shown, budget), state=output.note,
         )  # fmt: skip
     files = [str(path) for path in made.save(folder)]
@@ -110,6 +113,11 @@ def _folder(text: str) -> Path:
         raise EnvironmentFailure(f"--out {text}: it cannot be made: {error.strerror}") from None
     output_file(str(path / "chart.json"), (), "--out")
     return path
+
+
+def _title(scene: str) -> str:
+    """The file's path, cut at its beginning where it is long."""
+    return scene if len(scene) <= _LONGEST else "..." + scene[3 - _LONGEST :]
 
 
 def _follow(shown: Bar, budget: float) -> Callable[[str], None]:

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-#: The parts of the budget by which the reference, and all settings, are to be done; what is left is
-#: for repeating runs.
-REFERENCE, SETTINGS, ALL = 0.35, 0.8, 1.0
+#: The parts of the budget by which the reference, the settings of promising methods, and those of
+#: all are to be done; what is left is for repeating runs.
+REFERENCE, EARLY, SETTINGS, ALL = 0.35, 0.6, 0.8, 1.0
 
 #: One run may take a part of the time left, for others want to be tried too: a sixth, and less
 #: where more than thirty curves wait.

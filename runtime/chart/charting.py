@@ -14,10 +14,10 @@ from mstmm.errors import MstmmError, SceneError
 from mstmm.scene import Scene
 
 from ..integrate.steppers import AUTO
-from .budget import Budget
+from .budget import EARLY, SETTINGS, Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
-from .families import checked_methods, promising_first
+from .families import PROMISING, checked_methods
 from .front import judged
 from .measure import Measure, measure_of
 from .models import Variant, directions, ladder, modes_of, planar
@@ -116,7 +116,9 @@ class _Charting:
         )
         self.state(f"reference by {best.made_by}: its own error is {best.error:.1e}")
         curves = self._curves(variants, top, best, measure, reference)
-        found = Survey(best.run, measure, self.runs, self.tell).make(curves)
+        survey = Survey(best.run, measure, self.runs, self.tell)
+        survey.make([one for one in curves if one.method in PROMISING], EARLY)
+        found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
         points, partial = repeated(found.points, found.models, asked.rounds, self.runs, self.tell)
         if partial:
             why = f"{partial} of {asked.rounds} rounds of times were not whole: no time was left"
@@ -148,7 +150,7 @@ class _Charting:
         self.levels.append(Level(reference.model, reference.error, top.nu, top.engine))
         return [
             curve(method, level, model, self.asked.t_end, reference.floor, own)
-            for method in promising_first(self.asked.methods)
+            for method in self.asked.methods
             for level, model, own in models
         ]
 

@@ -17,7 +17,8 @@ TOLERANCES = tuple(10.0**-k for k in range(2, 13))
 #: Fixed steps in parts of the run, long to short: two to a decade.
 STEPS = tuple(1.0 / round(10 ** (k / 2)) for k in range(3, 13))
 
-_PROMISING = ("dop853", "rodas4p2", "rodas5p", "genalpha", "dopri5", AUTO)
+#: Methods that are the cheapest for many scenes: they are tried before time is short.
+PROMISING = ("dop853", "rodas4p2", "rodas5p", "genalpha", "dopri5", AUTO)
 
 #: Families in the order of legends.
 FAMILIES = (
@@ -30,12 +31,6 @@ _KINDS = {ROSENBROCK: 2, DIRK: 3, ALPHA: 4, EXPONENTIAL: 5}
 def every_method() -> tuple[str, ...]:
     """All that `simulate` knows: own ones, the choice among them, the classical ones, others'."""
     return (*names(), AUTO, *classical.METHODS, *second_opinion.METHODS)
-
-
-def promising_first(methods: Sequence[str]) -> list[str]:
-    """The order in which methods are tried: those first that are the cheapest for many scenes, so
-    that time that is short is not gone before their turn."""
-    return sorted(methods, key=lambda name: name not in _PROMISING)
 
 
 def checked_methods(methods: Sequence[str] | None) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from .budget import SETTINGS
 from .families import settings
 from .measure import Measure
 from .point import LeftOut, Point, Setting
@@ -87,19 +86,20 @@ class Survey:
         self.reference, self.measure, self.runs, self.tell = reference, measure, runs, tell
         self.found = Found()
 
-    def make(self, curves: list[Curve]) -> Found:
-        """All of them, a setting of each at a time."""
+    def make(self, curves: list[Curve], part: float) -> Found:
+        """All of them, a setting of each at a time, until this part of the budget is spent."""
         while curves:
             waiting = len(curves)
-            curves = [one for one in curves if self._advance(one, waiting)]
+            curves = [
+                one for one in curves if self._advance(one, self.runs.budget.share(part, waiting))
+            ]
         return self.found
 
-    def _advance(self, one: Curve, waiting: int) -> bool:
+    def _advance(self, one: Curve, limit: float) -> bool:
         """One setting of one curve; False where the curve ends."""
         setting = next(one.ahead, None)
         if setting is None:
             return False
-        limit = self.runs.budget.share(SETTINGS, waiting)
         if not limit or one.expected > limit:
             self._left(one, f"{setting} and on", _NO_TIME)
             return False
