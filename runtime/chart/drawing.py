@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from .families import FAMILIES, family
 from .front import front
 from .looks import Look, mark_of, of_levels, of_methods
 from .point import Point
-
-if TYPE_CHECKING:
-    from .chart import Chart
+from .record import ChartRecord
 
 Place = tuple[float, float]
 
@@ -81,7 +78,7 @@ class Drawing:
     own: list[tuple[float, str, str]] = field(default_factory=list)  # levels' errors: x, colour
 
 
-def drawing(chart: Chart) -> Drawing:
+def drawing(chart: ChartRecord) -> Drawing:
     """Lay out a chart.  Its front and the methods on it are strong, the others stand behind."""
     placed = {id(p): at for p in chart.points if (at := place(p)) is not None}
     shown = [p for p in chart.points if id(p) in placed]
@@ -154,7 +151,7 @@ def _by_method(
 
 
 def _by_level(
-    points: Sequence[Point], placed: dict[int, Place], levels: Sequence[str], chart: Chart
+    points: Sequence[Point], placed: dict[int, Place], levels: Sequence[str], chart: ChartRecord
 ) -> list[Line]:
     """For every level of model its own front, joined, before the rest of its points."""
     colours, found = of_levels(levels), []

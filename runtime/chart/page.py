@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
 from mstmm.printable import printable
 
 from .drawing import Entry, drawing
 from .point import LeftOut
+from .record import ChartRecord
 from .svg import mark, svg
 from .tables import Table, advice, levels, points, recommendation, told
-
-if TYPE_CHECKING:
-    from .chart import Chart
 
 _STYLE = """
 :root { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; }
@@ -53,7 +50,7 @@ ul.left { font-size: .88rem; padding-left: 1.1rem; } summary { cursor: pointer; 
 """
 
 
-def page(chart: Chart) -> str:
+def page(chart: ChartRecord) -> str:
     """The whole page."""
     made = drawing(chart)
     keys = {name: i for i, name in enumerate(dict.fromkeys(line.name for line in made.lines))}
@@ -96,7 +93,7 @@ def page(chart: Chart) -> str:
     )
 
 
-def _how(chart: Chart) -> str:
+def _how(chart: ChartRecord) -> str:
     unit = "" if chart.reference.unit == "1" else f" in {chart.reference.unit}"
     return (
         f"{chart.t_end:g} s of motion. Errors: the largest of {printable(chart.reference.measure)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mstmm.errors import SceneError
 from mstmm.extras import missing
@@ -13,9 +13,7 @@ from mstmm.printable import printable
 
 from ..host.files import replacing
 from .drawing import Drawing, Entry, decades, drawing, time_text
-
-if TYPE_CHECKING:
-    from .chart import Chart
+from .record import ChartRecord
 
 _STYLE: dict[str, Any] = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
@@ -32,7 +30,7 @@ def installed() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def plot(chart: Chart, path: Path | None) -> Any:
+def plot(chart: ChartRecord, path: Path | None) -> Any:
     """`matplotlib.figure.Figure`; written to `path` too where one is given.
 
     Raises EnvironmentFailure without matplotlib, SceneError for an unknown ending.

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from mstmm.errors import MstmmError
 
 from .point import LeftOut
-
-if TYPE_CHECKING:
-    from .chart import Chart
+from .record import ChartRecord
 
 #: Headings, the columns that hold numbers, rows.
 Table = tuple[Sequence[str], Sequence[int], Sequence[Sequence[str]]]
 
 
-def recommendation(chart: Chart) -> str:
+def recommendation(chart: ChartRecord) -> str:
     """The cheapest setting for the error wanted, or why there is none."""
     asked = f"for an error of {chart.wanted:.2g}{_unit(chart)}"
     try:
@@ -30,7 +27,7 @@ def recommendation(chart: Chart) -> str:
     )
 
 
-def advice(chart: Chart) -> Table:
+def advice(chart: ChartRecord) -> Table:
     """The cheapest setting for every power of ten that one meets."""
     head = ("error asked", "method", "setting", "model", "CPU time", "error")
     rows = [
@@ -40,7 +37,7 @@ def advice(chart: Chart) -> Table:
     return head, (0, 4, 5), rows
 
 
-def levels(chart: Chart) -> Table:
+def levels(chart: ChartRecord) -> Table:
     """Levels of model and their own errors; no rows where there is but one."""
     head = ("level", "its own error", "degrees of freedom", "engine")
     rows = [
@@ -53,7 +50,7 @@ def levels(chart: Chart) -> Table:
     return head, (1, 2), rows if len(rows) > 1 else []
 
 
-def points(chart: Chart) -> Table:
+def points(chart: ChartRecord) -> Table:
     """Every run."""
     head = (
         "model", "method", "setting", "error", "CPU time", "runs", "steps", "evaluations",
@@ -102,7 +99,7 @@ def time_of(seconds: float) -> str:
     return f"{seconds / 1e-9:.3g} ns"
 
 
-def _unit(chart: Chart) -> str:
+def _unit(chart: ChartRecord) -> str:
     return "" if chart.reference.unit == "1" else f" {chart.reference.unit}"
 
 

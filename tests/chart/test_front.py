@@ -1,0 +1,112 @@
+"""Pareto's front and the recommendation, on points drawn and points given."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.chart.chart import Chart
+from mstmm.runtime.chart.front import front, judged, recommended
+from mstmm.runtime.chart.point import Level, Point, Reference, Setting
+
+REFERENCE = Reference(1e-11, "two runs", "as given", "all coordinates", "1", "none")
+
+
+def drawn(rng: np.random.Generator, curves: int = 6, settings: int = 8) -> tuple[Point, ...]:
+    """Curves whose errors fall on the whole, with hits and misses, ties and failures."""
+    found = []
+    for c in range(curves):
+        for s in range(settings):
+            setting = Setting(f"method{c}", "as given", 10.0 ** -(s + 2))
+            if rng.random() < 0.1:
+                found.append(Point(setting, failure="no"))
+                continue
+            error = 10.0 ** round(rng.normal(-s - 1, 2), 1)
+            seconds = 10.0 ** round(rng.normal(s / 4 - 3, 0.3), 1)
+            found.append(Point(setting, error, seconds, 1))
+    return judged(found, REFERENCE)
+
+
+def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> None:
+    for _ in range(50):
+        points = drawn(rng)
+        ran = [p for p in points if p.error is not None]
+        numbers = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in ran]
+        best = {
+            pair
+            for pair in numbers
+            if not any(
+                other != pair and other[0] <= pair[0] and other[1] <= pair[1] for other in numbers
+            )
+        }
+        found = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in front(points)]
+        assert set(found) == best
+        assert len(found) == len(best)
+        assert found == sorted(found, key=lambda pair: pair[1])
+
+
+def test_sure_errors_are_the_largest_of_tighter_settings(rng: np.random.Generator) -> None:
+    for point in (points := drawn(rng)):
+        tighter = [
+            p.error
+            for p in points
+            if p.method == point.method and p.setting.value <= point.setting.value
+            and p.error is not None
+        ]  # fmt: skip
+        assert point.sure_error == (None if point.error is None else max(tighter))
+        assert point.limited == (point.error is not None and point.error <= 3e-11)
+
+
+def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.Generator) -> None:
+    met = 0
+    for _ in range(30):
+        points = drawn(rng)
+        for asked in (1e-2, 1e-5, 1e-8):
+            enough = [p for p in points if p.sure_error is not None and p.sure_error <= asked]
+            if not enough:
+                with pytest.raises(NumericalFailure, match="no setting errs by at most"):
+                    recommended(points, asked, REFERENCE)
+                continue
+            best = recommended(points, asked, REFERENCE)
+            assert best in front(points, REFERENCE.floor)
+            assert best.sure_error is not None and best.sure_error <= asked
+            assert best.cpu_s == min(p.cpu_s or 0.0 for p in enough)
+            met += 1
+    assert met > 30
+
+
+def test_errors_that_the_reference_cannot_judge() -> None:
+    points = judged(
+        [
+            Point(Setting("a", "m", 1e-9), 2e-12, 1e-3, 1),
+            Point(Setting("b", "m", 1e-9), 1e-12, 1, 1),
+        ],
+        REFERENCE,
+    )
+    assert all(point.limited for point in points)
+    assert [p.method for p in front(points, REFERENCE.floor)] == ["a"]  # b is no better, and slower
+    assert recommended(points, 3.1e-11, REFERENCE).method == "a"
+    with pytest.raises(NumericalFailure, match="cannot judge errors below 3"):
+        recommended(points, 1e-11, REFERENCE)
+    for error in (0.0, -1.0, float("nan")):
+        with pytest.raises(SceneError, match="above 0"):
+            recommended(points, error, REFERENCE)
+
+
+def test_json_says_why_nothing_is_recommended() -> None:
+    points = judged([Point(Setting("a", "m", 1e-3), 1e-2, 1e-3, 1)], REFERENCE)
+    chart = Chart(
+        "t", 1.0, 11, REFERENCE, points, (Level("m", 1e-11, 1, "looped"),), (), 1e-6, 10.0, 1.0
+    )
+    data = json.loads(chart.to_json())
+    assert data["recommended"] is None
+    assert "the best that ran errs by 1.0e-02" in data["not_recommended"]
+    assert [(one["asked"], one["error"]) for one in data["advice"]] == [(0.1, 0.01), (0.01, 0.01)]
+    assert data["front"][0]["method"] == "a"
+    met = json.loads(replace(chart, wanted=0.5).to_json())
+    assert met["recommended"]["setting"] == {"rtol": 1e-3, "atol": 1e-5}
+    assert met["not_recommended"] is None
