@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,8 @@ from .converged import Converged, Tell, converged
 from .families import PROMISING, checked_methods
 from .front import judged
 from .measure import Measure, measure_of
-from .models import Variant, directions, ladder, modes_of, planar
+from .models import Variant, ladder
+from .planar import planar
 from .point import LeftOut, Level, Reference, Setting
 from .rounds import repeated
 from .survey import Curve, Survey, curve
@@ -31,10 +32,10 @@ if TYPE_CHECKING:
 
 #: Relative tolerance of the runs, by the choice among methods, for the levels' own errors.
 _TIGHT = 1e-8
+#: Levels with errors below this many times that tolerance are run as the reference was.
+_GOOD = 1e3
 #: Part of the budget by which the levels' own errors are to be found.
 _LEVELS = 0.45
-#: Coordinates that stay below this part of the largest one of their body do not move.
-_STILL = 1e-9
 #: The name of the only level of a chart without levels of model.
 AS_GIVEN = "as given"
 
@@ -140,7 +141,7 @@ class _Charting:
         """All methods on all levels, the richest one last."""
         models: list[tuple[str, Model, float | None]] = []
         others = list(variants[:-1])
-        if variants and (flat := self._planar(variants[-1], top, best)) is not None:
+        if variants and (flat := planar(variants[-1], top, best.run.q)) is not None:
             others.append(flat)
         for variant in others:
             found = self._level(variant, best, measure)
@@ -154,26 +155,15 @@ class _Charting:
             for level, model, own in models
         ]
 
-    def _planar(self, richest: Variant, top: Model, best: Converged) -> Variant | None:
-        """The richest level without the directions in which its beams stay straight."""
-        modes = modes_of(top)
-        still = [
-            direction
-            for direction, own in directions(modes)
-            if not moves(top, best.run, own)
-        ]  # fmt: skip
-        return planar(richest, modes, still)
-
     def _level(
         self, variant: Variant, best: Converged, measure: Measure
     ) -> tuple[Model, float | None] | None:
         """The model of a level and its own error; None, with the reason kept, where it does not
         apply."""
         self.tell(f"level {variant.name}")
-        setting = Setting(AUTO, variant.name, _TIGHT)
         try:
             model = self.compile(variant.scene)
-            run = self.runs.trial(model, setting, measure, self.budget.share(_LEVELS))
+            run = self._converged(model, variant.name, best, measure)
         except MstmmError as problem:
             self.left_out.append(LeftOut("", variant.name, "", str(problem), True))
             return None
@@ -188,10 +178,16 @@ class _Charting:
         self.levels.append(Level(variant.name, known, model.nu, model.engine))
         return model, known
 
-
-def moves(model: Model, run: Trial, coordinates: Sequence[str]) -> bool:
-    """Whether modal coordinates of one body, such as ("blade.z1",), move beside its others."""
-    slots = model.layout.modal[coordinates[0].rpartition(".")[0]]
-    sizes = np.abs(run.q[:, slots.q_slice]).max(axis=0)
-    own = [f"{slots.name}.{name}" in coordinates for name in slots.q_names]
-    return bool(sizes[own].max(initial=0.0) > _STILL * sizes.max(initial=0.0))
+    def _converged(self, model: Model, level: str, best: Converged, measure: Measure) -> Trial:
+        """A run of a level whose own error is small beside that of the level; made as the reference
+        was where the level is so good that this takes it."""
+        limit = self.budget.share(_LEVELS)
+        run = self.runs.trial(model, Setting(AUTO, level, _TIGHT), measure, limit)
+        if run.numbers is None:
+            return run
+        error = error_of(run, best.run, measure)
+        if isinstance(error, str) or error > _GOOD * _TIGHT:
+            return run
+        tight = replace(best.run.setting, model=level)
+        tighter = self.runs.trial(model, tight, measure, limit)
+        return run if tighter.numbers is None else tighter

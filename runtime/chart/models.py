@@ -1,4 +1,4 @@
-"""Levels of model of a scene: rigid, one-way, linear and stiffened with 1 to n shapes, planar.
+"""Levels of model of a scene: rigid, one-way, linear and stiffened with 1 to n shapes.
 
 A level is the scene with other tables; what a level leaves out is what its error tells.
 """
@@ -62,21 +62,6 @@ def modes_of(model: Compiled) -> Modal:
     return {name: body.modes for name, body in bodies.items() if name in beams}
 
 
-def planar(richest: Variant, modes: Modal, still: Sequence[str]) -> Variant | None:
-    """The richest level without the directions of beams that stay `still`, such as "blade.z".
-
-    None where there is nothing to leave out.
-    """
-    beams = []
-    for beam in richest.scene.beam:
-        names = [m for m in modes[beam.name] if f"{beam.name}.{_direction(m)}" not in still]
-        level = {} if names else {"model": "rigid"}
-        beams.append(with_shapes(beam, names or modes[beam.name], modes).model_copy(update=level))
-    if tuple(beams) == richest.scene.beam:
-        return None
-    return Variant("planar, " + richest.name, _with(richest.scene, beam=tuple(beams)))
-
-
 def directions(modes: Modal) -> Iterator[tuple[str, tuple[str, ...]]]:
     """("blade.z", ("blade.z1", ...)) of every direction that can be left out alone."""
     for body, names in modes.items():
@@ -98,7 +83,7 @@ def reduced(scene: Scene, modes: Modal, n: int, stiffening: bool) -> Scene:
         body.model_copy(update=change | {"modes": min(n, _free_modes(body))})
         for body in scene.elastic
     )
-    return _with(scene, beam=beams, elastic=bodies)
+    return with_tables(scene, beam=beams, elastic=bodies)
 
 
 def with_shapes(beam: Beam, names: Sequence[str], modes: Modal) -> Beam:
@@ -129,7 +114,8 @@ def _per_shape(body: Beam, places: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _with(scene: Scene, **tables: Any) -> Scene:
+def with_tables(scene: Scene, **tables: Any) -> Scene:
+    """The scene with other tables, which need no check."""
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}
     return Scene.model_construct(**(fields | tables))
 
