@@ -38,10 +38,14 @@ def thrown(axis: str = "z", **ball: Any) -> mstmm.Scene:
     )  # fmt: skip
 
 
-def level(scene: mstmm.Scene) -> Variant | None:
+def run(scene: mstmm.Scene) -> mstmm.Result:
     model = mstmm.compile(scene, engine="looped")
-    result = model.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=np.linspace(0, 1, 21))
-    return planar(Variant("rigid", scene), model, result.q)
+    return model.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=np.linspace(0, 1, 21))
+
+
+def level(scene: mstmm.Scene) -> Variant | None:
+    result = run(scene)
+    return planar(Variant("rigid", scene), result.model, result.q)
 
 
 @pytest.mark.parametrize("axis", ["z", "x"])
