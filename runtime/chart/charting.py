@@ -122,7 +122,7 @@ class _Charting:
         found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
         points, partial = repeated(found.points, found.models, asked.rounds, self.runs, self.tell)
         if partial:
-            why = f"{partial} of {asked.rounds} rounds of times were not whole: no time was left"
+            why = f"{partial} of {asked.rounds} rounds of times are not whole: no time was left"
             self.left_out.append(LeftOut("", "", "", why, False))
         return Chart(
             title, asked.t_end, asked.samples, reference, judged(points, reference),

@@ -24,6 +24,8 @@ _WILD = 1e3
 _MARGIN = 0.25
 #: Size of the plane in points, for labels that must not meet; that of a letter.
 _PLANE, _LETTER = (450.0, 370.0), (5.3, 11.0)
+#: Room for the bars at the bottom, in points.
+_BARS = 14.0
 #: A word is not said again nearer than this, in points.
 _AGAIN = 170.0
 #: Where a label may stand beside its point, in points to the right and down.
@@ -201,7 +203,7 @@ def _labels(places: Sequence[Place], words: Sequence[str], x: Place, y: Place) -
         for right, down in _BESIDE:
             a, b = points[i][0] + right, points[i][1] + down
             box = (a - wide, b - high, a + wide, b + high)
-            inside = box[0] > 0 and box[2] < _PLANE[0] and box[1] > 0 and box[3] < _PLANE[1]
+            inside = box[0] > 0 and box[2] < _PLANE[0] and box[1] > 0 and box[3] < _PLANE[1] - _BARS
             if (
                 inside
                 and not any(_meet(box, other) for other in boxes)

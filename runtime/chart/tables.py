@@ -75,11 +75,11 @@ def told(entries: Iterable[LeftOut], refused: bool, most: int = 1000) -> list[st
         if one.refused == refused:
             what = ", ".join(word for word in (one.method, one.setting) if word)
             reasons.setdefault(one.reason, {}).setdefault(what, []).append(one.model)
-    return [f"{reason}{_curves(curves, most)}" for reason, curves in reasons.items()]
+    return [f"{_curves(curves, most)}{reason}" for reason, curves in reasons.items()]
 
 
 def _curves(curves: Mapping[str, Sequence[str]], most: int) -> str:
-    """: "dop853, rtol 1e-09 and on (3 levels)"; rk4 ..."""
+    """dop853, rtol 1e-09 and on (3 levels); rk4 ...:"""
     texts = []
     for what, models in curves.items():
         several = len(models) > 1
@@ -88,7 +88,7 @@ def _curves(curves: Mapping[str, Sequence[str]], most: int) -> str:
     texts = [text for text in texts if text]
     if len(texts) > most:
         texts[most:] = [f"and {len(texts) - most} more"]
-    return ": " + "; ".join(texts) if texts else ""
+    return "; ".join(texts) + ": " if texts else ""
 
 
 def time_of(seconds: float) -> str:

@@ -184,7 +184,7 @@ def test_reasons_are_told_once() -> None:
         LeftOut("", "", "", "no rounds", False),
     ]
     assert told(entries, False) == [
-        "no time: rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on", "no rounds",
+        "rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on: no time", "no rounds",
     ]  # fmt: skip
-    assert told(entries, False, 1)[0] == "no time: rk4, step 1 s and on (2 levels); and 1 more"
-    assert told(entries, True) == ["no such level: one-way"]
+    assert told(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 1 more: no time"
+    assert told(entries, True) == ["one-way: no such level"]
