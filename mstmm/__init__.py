@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .bridge.charting import chart
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
+    from .runtime.chart.chart import Chart
     from .runtime.model.loading import load_result
     from .runtime.model.model import Model
     from .runtime.result.result import Result
@@ -47,6 +48,7 @@ _LAZY = {
     "compile": (".bridge.compilation", "compile_scene"),
     "register": (".bridge.compilation", "register"),
     "generate_file": (".bridge.compilation", "generate_file"),
+    "Chart": (".runtime.chart.chart", "Chart"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
     "load_result": (".runtime.model.loading", "load_result"),
@@ -55,9 +57,9 @@ _LAZY = {
 }
 
 __all__ = [
-    "Atlas", "ElementError", "EnvironmentFailure", "ExpressionError", "Model", "MstmmError",
-    "NumericalFailure", "Result", "Scene", "SceneError", "chart", "compile", "generate_file",
-    "load_result", "load_scene", "register", "stability",
+    "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
+    "MstmmError", "NumericalFailure", "Result", "Scene", "SceneError", "chart", "compile",
+    "generate_file", "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def chart(
 
     alike = "looped" if models and engine == "auto" else engine
     model = compiled(scene, mstmm.load_scene(scene), engine=alike)
-    with bar("charting") as shown:
+    with bar("charting", moves_alone=False) as shown:
         made = mstmm.chart(
             model, t_end, quantities=quantity or (), methods=method, models=models, error=error,
             budget=budget, samples=samples, rounds=rounds, engine=engine, title=_title(scene),

@@ -16,8 +16,9 @@ PATIENCE = 0.7
 class Bar:
     """Appears once a run has lasted `PATIENCE`; call it with (t, t_end) in s of the simulation."""
 
-    def __init__(self, shown: bool, label: str = "simulating") -> None:
+    def __init__(self, shown: bool, label: str = "simulating", moves_alone: bool = True) -> None:
         self._shown, self._begin = shown, time.monotonic()
+        self._moves_alone = moves_alone
         self._bar: Any = None
         self._task: Any = None
         self._label = label
@@ -39,7 +40,7 @@ class Bar:
             if time.monotonic() - self._begin < PATIENCE:
                 return
             self._start()
-        self._bar.update(self._task, completed=part, state=state)
+        self._bar.update(self._task, completed=part, state=state, refresh=not self._moves_alone)
 
     def _start(self) -> None:
         from rich.console import Console
@@ -49,7 +50,7 @@ class Bar:
             TextColumn("{task.description}"), BarColumn(),
             TextColumn("{task.percentage:>3.0f} %  {task.fields[state]}  left"),
             TimeRemainingColumn(compact=True),
-            console=Console(stderr=True), transient=True,
+            console=Console(stderr=True), transient=True, auto_refresh=self._moves_alone,
         )  # fmt: skip
         self._bar.start()
         self._task = self._bar.add_task(self._label, total=1.0, state="")
@@ -62,9 +63,12 @@ class Bar:
 
 
 @contextmanager
-def bar(label: str = "simulating") -> Iterator[Bar]:
-    """A bar that is gone when the block ends, however it ends."""
-    made = Bar(sys.stderr.isatty(), label)
+def bar(label: str = "simulating", moves_alone: bool = True) -> Iterator[Bar]:
+    """A bar that is gone when the block ends, however it ends.
+
+    One that does not move alone costs no processor time but when it is called.
+    """
+    made = Bar(sys.stderr.isatty(), label, moves_alone)
     try:
         yield made
     finally:

@@ -237,7 +237,7 @@ def _legend(lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str
         ]  # fmt: skip
     found = []
     known = {line.name: line for line in lines}
-    for method in _ordered(known):
+    for method in (m for m in _ordered(p.method for p in points) if m in known):
         heading = Entry(family(method))
         if heading not in found:
             found.append(heading)

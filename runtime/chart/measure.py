@@ -79,7 +79,9 @@ class Places(Measure):
     name = "places of all bodies and ends"
 
     def __init__(self, model: Compiled, start: Result) -> None:
-        self._length = scene_length(model)
+        ports = [port for body in model.flexible.values() for port in body.ports.values()]
+        lengths = [float(np.linalg.norm(port.position)) for port in ports]
+        self._length = max(scene_length(model), *lengths, 0.0)
         ending = ".position"
         self._names = [name[: -len(ending)] for name in start.names() if name.endswith(ending)]
         self.scaling = f"parts of the length of the scene, {self._length:g} m"

@@ -74,7 +74,9 @@ def page(chart: ChartRecord) -> str:
             f'<p class="soft">{made.beyond} of the points err by far more and lie beyond the '
             "picture.</p>"
         )
-    body += ["<h2>What to take</h2>", f"<p>{escape(printable(recommendation(chart)))}</p>"]
+    said = recommendation(chart)
+    said = said[:1].upper() + said[1:]
+    body += ["<h2>What to take</h2>", f"<p>{escape(printable(said))}</p>"]
     if chart.advice():
         body.append(_html(advice(chart)))
     if len(chart.levels) > 1:

@@ -8,11 +8,13 @@ with laws or drives stay what they are.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.ir.facts import builtin_hinges
 from mstmm.numbers.rotations import perpendicular
 from mstmm.scene import Hinge
 from mstmm.scene.tables.hinge_keys import Initial
@@ -58,36 +60,60 @@ def _moves(model: Compiled, q: Array, coordinates: Sequence[str]) -> bool:
 
 
 def _flat(model: Compiled, hinge: Hinge, q: Array) -> Hinge | None:
-    """The pin or planar hinge that moves as this one did; None where there is none."""
-    if hinge.type not in ("ball", "free") or hinge.drive is not None:
+    """The hinge in a plane that moves as this one did; None where there is none."""
+    facts = hinge.builtin
+    if facts is None or facts.quaternion is None or facts.frame != "own":
+        return None
+    if hinge.drive is not None or hinge.initial is None or hinge.initial.q is None:
         return None
     plain = Hinge(name="plain", type=hinge.type, inboard="ground", outboard=hinge.outboard)
-    if hinge.law != plain.law or hinge.initial is None or hinge.initial.q is None:
-        return None
     own = q[:, model.layout.hinges[hinge.name].q_slice]
-    axis = _axis(own[:, -3:])
-    if axis is None:
+    axis = _axis(own[:, facts.quaternion + 1 :])
+    speed = np.array(hinge.initial.u or (0.0,) * len(facts.speeds))
+    if hinge.law != plain.law or axis is None or not _along(speed[-3:], axis):
         return None
-    start = np.array(hinge.initial.q)
-    speed = np.array(hinge.initial.u or (0.0,) * (3 if hinge.type == "ball" else 6))
+    start, rate = np.array(hinge.initial.q), float(speed[-3:] @ axis)
     turn = 2.0 * float(np.arctan2(start[-3:] @ axis, start[-4]))
-    rate = float(speed[-3:] @ axis)
-    if not np.allclose(speed[-3:], rate * axis, rtol=0.0, atol=_STILL * max(1.0, abs(rate))):
+    common = {"name": hinge.name, "inboard": hinge.inboard, "outboard": hinge.outboard,
+              "orientation": hinge.orientation, "position": hinge.position}  # fmt: skip
+    if not facts.free_body:
+        made = Hinge(
+            **common, type=_turning(), axis=_vector(axis), initial=_start([turn], [rate])
+        )  # fmt: skip
+    elif _across(own[:, :3], axis):
+        x = np.array(perpendicular(_vector(axis)))
+        y, moved = np.cross(axis, x), _rotated(speed[:3], axis, turn)
+        initial = _start([start[:3] @ x, start[:3] @ y, turn], [moved @ x, moved @ y, rate])
+        made = Hinge(
+            **common, type=_flying(), normal=_vector(axis), axis2=_vector(x), initial=initial
+        )  # fmt: skip
+    else:
         return None
-    changed = {"name": hinge.name, "inboard": hinge.inboard, "outboard": hinge.outboard,
-               "orientation": hinge.orientation, "position": hinge.position}  # fmt: skip
-    if hinge.type == "ball":
-        pin = Hinge(**changed, type="pin", axis=_vector(axis), initial=_start([turn], [rate]))
-        return pin.model_copy(update={"release": hinge.release})
-    across = np.abs(own[:, :3] @ axis).max()
-    if across > _STILL * np.abs(own[:, :3]).max(initial=0.0):
-        return None
-    x = np.array(perpendicular(_vector(axis)))
-    y = np.cross(axis, x)
-    moved = _rotated(speed[:3], axis, turn)
-    initial = _start([start[:3] @ x, start[:3] @ y, turn], [moved @ x, moved @ y, rate])
-    flat = Hinge(**changed, type="planar", normal=_vector(axis), axis2=_vector(x), initial=initial)
-    return flat.model_copy(update={"release": hinge.release})
+    return made.model_copy(update={"release": hinge.release})
+
+
+@cache
+def _turning() -> str:
+    """The hinge that turns about its axis and does nothing else."""
+    known = builtin_hinges().items()
+    return next(name for name, f in known if f.axial and f.turns and not f.slides)
+
+
+@cache
+def _flying() -> str:
+    """The hinge that moves in a plane, and turns about its normal."""
+    return next(name for name, f in builtin_hinges().items() if f.frame == "plane")
+
+
+def _along(vector: Array, axis: Array) -> bool:
+    """Whether a vector has no part across the axis."""
+    across = np.linalg.norm(vector - axis * (axis @ vector))
+    return bool(across <= _STILL * np.linalg.norm(vector))
+
+
+def _across(places: Array, axis: Array) -> bool:
+    """Whether places (n, 3) lie in the plane across the axis through the origin."""
+    return bool(np.abs(places @ axis).max() <= _STILL * np.abs(places).max())
 
 
 def _axis(vectors: Array) -> Array | None:
