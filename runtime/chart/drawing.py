@@ -29,7 +29,10 @@ _BARS = 14.0
 #: A word is not said again nearer than this, in points.
 _AGAIN = 170.0
 #: Where a label may stand beside its point, in points to the right and down.
-_BESIDE = ((0, 15), (0, -13), (8, 26), (-30, 15), (-30, -13), (30, 28), (-50, 28), (0, -26))
+_BESIDE = (
+    (0, 15), (0, -13), (24, 15), (8, 26), (-30, 15), (-30, -13), (24, -13), (30, 28), (-50, 28),
+    (0, -26),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

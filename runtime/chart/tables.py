@@ -69,22 +69,22 @@ def points(chart: ChartRecord) -> Table:
 
 
 def told(entries: Iterable[LeftOut], refused: bool, most: int = 1000) -> list[str]:
-    """A sentence for each reason, with at most so many of the curves that it holds for."""
-    reasons: dict[str, dict[str, list[str]]] = {}
+    """A sentence for each reason, with at most so many of the methods that it holds for."""
+    reasons: dict[str, dict[str, list[LeftOut]]] = {}
     for one in entries:
         if one.refused == refused:
-            what = ", ".join(word for word in (one.method, one.setting) if word)
-            reasons.setdefault(one.reason, {}).setdefault(what, []).append(one.model)
-    return [f"{_curves(curves, most)}{reason}" for reason, curves in reasons.items()]
+            reasons.setdefault(one.reason, {}).setdefault(one.method, []).append(one)
+    return [f"{_named(methods, most)}{reason}" for reason, methods in reasons.items()]
 
 
-def _curves(curves: Mapping[str, Sequence[str]], most: int) -> str:
-    """dop853, rtol 1e-09 and on (3 levels); rk4 ...:"""
+def _named(methods: Mapping[str, Sequence[LeftOut]], most: int) -> str:
+    """rk4, step 1 s and on; dop853 (3 levels): ..."""
     texts = []
-    for what, models in curves.items():
-        several = len(models) > 1
-        on = f" ({len(models)} levels)" if several and what else ""
-        texts.append(f"{what}{on}" if what else ", ".join(models))
+    for method, entries in methods.items():
+        models, settings = [one.model for one in entries], {one.setting for one in entries}
+        words = [method, *settings] if len(settings) == 1 else [method]
+        text = ", ".join(word for word in words if word) or ", ".join(models)
+        texts.append(f"{text} ({len(models)} levels)" if method and len(models) > 1 else text)
     texts = [text for text in texts if text]
     if len(texts) > most:
         texts[most:] = [f"and {len(texts) - most} more"]

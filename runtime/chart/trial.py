@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..result.result import Result
 
 #: Longest sentence of a reason.
-_LONGEST = 200
+_LONGEST = 300
 
 
 @dataclass(frozen=True)

@@ -180,11 +180,14 @@ def test_reasons_are_told_once() -> None:
         LeftOut("rk4", "rigid", "step 1 s and on", "no time", False),
         LeftOut("rk4", "linear", "step 1 s and on", "no time", False),
         LeftOut("dop853", "linear", "rtol 1e-05 and on", "no time", False),
+        LeftOut("auto", "rigid", "rtol 1e-04 and on", "no time", False),
+        LeftOut("auto", "linear", "rtol 1e-05 and on", "no time", False),
         LeftOut("", "one-way", "", "no such level", True),
         LeftOut("", "", "", "no rounds", False),
     ]
     assert told(entries, False) == [
-        "rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on: no time", "no rounds",
+        "rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on; auto (2 levels): no time",
+        "no rounds",
     ]  # fmt: skip
-    assert told(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 1 more: no time"
+    assert told(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 2 more: no time"
     assert told(entries, True) == ["one-way: no such level"]
