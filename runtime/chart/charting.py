@@ -105,7 +105,7 @@ class _Charting:
 
     def chart(self, title: str) -> Chart:
         asked = self.asked
-        variants = ladder(self.model) if asked.models else ()
+        variants = ladder(self.model.scene) if asked.models else ()
         top = self._top(variants)
         start = top.simulate(0.0, method="dop853")
         measure = measure_of(top, start, asked.quantities, asked.models)

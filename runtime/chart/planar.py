@@ -17,9 +17,11 @@ from mstmm.arrays import Array
 from mstmm.ir.facts import builtin_hinges
 from mstmm.numbers.rotations import perpendicular
 from mstmm.scene import Hinge
+from mstmm.scene.tables.beam import Beam
+from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes
 from mstmm.scene.tables.hinge_keys import Initial
 
-from .models import Variant, directions, modes_of, with_shapes, with_tables
+from .models import Variant, modes_of, with_shapes, with_tables
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -36,27 +38,33 @@ def planar(richest: Variant, model: Compiled, q: Array) -> Variant | None:
 
     None where there is nothing to leave out.
     """
-    modes = modes_of(model)
-    moving = [own for _, own in directions(modes) if _moves(model, q, own)]
-    kept = {name for own in moving for name in own}
-    beams = []
-    for beam in richest.scene.beam:
-        names = [name for name in modes.get(beam.name, ()) if f"{beam.name}.{name}" in kept]
-        level = {} if names else {"model": "rigid"}
-        beams.append(with_shapes(beam, names or modes[beam.name], modes).model_copy(update=level))
+    modes = modes_of(richest.scene)
+    beams = tuple(
+        _straight(model, beam, modes[beam.name], q) if beam.name in modes else beam
+        for beam in richest.scene.beam
+    )
     hinges = tuple(_flat(model, hinge, q) or hinge for hinge in richest.scene.hinge)
-    if tuple(beams) == richest.scene.beam and hinges == richest.scene.hinge:
+    if beams == richest.scene.beam and hinges == richest.scene.hinge:
         return None
-    scene = with_tables(richest.scene, beam=tuple(beams), hinge=hinges)
+    scene = with_tables(richest.scene, beam=beams, hinge=hinges)
     return Variant("planar, " + richest.name, scene)
 
 
-def _moves(model: Compiled, q: Array, coordinates: Sequence[str]) -> bool:
-    """Whether modal coordinates of one body, such as ("blade.z1",), move beside its others."""
-    slots = model.layout.modal[coordinates[0].rpartition(".")[0]]
+def _straight(model: Compiled, beam: Beam, modes: Modes, q: Array) -> Beam:
+    """A beam without shapes in the directions in which it stays straight; rigid without any."""
+    slots = model.layout.modal[beam.name]
     sizes = np.abs(q[:, slots.q_slice]).max(axis=0)
-    own = [f"{slots.name}.{name}" in coordinates for name in slots.q_names]
-    return bool(sizes[own].max(initial=0.0) > _STILL * sizes.max(initial=0.0))
+    moving = {
+        name.rstrip("0123456789")
+        for name, size in zip(slots.q_names, sizes, strict=True)
+        if size > _STILL * sizes.max()
+    }
+    kept = Modes(**{word: getattr(modes, word) for word in DIRECTIONS if word in moving})
+    if kept == modes:
+        return beam
+    if not kept.total:
+        return beam.model_copy(update={"model": "rigid"})
+    return with_shapes(beam, modes, kept)
 
 
 def _flat(model: Compiled, hinge: Hinge, q: Array) -> Hinge | None:

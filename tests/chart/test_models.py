@@ -91,17 +91,50 @@ def test_what_is_given_per_shape_goes_with_its_shapes() -> None:
         modes={"y": 2, "z": 2}, bending_stiffness=[30.0, 20.0], damping=[0.1, 0.2, 0.3, 0.4],
         initial={"eta": [1e-3, 2e-3, 3e-3, 4e-3]},
     )  # fmt: skip
-    model = mstmm.compile(scene, engine="looped")
-    one = reduced(scene, modes_of(model), 1, stiffening=True).beam[0]
+    one = reduced(scene, modes_of(scene), 1, stiffening=True).beam[0]
     assert one.modes is not None and one.modes.counts == (1, 1, 0, 0)
     assert one.damping.ratio == (0.1, 0.3)
     assert one.initial.eta == (1e-3, 3e-3)
     assert scene.beam[0].damping.ratio == (0.1, 0.2, 0.3, 0.4)
 
 
+@pytest.mark.parametrize("frame", ["tangent@mid", "tangent", "mean", "chord"])
+def test_numbers_of_shapes_are_counted_as_the_scene_does(frame: str) -> None:
+    """About a section in its middle a beam has coordinates for both sides of each shape."""
+    scene = hub(modes="auto", frame=frame, ends={"mid": 0.5})
+    whole = modes_of(scene)["blade"]
+    model = mstmm.compile(scene, engine="looped")
+    richest = ladder(scene)[-1]
+    assert richest.name == f"stiffened, {whole.y} shapes"
+    assert mstmm.compile(richest.scene, engine="looped").nu == model.nu
+    smaller = mstmm.compile(ladder(scene)[-2].scene, engine="looped")
+    assert smaller.nu < model.nu
+
+
+def test_bodies_that_the_scene_makes_rigid_stay_rigid() -> None:
+    scene = hub()
+    two = mstmm.Scene.from_data({
+        "gravity": [0, 0, 0], "body": [b.model_dump(by_alias=True) for b in scene.body],
+        "beam": [
+            {"name": name, "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 20.0,
+             "modes": {"y": count}, "model": model}
+            for name, count, model in (("soft", 2, "flexible"), ("hard", 5, "rigid"))
+        ],
+        "hinge": [
+            {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "hub"},
+            {"name": "clamp", "type": "fixed", "inboard": "hub", "outboard": "soft"},
+            {"name": "other", "type": "fixed", "inboard": "hub", "outboard": "hard",
+             "orientation": [0, 0, np.pi]},
+        ],
+    })  # fmt: skip
+    levels = ladder(two)
+    assert [one.name for one in levels][-1] == "stiffened, 2 shapes"
+    assert all(one.scene.beam[1].model == "rigid" for one in levels)
+
+
 def test_shapes_of_the_users_own_are_cut_too() -> None:
     scene = hub(modes=None, shapes={"y": ["(x/L)^2", "(x/L)^3"]})
-    variants = {variant.name: variant.scene for variant in ladder(mstmm.compile(scene))}
+    variants = {variant.name: variant.scene for variant in ladder(scene)}
     shapes = variants["linear, 1 shape"].beam[0].shapes
     assert shapes is not None and [one.text for one in shapes.y] == ["(x/L)^2"]
     assert mstmm.compile(variants["stiffened, 2 shapes"]).nu == 3
@@ -131,7 +164,8 @@ def test_quantities_that_a_level_does_not_have() -> None:
 
 
 def test_a_scene_of_rigid_bodies_has_one_level() -> None:
-    model = mstmm.compile(pendulum(), engine="looped")
-    assert [variant.name for variant in ladder(model)] == ["rigid"]
-    made = mstmm.chart(model, 0.5, methods=["dop853"], models=True, samples=3, rounds=0, budget=300)
+    assert [variant.name for variant in ladder(pendulum())] == ["rigid"]
+    made = mstmm.chart(
+        pendulum(), 0.5, methods=["dop853"], models=True, samples=3, rounds=0, budget=300
+    )
     assert [level.name for level in made.levels] == ["rigid"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.scene.tables.beam_keys import Modes
 from mstmm.scene.tables.loads import Load
 
 from ..computable import computed
@@ -59,6 +60,12 @@ class BeamBodies:
         }
         said = tuple(f'beam "{beam.name}": {text}' for text in core.warnings)
         return replace(core, name=beam.name, ports={**core.ports, **spans}, warnings=said)
+
+    def modes(self, beam: Beam) -> Modes:
+        """How many shapes it has in each direction, also where the scene leaves that open."""
+        data = beam_data(beam)
+        chosen = choices(beam, data, holding(self._around, beam, data), self._idle(beam))
+        return Modes(**{choice.direction: choice.count for choice in chosen})
 
     def _idle(self, beam: Beam) -> frozenset[str]:
         """Directions in which nothing moves the beam; asked for where the shapes are "auto"."""
