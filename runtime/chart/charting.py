@@ -120,9 +120,9 @@ class _Charting:
         survey = Survey(best.run, measure, self.runs, self.tell)
         survey.make([one for one in curves if one.method in PROMISING], EARLY)
         found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
-        points, partial = repeated(found.points, found.models, asked.rounds, self.runs, self.tell)
-        if partial:
-            why = f"{partial} of {asked.rounds} rounds of times are not whole: no time was left"
+        points, missed = repeated(found.points, found.models, asked.rounds, self.runs, self.tell)
+        if missed and asked.rounds:
+            why = f"{missed} of {len(points)} runs were timed less often than the others, for time"
             self.left_out.append(LeftOut("", "", "", why, False))
         return Chart(
             title, asked.t_end, asked.samples, reference, judged(points, reference),

@@ -24,7 +24,7 @@ _FILLED, _CALLS = 5e-3, 5
 def repeated(
     points: list[Point], models: list[Model], rounds: int, runs: Runs, tell: Callable[[str], None]
 ) -> tuple[list[Point], int]:
-    """The points with the least time of all their runs; and how many rounds were not whole.
+    """The points with the least time of all their runs; and how many missed a round.
 
     A round takes the cheap points first and leaves out those that no longer fit into the budget;
     runs so long that a few of them would fill it have no part in rounds.
@@ -33,19 +33,20 @@ def repeated(
     longest = runs.budget.left() / _LONG
     times = {i: p.cpu_s for i, p in enumerate(points) if p.cpu_s is not None}
     order = sorted((i for i in times if times[i] <= longest), key=lambda i: (times[i], i))
-    partial = 0
+    missed: set[int] = set()
     for number in range(rounds):
         tell(f"times taken again, round {number + 1} of {rounds}")
-        left = sum(not _again(timed, i, models[i], runs) for i in order)
-        partial += bool(left)
-    return timed, partial
+        rest = rounds - number
+        kept = runs.budget.left() * (rest - 1) / rest  # for the rounds that follow
+        missed |= {i for i in order if not _again(timed, i, models[i], runs, kept)}
+    return timed, len(missed) + len(times) - len(order)
 
 
-def _again(timed: list[Point], i: int, model: Model, runs: Runs) -> bool:
-    """Time one point again; False where there is no time for it."""
+def _again(timed: list[Point], i: int, model: Model, runs: Runs, kept: float) -> bool:
+    """Time one point again; False where that would take of the time that is kept."""
     point = timed[i]
     assert point.cpu_s is not None
-    left, once = runs.budget.left(), max(point.cpu_s, 1e-6)
+    left, once = runs.budget.left() - kept, max(point.cpu_s, 1e-6)
     calls = max(1, min(_CALLS, int(_FILLED / once)))
     if calls * once > left:
         return False
