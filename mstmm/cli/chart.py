@@ -143,7 +143,7 @@ def _say(made: Chart, files: list[str]) -> None:
             columns = [name + ">" * (i in numbers) for i, name in enumerate(head)]
             console.print(output.table(title, columns, rows))
             output.say()
-    for refused, word in ((True, "does not apply"), (False, "not run")):
+    for refused, word in ((True, "does not apply"), (False, "left out")):
         for text in told(made.left_out, refused, _NAMED):
             output.say(f"{word}: {text}")
     if missing("plot"):

@@ -123,7 +123,7 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
 
 def _left_out(entries: Sequence[LeftOut]) -> str:
     parts = []
-    for refused, heading in ((True, "Does not apply"), (False, "Not run")):
+    for refused, heading in ((True, "Does not apply"), (False, "Left out")):
         items = [f"<li>{escape(printable(text))}</li>" for text in told(entries, refused)]
         if items:
             parts.append(f'<h2>{heading}</h2><ul class="left">{"".join(items)}</ul>')

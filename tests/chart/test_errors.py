@@ -64,6 +64,17 @@ def test_errors_of_a_quantity_are_in_its_unit() -> None:
         assert point.error == pytest.approx(apart.max(), abs=1e-10)
 
 
+def test_errors_of_orientations_are_angles() -> None:
+    """Of a pendulum the same as those of its angle."""
+    turned, angle = charted("bob.orientation"), charted("pivot.angle")
+    assert turned.reference.unit == angle.reference.unit == "rad"
+    errors = {p.setting: p.error for p in angle.points}
+    compared = [p for p in turned.points if p.error is not None and 1e-9 < p.error < 1.0]
+    assert len(compared) > 20
+    for point in compared:
+        assert point.error == pytest.approx(errors[point.setting], rel=1e-6, abs=1e-10)
+
+
 def test_several_quantities_count_in_parts_of_their_excursions() -> None:
     both = charted("pivot.angle", "energy.kinetic")
     assert both.reference.unit == "1"
