@@ -11,6 +11,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
+from ..host.interruptible import interruptible
 from ..result.one_way.result import OneWayResult
 from ..run import second_opinion
 from .budget import Budget, OutOfTime
@@ -65,14 +66,15 @@ class Runs:
         OutOfTime after `limit` s of the clock, KeyboardInterrupt after an interrupt.
         """
         alarm = self.budget.alarm(limit)
-        begin = time.process_time()
-        result = model.simulate(
-            self.t_end, output_times=self.times, progress=alarm, **setting.options
-        )
-        if isinstance(result, OneWayResult) and result.success:
-            _ = result.cost  # makes the elastic response, which is part of what such a run is for
-        spent = time.process_time() - begin
-        if result.status is None:
+        with interruptible() as interrupted:  # short runs end before they look at it
+            begin = time.process_time()
+            result = model.simulate(
+                self.t_end, output_times=self.times, progress=alarm, **setting.options
+            )
+            if isinstance(result, OneWayResult) and result.success:
+                _ = result.cost  # makes the elastic response, which is part of what it is for
+            spent = time.process_time() - begin
+        if interrupted[0] or result.status is None:
             raise KeyboardInterrupt
         return result, spent
 

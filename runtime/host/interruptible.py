@@ -15,11 +15,17 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 PATIENCE = 5.0
 
 
+#: Flags of the blocks that the main thread is in.
+_open: list[list[bool]] = []
+
+
 @contextmanager
 def interruptible() -> Iterator[list[bool]]:
     """Ctrl-C and SIGTERM set the flag instead of ending anything, so that no sample is lost.
 
-    A signal that this process was told to ignore (nohup, a script's background job) stays ignored.
+    Within another such block the flags of both are set: what ends for another reason while a signal
+    comes does not hide it from who has more to do.  A signal that this process was told to ignore
+    (nohup, a script's background job) stays ignored.
     Where nobody has looked at the flag for PATIENCE, the next signal is a KeyboardInterrupt.
     """
     flag, since = [False], [0.0]
@@ -28,12 +34,16 @@ def interruptible() -> Iterator[list[bool]]:
         return
 
     def note(*_: object) -> None:
-        if not flag[0]:
-            flag[0], since[0] = True, time.monotonic()
+        for outer in _open:
+            outer[0] = True
+        if not since[0]:
+            since[0] = time.monotonic()
         elif time.monotonic() - since[0] > PATIENCE:
             raise KeyboardInterrupt
 
     with ExitStack() as restored:
+        _open.append(flag)
+        restored.callback(_open.pop)
         for which in INTERRUPTS:
             previous = signal.getsignal(which)
             if previous is not None and previous is not signal.SIG_IGN:

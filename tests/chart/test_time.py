@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from typing import Any
+
 import numpy as np
 import pytest
 from chart.scenes import Clock, hub, pendulum, stiff
@@ -14,6 +18,8 @@ from mstmm.runtime.chart.charting import charted, request
 from mstmm.runtime.chart.measure import Coordinates
 from mstmm.runtime.chart.point import Setting
 from mstmm.runtime.chart.trial import Runs
+from mstmm.runtime.host.interruptible import interruptible
+from mstmm.runtime.run.simulate import advance
 
 METHODS = ("dop853", "dopri5", "rodas4")
 
@@ -92,6 +98,23 @@ def test_an_interrupted_run_is_no_point(monkeypatch: pytest.MonkeyPatch) -> None
     result.status = None  # as Ctrl-C leaves it
     monkeypatch.setattr(mstmm.Model, "simulate", lambda *_, **__: result)
     runs = Runs(1.0, np.array([0.0, 1.0]), Budget(1e9))
+    with pytest.raises(KeyboardInterrupt):
+        runs.trial(model, Setting("dop853", "as given", 1e-9), Coordinates(model), limit=1e9)
+
+
+def test_an_interrupt_within_a_short_run_is_heard(
+    heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that ends before it looks for interrupts does not hide one from the chart."""
+    model = mstmm.compile(pendulum(), engine="looped")
+
+    def signalled(*arguments: Any) -> Any:
+        with interruptible():  # as runs are, whose end comes first
+            os.kill(os.getpid(), signal.SIGINT)
+        return advance(*arguments)
+
+    monkeypatch.setattr("mstmm.runtime.run.execution.advance", signalled)
+    runs = Runs(1e-3, np.array([0.0, 1e-3]), Budget(1e9))
     with pytest.raises(KeyboardInterrupt):
         runs.trial(model, Setting("dop853", "as given", 1e-9), Coordinates(model), limit=1e9)
 
