@@ -103,7 +103,7 @@ def drawing(chart: ChartRecord) -> Drawing:
         _labels(steps, words, x, y), _legend(lines, chart.points, levels),
         chart.title or "cost against accuracy",
         f"{chart.t_end:g} s of motion; reference: {reference.made_by}, its own error "
-        f"{reference.error:.1e}",
+        f"{reference.error:.1e}" + ("" if shown else "; no point has an error above zero"),
         f"largest error of {reference.measure}{unit}" + ("" if unit else " (scaled)"),
         beyond=len(shown) - len(kept),
         own=[

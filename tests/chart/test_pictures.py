@@ -114,6 +114,18 @@ def test_wild_errors_do_not_shrink_the_rest() -> None:
     assert "beyond the picture" in chart.to_html()
 
 
+def test_errors_of_zero_have_no_place_on_the_axes(tmp_path: Path) -> None:
+    """A pendulum at rest without gravity stays where it is, by every method."""
+    scene = pendulum()
+    hanging = scene.model_copy(update={"gravity": (0.0, 0.0, 0.0)})
+    made = mstmm.chart(hanging, 1.0, methods=METHODS, samples=3, rounds=0, budget=300)
+    assert {point.error for point in made.points} == {0.0}
+    assert made.recommended(1e-3).error == 0.0
+    assert "no point has an error above zero" in drawing(made).below
+    assert "no point has an error" not in drawing(one_level()).below
+    assert len(made.save(tmp_path)) == 3
+
+
 def test_labels_do_not_meet() -> None:
     for chart in (one_level(), levels()):
         made = drawing(chart)
