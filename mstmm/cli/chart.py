@@ -125,8 +125,9 @@ def _follow(shown: Bar, budget: float) -> Callable[[str], None]:
     begin = time.monotonic()
 
     def tell(text: str) -> None:
+        spent = min(time.monotonic() - begin, budget)
         shown.label(text)
-        shown(min(time.monotonic() - begin, budget), budget)
+        shown.share(spent / budget, f"{spent:.0f} of {budget:g} s")
 
     return tell
 
