@@ -85,18 +85,29 @@ def tree(kinds: list[str]) -> mstmm.Scene:
 def _moving(kind: str, rng: np.random.Generator) -> dict[str, Any]:
     spin = rng.normal(0, 0.5, 6).tolist()
     six = {"q": [0.01, 0, 0, 1, 0, 0, 0], "u": spin}
-    law = {"stiffness": [300, 200, 250, 30, 20, 25], "damping": [5, 5, 5, 0.3, 0.2, 0.1]}
+    law: dict[str, list[float]] = {
+        "stiffness": [300, 200, 250, 30, 20, 25], "damping": [5, 5, 5, 0.3, 0.2, 0.1],
+    }  # fmt: skip
     found: dict[str, dict[str, Any]] = {
         "fixed": {},
         "pin": {"axis": rng.normal(size=3).tolist(), "initial": {"q": [0.3], "u": spin[:1]}},
         "ball": {"initial": {"q": [1, 0, 0, 0], "u": spin[:3]}},
         "free": {"initial": six},
         "elastic": {"initial": six, "law": law},
+        "sprung pin": {"type": "elastic", "initial": six, "law": _without_turns(law, 1)},
+        "sprung ball": {"type": "elastic", "initial": six, "law": _without_turns(law, 3)},
     }
     return found[kind]
 
 
-_SPRINGS = {"stiffness": [500, 400, 450, 30, 20, 25], "damping": [5, 5, 5, 0.3, 0.2, 0.1]}
+def _without_turns(law: dict[str, list[float]], count: int) -> dict[str, list[float]]:
+    """Springs and dampers of an elastic hinge, but none about its last axes."""
+    return {name: [*values[: 6 - count], *[0.0] * count] for name, values in law.items()}
+
+
+_SPRINGS: dict[str, list[float]] = {
+    "stiffness": [500, 400, 450, 30, 20, 25], "damping": [5, 5, 5, 0.3, 0.2, 0.1],
+}  # fmt: skip
 _HELD: dict[str, dict[str, Any]] = {
     "pin": {"axis": [0, 0, 1], "initial": {"q": [0.1], "u": [1.0]}},
     "ball": {"initial": {"q": [1, 0, 0, 0], "u": [0.3, 0.4, 0.5]}},
@@ -105,11 +116,17 @@ _HELD: dict[str, dict[str, Any]] = {
         "law": _SPRINGS, "initial": {"q": [0, 0, 0, 1, 0, 0, 0], "u": [0, 0, 0, 0.1, 0.1, 0.2]},
     },
 }  # fmt: skip
+_HELD["sprung pin"] = _HELD["elastic"] | {"type": "elastic", "law": _without_turns(_SPRINGS, 1)}
 _AT_TIP: dict[str, dict[str, Any]] = {
     "pin": {"axis": [0.2, 0.3, 1], "initial": {"q": [0.3], "u": [1.0]}},
     "ball": {"initial": {"q": [1, 0, 0, 0], "u": [0.1, 0.2, 0.4]}},
     "fixed": {},
     "elastic": {"law": _SPRINGS},
+    "sprung pin": {
+        "type": "elastic",
+        "law": _without_turns(_SPRINGS, 1),
+        "initial": {"q": [0, 0, 0, 1, 0, 0, 0], "u": [0, 0, 0, 0.1, 0.2, 0.4]},
+    },
 }
 
 

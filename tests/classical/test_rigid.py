@@ -162,6 +162,8 @@ KINDS = {
     "welds": ["fixed", "pin", "pin"],
     "springs": ["elastic"],
     "springs and pins": ["elastic", "pin", "fixed"],
+    "springs about two axes": ["sprung pin", "fixed"],
+    "springs along three axes": ["sprung ball", "elastic"],
     "in flight": ["free", "ball", "ball", "ball", "ball", "ball"],
 }
 

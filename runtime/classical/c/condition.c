@@ -45,9 +45,8 @@ void classical_own_condition(const step_record *step, int index, int outboard, i
         return;
     }
     const slopes at = classical_slopes(step, index);
-    const section held = classical_section(step, index);
     real axis[3];
-    classical_axis(held.axes, axis);
+    classical_pin_axis(step, index, axis);
     pin_condition(axis, step->run->motions[index].outboard, modes,
                   outboard ? at.outboard : at.inboard, outboard ? at.eta_outboard : at.eta_inboard,
                   length, rows);

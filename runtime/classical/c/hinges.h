@@ -23,6 +23,7 @@ slopes classical_slopes(const step_record *step, int body);
 void classical_outboard_axes(const step_record *step, int body, real *axes);
 void classical_outboard_spin(const step_record *step, int body, real *spin);
 void classical_axis(const real *axes, real *axis);
+void classical_pin_axis(const step_record *step, int index, real *axis);
 /* condition.c */
 void classical_own_condition(const step_record *step, int body, int outboard, int middle,
                              real *rows);

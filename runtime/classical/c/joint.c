@@ -68,6 +68,19 @@ static int smooth(const step_record *step, int inner, int outer, const real *row
 #undef BY_SPACE
 }
 
+/* The axis of a pin: its inboard section's, or behind springs, which tilt it, its outboard one's. */
+void classical_pin_axis(const step_record *step, int index, real *axis)
+{
+    const section held = classical_section(step, index);
+    real axes[9];
+    if (step->run->bodies[index].hinge != MSTMM_CLASSICAL_ELASTIC_PIN) {
+        classical_axis(held.axes, axis);
+        return;
+    }
+    classical_outboard_axes(step, index, axes);
+    classical_axis(axes, axis);
+}
+
 static int pin(const step_record *step, int index, int inner, const real *rows, const real *modal,
                real *matrix)
 {
@@ -75,10 +88,9 @@ static int pin(const step_record *step, int index, int inner, const real *rows, 
     const real *none = classical_nothing;
     const body_record *body = &step->run->bodies[index];
     const slopes at = classical_slopes(step, index);
-    const section held = classical_section(step, index);
     real axes[9], axis[3], own[3], beta[3];
     classical_outboard_axes(step, index, axes);
-    classical_axis(held.axes, axis);
+    classical_pin_axis(step, index, axis);
     classical_axis(axes, own);
     for (int i = 0; i < 3; i++) { /* what brings the outboard axis to the inboard one */
         const int j = (i + 1) % 3, k = (i + 2) % 3;

@@ -4,6 +4,8 @@
 #include "hinges.h"
 
 #define RIGID_STIFFNESS 1e30 /* of a spring that shall not turn; its compliance vanishes */
+/* The same beside springs that do turn, times theirs: rounding of more would be as large as they. */
+#define RIGID_BESIDE 1e8
 
 /* axes diag axes^T */
 static void turned_diagonal(int n, const real *axes, const real *diagonal, real *out)
@@ -114,22 +116,37 @@ static void spring_load(const step_record *step, int index, const section *held,
     classical_multiply(3, 3, 1, axes, tau + 3, load + 3);
 }
 
+/* Stiffness and damping about x, y and z up to the free turn, which has a matrix of its own: what
+ * turns freely is rigid here.  Returns whether any of them turns. */
+static int turning_springs(const body_record *body, real rate, real *stiffness, real *damping)
+{
+    const int pin = body->hinge == MSTMM_CLASSICAL_ELASTIC_PIN;
+    const int ball = body->hinge == MSTMM_CLASSICAL_ELASTIC_BALL;
+    for (int k = 0; k < 3; k++) {
+        stiffness[k] = ball ? RIGID_STIFFNESS : body->law[9 + k];
+        damping[k] = ball ? 0 : body->law[13 + k];
+    }
+    if (pin)
+        stiffness[2] = RIGID_BESIDE * fmax(stiffness[0] + rate * damping[0],
+                                           stiffness[1] + rate * damping[1]);
+    return !ball;
+}
+
 static int spatial_springs(const step_record *step, int index, int outer, const real *modal,
                            real *matrix)
 {
     const body_record *body = &step->run->bodies[index];
     const slopes at = classical_slopes(step, index);
     const section held = classical_section(step, index);
-    const int locked = body->hinge != MSTMM_CLASSICAL_ELASTIC;
-    const real rigid[3] = {RIGID_STIFFNESS, RIGID_STIFFNESS, RIGID_STIFFNESS};
-    real axes[9], load[6], d[3], k_t[9], c_t[9], k_r[9], c_r[9];
+    real axes[9], load[6], d[3], k_t[9], c_t[9], k_r[9], c_r[9], stiffness[3], damping[3];
     classical_outboard_axes(step, index, axes);
     spring_load(step, index, &held, axes, load, d);
     turned_diagonal(3, held.axes, body->law, k_t);
     turned_diagonal(3, held.axes, body->law + 6, c_t);
-    turned_diagonal(3, held.axes, locked ? rigid : body->law + 9, k_r);
-    turned_diagonal(3, axes, locked ? classical_nothing : body->law + 13, c_r);
-    const real *moment = locked ? classical_nothing : load + 3;
+    const int turns = turning_springs(body, step->map.c, stiffness, damping);
+    turned_diagonal(3, held.axes, stiffness, k_r);
+    turned_diagonal(3, axes, damping, c_r);
+    const real *moment = turns ? load + 3 : classical_nothing;
 #define CALL(pairing, ...)                                                                         \
     mstmm_discrete_elastic_spatial_##pairing##_transfer(                                           \
         .k_t = k_t, .c_t = c_t, .k_r = k_r, .c_r = c_r, .C = &step->map.c, .d_s = d, .q_s = load,  \
