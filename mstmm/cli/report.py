@@ -103,7 +103,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
     """The outcome of a run without its samples, which are in the file."""
     layout = result.model.layout
     last = len(result.t) - 1
-    counted = result.statistics
+    counted, reached = result.statistics, result.error_estimate
     return {
         "success": result.success,
         "trusted": verdict.trusted,
@@ -120,6 +120,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "engine_choice": result.model.engine_choice,
         "seconds": seconds,
         "statistics": None if counted is None else asdict(counted),
+        "error_estimate": None if reached is None else reached.to_dict(),
         "warnings": list(result.warnings),
         "certificate": _certificate(result),
     }
@@ -130,6 +131,7 @@ def _certificate(result: Result) -> dict[str, Any]:
     certificate = result.certificate
     data = {key: value for key, value in vars(certificate).items() if key != "error"}
     plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
+    plain.pop("reached")
     plain["momentum"] = [vars(drift) for drift in certificate.momentum]
     plain["flexible"] = [vars(body) for body in certificate.flexible]
     error = certificate.error

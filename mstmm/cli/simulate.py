@@ -48,10 +48,10 @@ class Plan:
 
     scene: str
     t_end: float
-    method: str
+    method: str | None
     step: float | None
-    rtol: float
-    atol: float
+    rtol: float | None
+    atol: float | None
     times: Times | None
     output: Path
     plot: Path | None
@@ -67,11 +67,14 @@ class Plan:
     scheme: str = ""
     iterations: int = 1
     tangent: str = "auto"
+    error: float | None = None
+    of: tuple[str, ...] = ()
 
     @property
     def resumable(self) -> bool:
-        """Integrators of others and the classical method keep no checkpoints."""
-        return not self.method.startswith((*_OF_OTHERS, _CLASSICAL))
+        """Integrators of others, the classical method and runs for an error keep no checkpoints."""
+        others = (self.method or METHOD).startswith((*_OF_OTHERS, _CLASSICAL))
+        return self.error is None and not others
 
     @property
     def checkpoint(self) -> Path:
@@ -85,23 +88,38 @@ def simulate(
         float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the run, s.")
     ] = 10.0,
     method: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--method", metavar="NAME", help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
+            "--method", metavar="NAME", show_default=f"{METHOD}, auto with --error",
+            help="dop853, dopri5, rk4; rodas4p2, rodas5p, genalpha and "
             "more for stiff motion (see mstmm list); exprb32 for undamped vibration; auto, which "
             "chooses; dttmm-classical; scipy-NAME or sundials-NAME."
         ),
-    ] = METHOD,
+    ] = None,
     step: Annotated[
         float | None,
         typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s; some need it."),
     ] = None,
     rtol: Annotated[
-        float, typer.Option("--rtol", metavar="X", parser=positive, help="Relative tolerance.")
-    ] = RTOL,
+        float | None,
+        typer.Option("--rtol", metavar="X", parser=positive, show_default=f"{RTOL:g}",
+                     help="Relative tolerance."),
+    ] = None,
     atol: Annotated[
-        float, typer.Option("--atol", metavar="X", parser=not_negative, help="Absolute tolerance.")
-    ] = ATOL,
+        float | None,
+        typer.Option("--atol", metavar="X", parser=not_negative, show_default=f"{ATOL:g}",
+                     help="Absolute tolerance."),
+    ] = None,
+    error: Annotated[
+        float | None,
+        typer.Option("--error", metavar="X", parser=positive, help="Error wanted of the whole run, "
+                     "instead of tolerances: rad, or part of the motion; several runs reach it."),
+    ] = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option("--of", metavar="NAME", help="Quantity whose error --error is, in its unit, "
+                     "such as rod1.tip.position; may be repeated."),
+    ] = None,
     max_step: Annotated[
         float | None,
         typer.Option("--max-step", metavar="S", parser=positive, help="Longest step of a method "
@@ -189,9 +207,10 @@ def simulate(
         output_file(_default_output(scene) if output is None else output, RESULTS),
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
-        max_step or 0.0, radius, scheme, iterations, tangent,
+        max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
     )  # fmt: skip
     _refuse_endless(plan)
+    _refuse_resumed_error(plan)
     from . import report
 
     need_for(plan.output, "--output")
@@ -199,7 +218,7 @@ def simulate(
         need_for(plan.plot, "--plot")
     use_files(hinge or [])
     model = _model(plan)
-    load_method(plan.method)
+    load_method(plan.method or METHOD)
     with bar() as progress, _kept_if_interrupted(plan.checkpoint):
         begin = time.perf_counter()
         result = _run(plan, model, progress)
@@ -222,6 +241,15 @@ def _refuse_endless(plan: Plan) -> None:
         raise MstmmError(
             f"--step {plan.step:g}: {plan.t_end / plan.step:.1e} steps would never end; "
             f"take {plan.t_end / MAX_STEPS:.1e} s or more"
+        )
+
+
+def _refuse_resumed_error(plan: Plan) -> None:
+    """Several runs are made for an error, of which none is kept to go on from."""
+    if plan.resume and plan.error is not None:
+        raise MstmmError(
+            "--resume: there is no checkpoint of runs with --error; run it again, or take the "
+            "method and the tolerances that such a run has found"
         )
 
 
@@ -300,7 +328,8 @@ def _run(plan: Plan, model: Model, progress: Bar) -> Result:
         plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
         None if plan.times is None else plan.times.until(plan.t_end),
         max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
-        iterations=plan.iterations, tangent=plan.tangent, progress=progress, resume=plan.resume,
+        iterations=plan.iterations, tangent=plan.tangent, error=plan.error, error_of=plan.of,
+        progress=progress, resume=plan.resume,
         checkpoint=str(plan.checkpoint) if plan.resumable else None,
     )  # fmt: skip
 
@@ -311,7 +340,7 @@ def _saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
     The checkpoint goes with the last step, so that every part can be done again.  A run that was
     resumed is no short one.
     """
-    short = seconds < SHORT and not plan.resume
+    short = seconds < SHORT and not plan.resume and plan.error is None
     if result.trajectory.success and (short if plan.certify is None else plan.certify):
         from mstmm.runtime.result.output import storage
 

@@ -190,12 +190,14 @@ class Model(Compiled):
     def simulate(
         self,
         t_end: float,
-        method: str = METHOD,
+        method: str | None = None,
         step: float | None = None,
-        rtol: float = RTOL,
-        atol: float = ATOL,
+        rtol: float | None = None,
+        atol: float | None = None,
         output_times: ArrayLike | Sequence[float] | None = None,
         *,
+        error: float | None = None,
+        error_of: str | Sequence[str] = (),
         t_start: float = 0.0,
         initial: tuple[ArrayLike, ArrayLike] | None = None,
         max_step: float = 0.0,
@@ -221,8 +223,15 @@ class Model(Compiled):
                 of SciPy and SUNDIALS on the same kernels; dttmm-classical,
                 dttmm-classical-product (with `step`): the discrete-time transfer matrix method in
                 absolute coordinates.
-            step: fixed step in s; otherwise `rtol` and `atol` control the step.
-            output_times: times of the samples (s, increasing); otherwise every accepted step.
+                Without one dop853; auto where an error is given.
+            step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
+            output_times: times of the samples (s, increasing); otherwise every accepted step (with
+                an error 201 samples).
+            error: largest error wanted of the whole run, instead of tolerances: in rad, and of
+                coordinates that are no angles in parts of the largest excursion of their unit.
+                Several runs find the tolerance; `Result.error_estimate` says what was reached.
+            error_of: names of quantities whose error is meant, instead of all coordinates: of one
+                in its unit, of several in parts of how far each goes.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
                 (0.8).
@@ -242,8 +251,12 @@ class Model(Compiled):
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for settings that make no sense.
         """
+        from .asked import Control, asked
         from .results import simulate
 
+        given = Control(method, step, rtol, atol)
+        wanted = asked(error, error_of, given, checkpoint is not None or resume)
+        method, rtol, atol = given.filled(wanted)
         settings = checked(
             Settings(
                 t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
@@ -257,6 +270,7 @@ class Model(Compiled):
             self, settings, one("initial q", q, self.nq, instead),
             one("initial u", u, self.nu, instead),
             certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
+            wanted=wanted,
         )  # fmt: skip
 
     def simulate_batch(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate
+from ..run.reached import ReachedError
 from ..run.stability import StepCheck
 from .conditioning import LARGEST, PivotLoss, SingularDistance
 from .evidence import Drift, Give
@@ -41,6 +42,7 @@ class Certificate:
         failures: why the run, or some of its samples, cannot be used at all.
         models: where models of the scene are outside their range whatever the run.
         unseen: of expressions of the scene, what the steps may have passed over.
+        reached: of the error that was asked for (error=...); None where none was.
     """
 
     energy: Drift
@@ -61,6 +63,7 @@ class Certificate:
     failures: tuple[str, ...] = ()
     models: tuple[str, ...] = ()
     unseen: tuple[str, ...] = ()
+    reached: ReachedError | None = None
 
     def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
@@ -71,6 +74,14 @@ class Certificate:
     def trusted(self) -> bool:
         """True where balances, error and models were looked at and all stay within bounds."""
         return self.verdict().trusted
+
+    @property
+    def drift(self) -> float:
+        """Relative drift of energy and momentum beyond which they count as not kept: no less than
+        the error that was asked for, where that is in parts or rad."""
+        if self.reached is None or self.reached.unit not in ("1", "rad"):
+            return DRIFT
+        return max(DRIFT, self.reached.asked)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -128,20 +139,22 @@ def _verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:
     against = list(c.failures) + [
         f"{d.name} changes by {d}, more than the {balance:g} asked for"
         for d in (c.energy, *c.momentum)
-        if balance < d.relative <= DRIFT
+        if balance < d.relative <= c.drift and c.drift == DRIFT
     ]
     missing = []
     if c.samples < 2:
         missing.append("one sample tells nothing of energy and momentum")
-    if c.error is None:
-        missing.append("no second run has told its error (certify=True)")
-    else:
+    if c.error is not None:
         against += _inaccurate(c, accuracy)
+    elif c.reached is None:
+        missing.append("no second run has told its error (certify=True)")
     against += c.doubts
-    words = f"{accuracy:g} rad or {accuracy:.3g} of the motion"
+    words = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
+    if c.reached is not None:
+        words = f"the error of {c.reached.of} as asked for"
+    kept = max(balance, c.drift) if c.drift > DRIFT else balance
     return Verdict(
-        tuple(dict.fromkeys(against)), tuple(missing),
-        f"errors within {words}, balances within {balance:g}",
+        tuple(dict.fromkeys(against)), tuple(missing), f"{words}, balances within {kept:g}"
     )  # fmt: skip
 
 
@@ -167,6 +180,8 @@ def _until(error: ErrorEstimate) -> str:
 
 def _doubts(c: Certificate) -> list[str]:
     found = [] if c.finite else ["the states hold numbers that are not finite"]
+    if c.reached is not None and not c.reached.met:
+        found.append(c.reached.warning)
     found += c.unseen
     found += [
         f"{d.name} cannot be balanced: it is beyond what numbers hold, or no sample gives it"
@@ -176,7 +191,7 @@ def _doubts(c: Certificate) -> list[str]:
     found += [
         f"{d.name} is not kept: it changes by {d}; the tolerance or the step is too coarse"
         for d in (c.energy, *c.momentum)
-        if d.relative > DRIFT
+        if d.relative > c.drift
     ]
     if c.pivot is not None and c.pivot.ratio > LOSS:
         found.append(
@@ -205,9 +220,11 @@ def _advice(c: Certificate) -> list[str]:
 
 def _error_rows(c: Certificate) -> list[tuple[str, str]]:
     error = c.error
+    rows = [] if c.reached is None else [("error", str(c.reached))]
     if error is None:
-        return [("error", "not estimated (certify=True makes a second run)")]
-    rows = []
+        covered = [("what this covers", _covered(c))]
+        missing = [("error", "not estimated (certify=True makes a second run)")]
+        return rows + covered if rows else missing
     until = "" if error.horizon is None else f" up to t = {error.horizon:.6g} s"
     for kind in ("q", "u"):
         at_all = "; " + _values(error.whole(kind)) + " over the whole run" if until else ""

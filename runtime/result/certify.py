@@ -38,4 +38,5 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         failures=() if result.success else (result.message,),
         models=result._outside(),
         unseen=result.trajectory.unseen,
+        reached=run.reached,
     )

@@ -16,6 +16,7 @@ from ..integrate.settings import Settings
 from ..pack.layout import HingeSlots
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
+from ..run.reached import ReachedError
 from ..run.stability import StepCheck
 from ..run.stretches import Stretch
 from ..run.trajectory import Trajectory
@@ -84,6 +85,11 @@ class Record(FlexibleResults, ABC):
         """What method="auto" did: each method with its begin (s), reason and fastest motion (1/s);
         empty for a run whose method was given."""
         return self.trajectory.methods
+
+    @property
+    def error_estimate(self) -> ReachedError | None:
+        """What was reached of the error that `simulate(error=...)` asked for; None without one."""
+        return self.trajectory.reached
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:

@@ -35,9 +35,9 @@ _FEW = 2000.0
 _LOOSE = 1e-5
 
 
-def implicit_method(settings: Settings) -> str:
+def implicit_method(rtol: float) -> str:
     """Which implicit method `auto` takes for a tolerance."""
-    return "rodas4p2" if settings.rtol >= _LOOSE else "rodas5p"
+    return "rodas4p2" if rtol >= _LOOSE else "rodas5p"
 
 
 class Choice:
@@ -59,7 +59,7 @@ class Choice:
         if run.tableau.implicit:
             self._look_back(run, rate)
         elif self._is_stiff(run, rate):
-            self._change(run, implicit_method(self._settings), rate)
+            self._change(run, implicit_method(self._settings.rtol), rate)
         else:
             self._ask(run, 2 * self._asked_for[0])
 
@@ -147,7 +147,7 @@ class Choice:
             method = self.stretches[-1].method
         except (KeyError, TypeError, IndexError) as error:
             raise ValueError(str(error)) from None
-        if method not in (AUTO_EXPLICIT, implicit_method(self._settings)):
+        if method not in (AUTO_EXPLICIT, implicit_method(self._settings.rtol)):
             raise ValueError(method)
         if method != AUTO_EXPLICIT:
             self._system.offer_tangent()

@@ -12,6 +12,7 @@ from mstmm.errors import SceneError
 
 from ..integrate.loop import Statistics, Status
 from ..integrate.settings import Settings
+from .reached import ReachedError
 from .stretches import Stretch
 
 
@@ -42,6 +43,7 @@ class Trajectory:
     unseen: tuple[str, ...] = ()  # of expressions: what the steps may have passed over
     methods: tuple[Stretch, ...] = ()  # of a run that chose among them
     before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
+    reached: ReachedError | None = None  # of a run that was asked for an error
 
     @property
     def first(self) -> tuple[float, Array, Array]:

@@ -20,6 +20,7 @@ from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, get
 from ...run import classical, second_opinion
 from ...run.error_estimate import ErrorEstimate
+from ...run.reached import from_dict
 from ...run.stretches import from_rows
 from ...run.trajectory import Trajectory
 
@@ -70,6 +71,7 @@ def attributes(result: Record) -> dict[str, Any]:
         "notes": json.dumps(list(run.notes)),
         "unseen": json.dumps(list(run.unseen)),
         "methods": json.dumps([asdict(stretch) for stretch in run.methods]),
+        "error_estimate": json.dumps(None if run.reached is None else run.reached.to_dict()),
         "norm_residual": run.norm_residual,
         "certificate": str(result.certificate),
     }
@@ -193,4 +195,5 @@ def trajectory(data: Any) -> Trajectory:
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
         start, tuple(json.loads(a.get("unseen", "[]"))),
         from_rows(json.loads(a.get("methods", "[]"))),
+        from_dict(json.loads(a.get("error_estimate", "null"))),
     )  # fmt: skip

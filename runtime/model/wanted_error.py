@@ -1,0 +1,255 @@
+"""`simulate(error=...)`: the runs by which a wanted error is reached, and what is known of it.
+
+A first run is loose: it shows whether the motion is stiff and what local errors add up to.  The
+next ones come at the tolerances that `looks` makes of what is known, until the estimate of the
+tightest one is what was wanted, or nothing better can be had.  The tightest one is kept.  Nothing
+depends on a clock, so that all of it repeats itself to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..integrate.settings import Settings
+from ..result.measure import Coordinates, Measure, Quantities
+from ..run.error_estimate import compare
+from ..run.execution import Watch, first_run
+from ..run.reached import Attempt, ReachedError
+from ..run.stability import StepCheck
+from .asked import Asked
+from .family import Family, is_explicit
+from .looks import Look, estimate, first_rtol, hopeless, next_rtol
+from .results import result_of
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..result.result import Result
+    from ..run.trajectory import Trajectory
+
+#: Absolute tolerance in the relative one.
+_ATOL = 0.01
+
+#: Samples where nobody asked for others, those that are looked at in any case, and how many of the
+#: user's are enough to look at them alone.
+_SAMPLES, _LOOKS, _ENOUGH = 201, 101, 50
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A run that reached its end, with the numbers of what is compared."""
+
+    run: Trajectory
+    numbers: Array
+    cpu_s: float
+    step: StepCheck | None
+
+    @property
+    def order(self) -> tuple[bool, float]:
+        """Runs by an explicit method come behind others, which they follow in time, too."""
+        return is_explicit(self.run), -self.run.settings.rtol
+
+
+class Search:
+    """The runs for one wanted error.  `settings` say all but the tolerances."""
+
+    def __init__(
+        self, model: Compiled, settings: Settings, wanted: Asked, q: Array, u: Array,
+        progress: Progress | None,
+    ) -> None:  # fmt: skip
+        self._model, self._q, self._u = model, q, u
+        self._wanted, self._progress = wanted, progress
+        self._times = settings.output_times
+        self._settings = replace(settings, output_times=_looked_at(settings))
+        self._family = Family(model, settings, q, u)
+        self._measure: Measure | None = None if wanted.of else Coordinates(model)
+        self._made: list[_Made] = []  # the one to keep is the last
+        self._looks: list[Look] = []
+        self._failed: list[Attempt] = []
+        self._notes: list[str] = []
+
+    def result(self) -> Result:
+        """The run that is kept, with what is known of its error."""
+        method = self._family.first()
+        rtol = first_rtol(self._wanted.error, self._family.is_explicit(method))
+        while True:
+            lost = self._run(method, rtol)
+            if lost is not None:
+                return self._lost(lost)
+            why = self._settled()
+            if why is not None:
+                return self._kept(why)
+            method, rtol = self._next()
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    def _run(self, method: str, rtol: float) -> Trajectory | None:
+        """Make one run; returned where nothing else is left: interrupted, or first and failed."""
+        rtol, atol = _short(rtol), _short(_ATOL * rtol)
+        settings = replace(self._settings, rtol=rtol, atol=atol, method=method)
+        watch = Watch(self._told(), settings)
+        begin = time.process_time()
+        run, step = first_run(self._model, settings, self._q, self._u, watch)
+        spent = time.process_time() - begin
+        self._notes += [note for note in watch.notes if note not in self._notes]
+        run = replace(run, start=(self._q, self._u))
+        if not run.success:
+            self._failed.append(_attempt(run, spent, None, run.message))
+            return None if self._made and run.status is not None else run
+        result = result_of(self._model, run, None, step)
+        if self._measure is None:
+            self._measure = Quantities(result, self._wanted.of)
+        self._made.append(_Made(run, self._measure.read(result), spent, step))
+        self._made.sort(key=lambda one: one.order)
+        self._measure.scale_by(self._made[-1].numbers)
+        self._looks = [self._look(one) for one in self._made]
+        return None
+
+    def _look(self, one: _Made) -> Look:
+        """A run compared with the tightest one."""
+        assert self._measure is not None
+        tightest, way = self._made[-1].numbers, 0.0
+        n = min(len(one.numbers), len(tightest))
+        if not n or abs(len(one.numbers) - len(tightest)) > 1:
+            way = math.inf
+        elif one is not self._made[-1]:
+            way = float(self._measure.apart(one.numbers[:n], tightest[:n]).max()) / self._size
+        counted = one.run.statistics
+        summed = None if counted is None else counted.sum_local_error
+        return Look(one.run.settings.rtol, is_explicit(one.run), way, summed)
+
+    def _told(self) -> Progress | None:
+        """Progress of the next run: each takes half of what is left."""
+        progress, share = self._progress, 0.5 ** (len(self._made) + 1)
+        if progress is None:
+            return None
+        start, end = self._settings.t_start, self._settings.t_end
+
+        def tell(t: float, _: float) -> None:
+            progress(start + (1.0 - 2.0 * share) * (end - start) + share * (t - start), end)
+
+        return tell
+
+    # --- what is known --------------------------------------------------------------------------
+
+    @property
+    def _size(self) -> float:
+        """Of the motion of what is compared, where that has a unit; 1 for angles and parts."""
+        assert self._measure is not None
+        if self._measure.unit in ("1", "rad"):
+            return 1.0
+        numbers = self._made[-1].numbers
+        start = np.broadcast_to(numbers[:1], numbers.shape)
+        return float(self._measure.apart(numbers, start).max(initial=0.0)) or 1.0
+
+    def _settled(self) -> str | None:
+        """ "" where the wanted error is reached, why it never will be, or None where a further run
+        may."""
+        known = estimate(self._looks)
+        if known is not None and known * self._size <= self._wanted.error:
+            return ""
+        if self._failed:
+            return f"the next run, rtol {self._failed[-1].rtol:.0e}, failed: " + (
+                self._failed[-1].failure
+            )
+        return hopeless(self._looks) or None
+
+    def _next(self) -> tuple[str, float]:
+        """Method and tolerance of the next run."""
+        part, explicit = self._wanted.error / self._size, self._looks[-1].explicit
+        rtol = next_rtol(self._looks, part, explicit)
+        method = self._family.method(rtol, [one.run for one in self._made])
+        if self._family.is_explicit(method) != explicit:
+            rtol = next_rtol(self._looks, part, not explicit)
+        return method, rtol
+
+    # --- results --------------------------------------------------------------------------------
+
+    def _lost(self, run: Trajectory) -> Result:
+        """What an interrupted run, or a first one that failed, left."""
+        why = f"a run did not reach its end: {run.message}"
+        known = self._reached(run, None, why, "no run reached its end")
+        return result_of(self._model, self._as_asked(replace(run, reached=known)))
+
+    def _kept(self, why: str) -> Result:
+        """The tightest run as a result; `why` it is not what was wanted, "" where it is."""
+        made, error, known = self._made[-1], None, estimate(self._looks)
+        if why and len(self._made) > 1:
+            before = self._made[-2].run
+            reference = f"rtol {before.settings.rtol:.0e}"
+            error = compare(self._model.layout, made.run, before, reference, self._q)
+            if error.horizon is not None:
+                why = (
+                    "small errors grow until the motion cannot be told any more, at these "
+                    f"tolerances from t = {error.horizon:.4g} s on (end earlier), and {why}"
+                )
+        finite = None if known is None or known == math.inf else known * self._size
+        reached = self._reached(made.run, finite, why, self._found())
+        run = replace(made.run, reached=reached, notes=(*made.run.notes, *self._notes))
+        return result_of(self._model, self._as_asked(run), error, made.step)
+
+    def _found(self) -> str:
+        """How the estimate was made, in words."""
+        rtols = [f"{one.run.settings.rtol:.1e}" for one in self._made]
+        if len(rtols) < 2:
+            return "one run alone, with which nothing was compared"
+        return f"by runs with rtol {', '.join(rtols[:-1])} and {rtols[-1]}, the last one kept"
+
+    def _reached(self, run: Trajectory, known: float | None, why: str, found: str) -> ReachedError:
+        runs = [
+            _attempt(
+                one.run, one.cpu_s,
+                None if one is self._made[-1] or look.apart == math.inf
+                else look.apart * self._size,
+            )
+            for one, look in zip(self._made, self._looks, strict=True)
+        ]  # fmt: skip
+        measure, s = self._measure, run.settings
+        of, unit, scaling = ", ".join(self._wanted.of), "1", ""
+        if measure is not None:
+            of, unit, scaling = measure.name, measure.unit, measure.scaling
+        return ReachedError(
+            self._wanted.error, known, of, unit, scaling.replace("the reference", "the run"),
+            s.method, s.rtol, s.atol, found, why, (*runs, *self._failed),
+        )  # fmt: skip
+
+    def _as_asked(self, run: Trajectory) -> Trajectory:
+        """The run at the samples that the user asked for."""
+        if self._times is None or self._times == self._settings.output_times:
+            return run
+        keep = np.isin(run.t, self._times)
+        return replace(
+            run, t=run.t[keep], q=run.q[keep], u=run.u[keep], memory=run.memory[keep],
+            work=run.work[keep], event=run.event[keep],
+            settings=replace(run.settings, output_times=self._times),
+        )  # fmt: skip
+
+
+def _looked_at(settings: Settings) -> tuple[float, ...]:
+    """Times at which runs are compared: the user's, and others between where those are few."""
+    start, end, wanted = settings.t_start, settings.t_end, settings.output_times
+    if wanted is None:
+        return tuple(np.unique(np.linspace(start, end, _SAMPLES)).tolist())
+    if len(wanted) >= _ENOUGH:
+        return wanted
+    return tuple(np.union1d(wanted, np.linspace(start, end, _LOOKS)).tolist())
+
+
+def _short(tolerance: float) -> float:
+    """A tolerance of two digits, which a user can type."""
+    return float(f"{tolerance:.1e}")
+
+
+def _attempt(run: Trajectory, cpu_s: float, apart: float | None, failure: str = "") -> Attempt:
+    s, counted = run.settings, run.statistics
+    evaluations = 0 if counted is None else counted.evaluations + counted.residuals
+    return Attempt(s.method, s.rtol, s.atol, apart, evaluations, cpu_s, failure)

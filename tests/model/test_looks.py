@@ -1,0 +1,81 @@
+"""The rule of the search on runs whose errors are known by construction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from mstmm.runtime.model.looks import (
+    RUNS,
+    TIGHTEST,
+    Look,
+    estimate,
+    first_rtol,
+    hopeless,
+    next_rtol,
+)
+
+
+def looks(error: Callable[[float], float], *rtols: float, explicit: bool = True) -> list[Look]:
+    """Runs whose error is a function of the tolerance; they err all the same way."""
+    tightest = error(rtols[-1])
+    return [Look(rtol, explicit, abs(error(rtol) - tightest), summed=10.0 * rtol) for rtol in rtols]
+
+
+def search(error: Callable[[float], float], asked: float, explicit: bool) -> tuple[float, float]:
+    """(true, estimated) error at the end of a search by one kind of method."""
+    rtols = [first_rtol(asked, explicit)]
+    while True:
+        found = looks(error, *rtols, explicit=explicit)
+        known = estimate(found)
+        if known is not None and (known <= asked or hopeless(found)):
+            return error(rtols[-1]), known
+        rtols.append(next_rtol(found, asked, explicit))
+
+
+@pytest.mark.parametrize("explicit", [True, False])
+@pytest.mark.parametrize("asked", [1e-2, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("growth", [0.03, 1.0, 50.0, 3e3])
+@pytest.mark.parametrize("power", [0.7, 0.9, 1.0, 1.2])
+def test_errors_that_follow_a_power_are_reached_and_told(
+    explicit: bool, asked: float, growth: float, power: float
+) -> None:
+    true, told = search(lambda rtol: growth * rtol**power, asked, explicit)
+    assert true <= 10 * told
+    if growth * TIGHTEST**power < asked / 1000:  # within reach of numbers of 16 digits
+        assert told <= asked
+
+
+def test_one_run_tells_nothing() -> None:
+    assert estimate(looks(lambda rtol: rtol, 1e-3)) is None
+    assert hopeless(looks(lambda rtol: rtol, 1e-3)) == ""
+
+
+def test_an_error_that_stays_ends_the_search() -> None:
+    """Rounding: about 1e-9, whatever the tolerance, now this way and now that."""
+    true, told = search(lambda rtol: 1e-9 * math.sin(1 / rtol) + 1e-3 * rtol, 1e-12, explicit=True)
+    assert told > 1e-12
+    assert abs(true) <= 10 * told
+
+
+def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
+    """Errors of the size of the motion however tight, as of chaos."""
+    rtols = [first_rtol(1e-6, explicit=True)]
+    while not hopeless(found := looks(lambda rtol: 1.0 + 0.3 * math.sin(1 / rtol), *rtols)):
+        rtols.append(next_rtol(found, 1e-6, explicit=True))
+    assert rtols[-1] == TIGHTEST
+    assert len(rtols) < RUNS
+
+
+def test_runs_that_end_elsewhere_have_no_estimate() -> None:
+    found = [Look(1e-3, True, math.inf, None), Look(1e-5, True, 0.0, None)]
+    assert estimate(found) == math.inf
+    assert next_rtol(found, 1e-6, explicit=True) == pytest.approx(1e-8)
+
+
+def test_an_explicit_run_after_implicit_ones_is_judged_by_a_looser_one() -> None:
+    found = [Look(1e-4, False, 0.2, 1e-4), Look(1e-8, True, 0.0, 1e-8)]
+    assert estimate(found) == pytest.approx(1.5 * 0.2 * 1e-4**0.8)
+    assert next_rtol(found, 1e-7, explicit=True) == pytest.approx(1e-7)
