@@ -210,7 +210,7 @@ def simulate(
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
     )  # fmt: skip
     _refuse_endless(plan)
-    _refuse_resumed_error(plan)
+    _refuse_beside_error(plan)
     from . import report
 
     need_for(plan.output, "--output")
@@ -244,12 +244,18 @@ def _refuse_endless(plan: Plan) -> None:
         )
 
 
-def _refuse_resumed_error(plan: Plan) -> None:
-    """Several runs are made for an error, of which none is kept to go on from."""
-    if plan.resume and plan.error is not None:
+def _refuse_beside_error(plan: Plan) -> None:
+    """Several runs are made for an error, of which none is kept to go on from; and what is trusted
+    is what was asked for."""
+    if plan.error is not None and plan.resume:
         raise MstmmError(
             "--resume: there is no checkpoint of runs with --error; run it again, or take the "
             "method and the tolerances that such a run has found"
+        )
+    if plan.error is not None and plan.accuracy is not None:
+        raise MstmmError(
+            "--accuracy beside --error: a result counts as trusted that reaches --error; leave "
+            "--accuracy out"
         )
 
 

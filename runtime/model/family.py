@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from ..run.trajectory import Trajectory
 
-#: |lambda| T of flexible bodies from which the first run is an implicit one.
-_VIBRATING = 200.0
+#: |lambda| T from which the first run is an implicit one; and for an error from which on it may
+#: leave small vibrations out.
+_VIBRATING, _LEFT_OUT, _LOOSE = 1000.0, 200.0, 1e-4
 
 #: h |lambda| of explicit steps that follow a vibration at a tolerance, and the order at which it
 #: falls.
@@ -34,17 +35,33 @@ _FOLLOWED, _AT, _SLOWLY = 4.0, 1e-3, 16.0
 _MANY = 1000
 
 #: An implicit step in explicit ones, and the order at which their number grows.
-_STEP, _ORDER = 2.5, 5.0
+_STEP, _ORDER = 2.5, 4.0
+
+#: Explicit ones among the methods of SciPy and SUNDIALS.
+_EXPLICIT_OF_OTHERS = ("scipy-DOP853", "scipy-RK45")
+
+#: The tolerance of the last implicit run in that of a first explicit one, at most; how many times
+#: more implicit runs may cost once there are two, for an explicit one would begin anew.
+_NEAR, _BEHIND = 4.0, 2.0
 
 
 def is_explicit(run: Trajectory) -> bool:
-    """Whether an explicit method alone made a run."""
-    return {one.method for one in run.methods} <= {AUTO_EXPLICIT} and not _implicit(run)
+    """Whether explicit methods alone made a run."""
+    made = {one.method for one in run.methods} or {run.settings.method}
+    return all(explicit(method) for method in made)
 
 
-def _implicit(run: Trajectory) -> bool:
+def explicit(method: str) -> bool:
+    """Whether a method is explicit; `auto` begins so."""
+    if method in second_opinion.METHODS:
+        return method in _EXPLICIT_OF_OTHERS
+    return method == AUTO or not get(method).implicit
+
+
+def _held_back(run: Trajectory) -> bool:
+    """Whether stability set many steps of a run that was not free to change its method."""
     counted = run.statistics
-    return counted is not None and counted.tangents > 0
+    return not run.methods and counted is not None and counted.stability_limited
 
 
 def _may_vibrate(model: Compiled, span: float) -> bool:
@@ -58,16 +75,19 @@ def _may_vibrate(model: Compiled, span: float) -> bool:
     given = [one for hinge in scene.hinges for one in hinge.law.stiffness]
     stiffest = max(given + [spring.law.stiffness for spring in scene.spring], default=0.0)
     least = min((min(body.mass, max(body.inertia)) for body in scene.bodies), default=0.0)
-    return stiffest * span**2 > _VIBRATING**2 * least
+    return stiffest * span**2 > _LEFT_OUT**2 * least
 
 
 class Family:
     """The method of each of several runs from one start."""
 
-    def __init__(self, model: Compiled, settings: Settings, q: Array, u: Array) -> None:
+    def __init__(
+        self, model: Compiled, settings: Settings, error: float, q: Array, u: Array
+    ) -> None:
         self._settings = settings
+        self._many = _VIBRATING if error < _LOOSE else _LEFT_OUT
         self._span = settings.t_end - settings.t_start
-        self._rate = 0.0
+        self._rate, self._rescued = 0.0, False
         if settings.method == AUTO and _may_vibrate(model, self._span):
             try:
                 fastest = Fastest(model.looped, model.looped.start_memory())
@@ -77,27 +97,34 @@ class Family:
 
     def first(self) -> str:
         """The method of the first run."""
-        if self._settings.method == AUTO and self._rate * self._span > _VIBRATING:
-            return implicit_method(1.0)
-        return self._settings.method
+        if self._settings.method != AUTO or not self._rate:
+            return self._settings.method
+        return implicit_method(1.0) if self._rate * self._span > self._many else AUTO_EXPLICIT
 
-    def method(self, rtol: float, made: Sequence[Trajectory]) -> str:
-        """The method for a tolerance, after these runs, loose to tight."""
-        if self._settings.method != AUTO:
+    def rescues(self, method: str) -> bool:
+        """Whether a run by this method that has failed is to be made by `auto`, which does without
+        an implicit method that finds no step; from then on all are."""
+        if self._settings.method != AUTO or explicit(method):
+            return False
+        self._rescued = True
+        return True
+
+    def method(self, rtol: float, fresh: float, made: Sequence[Trajectory]) -> str:
+        """The method of the next run after these ones: `rtol` is its tolerance if it is of the same
+        kind as the last one, `fresh` that of a first explicit one."""
+        if self._settings.method != AUTO or self._rescued:
             return self._settings.method
         implicit = [run for run in made if not is_explicit(run)]
-        if not implicit or len(implicit) < len(made):
+        if not implicit:
+            return AUTO if _held_back(made[-1]) else AUTO_EXPLICIT
+        if len(implicit) < len(made):
             return AUTO_EXPLICIT
         last = implicit[-1]
         rate = max([self._rate, *(one.rate or 0.0 for run in made for one in run.methods)])
-        growth = (last.settings.rtol / rtol) ** (1 / _ORDER)
-        followed = rate * self._span / _FOLLOWED * (_AT / rtol) ** (1 / _SLOWLY)
+        growth = (last.settings.rtol / min(rtol, _NEAR * fresh)) ** (1 / _ORDER)
+        followed = rate * self._span / _FOLLOWED * (_AT / fresh) ** (1 / _SLOWLY)
+        if len(implicit) > 1:
+            followed *= _BEHIND
         if _STEP * last.statistics.steps * growth < followed:
             return implicit_method(rtol)
         return AUTO_EXPLICIT
-
-    def is_explicit(self, method: str) -> bool:
-        """Whether a run by this method will be an explicit one."""
-        if method in (AUTO, AUTO_EXPLICIT) or method in second_opinion.METHODS:
-            return True
-        return not get(method).implicit

@@ -20,8 +20,8 @@ TIGHTEST = 1e-13
 #: Below this tolerance rounding may be what is seen: two runs alone do not show errors falling.
 _ROUNDING = 5e-12
 
-#: First tolerance in what is wanted, and its bounds: of all, of explicit and of implicit methods.
-_FIRST, _LOOSEST, _EARLIEST, _EARLIEST_IMPLICIT = 30.0, 3e-3, 1e-10, 1e-4
+#: First tolerance in what is wanted, and its bounds for explicit and for implicit methods.
+_FIRST, _BOUNDS, _BOUNDS_IMPLICIT = 100.0, (1e-10, 5e-4), (1e-4, 3e-3)
 
 #: The second tolerance is to make what local errors sum up to this times what is wanted; where they
 #: are not known, the error is taken for so many times the tolerance, for implicit methods at least.
@@ -33,20 +33,28 @@ _FRESH = 1 / 20
 #: The error is this many times what the power makes of the distance.
 _SAFETY = 1.5
 
+#: The part of an observed power that is trusted; powers of explicit runs scatter about the first by
+#: chance: one above the second number here counts as the third at least.
+_TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
+
 #: Powers of the tolerance by which errors fall: of explicit methods, of implicit ones (less where
 #: two runs are all there is), from an implicit to an explicit run, and where they hardly fall.
-_EXPLICIT, _IMPLICIT, _BLIND, _CHANGED, _HARDLY = 0.9, 0.65, 0.55, 0.8, 0.25
+_EXPLICIT, _IMPLICIT, _BLIND, _CHANGED, _HARDLY = 0.9, 0.65, 0.6, 0.8, 0.25
 
 #: A next tolerance aims at this part of what is wanted; its bounds in the one before, the lower one
 #: for implicit methods another.
-_AIM, _LEAST, _LEAST_IMPLICIT, _MOST = 0.5, 1e-4, 3e-3, 0.2
+_AIM, _LEAST, _LEAST_IMPLICIT, _MOST = 0.8, 1e-4, 3e-3, 0.25
 
 #: A looser tolerance, in the tightest one, whose run tells the error of that one.
-_COMPANION = 10.0
+_COMPANION = 50.0
 
 #: Runs that differ by more (in the size of the motion) tell nothing of the power; the next
 #: tolerance is so much tighter.
 _PARTED, _LEAP = 0.3, 1e-3
+
+#: Errors of implicit methods may stay for a while above this tolerance, as long as vibrations are
+#: not resolved.
+_SLOW = 1e-7
 
 #: Most runs.
 RUNS = 6
@@ -71,8 +79,8 @@ class Look:
 
 def first_rtol(asked: float, explicit: bool) -> float:
     """The first tolerance: loose, for it is there to look."""
-    least = _EARLIEST if explicit else _EARLIEST_IMPLICIT
-    return max(min(_FIRST * asked, _LOOSEST), least)
+    tightest, loosest = _BOUNDS if explicit else _BOUNDS_IMPLICIT
+    return max(min(_FIRST * asked, loosest), tightest)
 
 
 def estimate(looks: Sequence[Look]) -> float | None:
@@ -90,11 +98,11 @@ def next_rtol(looks: Sequence[Look], asked: float, explicit: bool) -> float:
     parts); `explicit` says by which kind of method it is made."""
     last, known = looks[-1], estimate(looks)
     if explicit and not last.explicit:
-        return max(_FRESH * asked, TIGHTEST)
+        return fresh_rtol(asked)
     if known is None:
         factor = asked / last.rtol / _growth(last)
     elif last.explicit and not looks[-2].explicit:
-        return _COMPANION * last.rtol
+        return min(_COMPANION * last.rtol, _BOUNDS[1])
     elif not known < _PARTED:
         factor = _LEAP
     else:
@@ -103,10 +111,15 @@ def next_rtol(looks: Sequence[Look], asked: float, explicit: bool) -> float:
     return max(last.rtol * min(max(factor, least), _MOST), TIGHTEST)
 
 
+def fresh_rtol(asked: float) -> float:
+    """Tolerance of an explicit run that follows an implicit one."""
+    return max(_FRESH * asked, TIGHTEST)
+
+
 def hopeless(looks: Sequence[Look]) -> str:
     """Why a further run would lead nowhere; "" if it may."""
     stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
-    if stays and looks[-2].apart < _PARTED:
+    if stays and looks[-2].apart < _PARTED and (looks[-1].explicit or looks[-1].rtol < _SLOW):
         return (
             "the error falls no more with the tolerance (rounding, or jumps of forces at which no "
             "step ends)"
@@ -138,7 +151,9 @@ def _power(looks: Sequence[Look]) -> float:
         return _HARDLY
     if seen is None:
         return min(usual, _BLIND) if usual == _IMPLICIT else usual
-    return min(max(seen, _HARDLY), usual)
+    if looks[-1].explicit and seen > _NOISE:
+        return min(max(seen, _SURE), _EXPLICIT)
+    return min(max(_TRUSTED * seen, _HARDLY), _EXPLICIT)
 
 
 def _falls(looks: Sequence[Look]) -> bool:

@@ -19,14 +19,15 @@ import numpy as np
 from mstmm.arrays import Array
 
 from ..integrate.settings import Settings
+from ..integrate.steppers import AUTO
 from ..result.measure import Coordinates, Measure, Quantities
 from ..run.error_estimate import compare
 from ..run.execution import Watch, first_run
 from ..run.reached import Attempt, ReachedError
 from ..run.stability import StepCheck
 from .asked import Asked
-from .family import Family, is_explicit
-from .looks import Look, estimate, first_rtol, hopeless, next_rtol
+from .family import Family, explicit, is_explicit
+from .looks import Look, estimate, first_rtol, fresh_rtol, hopeless, next_rtol
 from .results import result_of
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class Search:
         self._wanted, self._progress = wanted, progress
         self._times = settings.output_times
         self._settings = replace(settings, output_times=_looked_at(settings))
-        self._family = Family(model, settings, q, u)
+        self._family = Family(model, settings, wanted.error, q, u)
         self._measure: Measure | None = None if wanted.of else Coordinates(model)
         self._made: list[_Made] = []  # the one to keep is the last
         self._looks: list[Look] = []
@@ -80,12 +81,15 @@ class Search:
     def result(self) -> Result:
         """The run that is kept, with what is known of its error."""
         method = self._family.first()
-        rtol = first_rtol(self._wanted.error, self._family.is_explicit(method))
+        rtol = first_rtol(self._wanted.error, explicit(method))
         while True:
             lost = self._run(method, rtol)
-            if lost is not None:
+            if lost is not None and lost.status is not None and self._family.rescues(method):
+                method = AUTO
+                continue
+            if lost is not None and (not self._made or lost.status is None):
                 return self._lost(lost)
-            why = self._settled()
+            why = self._settled(lost)
             if why is not None:
                 return self._kept(why)
             method, rtol = self._next()
@@ -93,7 +97,7 @@ class Search:
     # --- runs -----------------------------------------------------------------------------------
 
     def _run(self, method: str, rtol: float) -> Trajectory | None:
-        """Make one run; returned where nothing else is left: interrupted, or first and failed."""
+        """Make one run; returned where it did not reach its end."""
         rtol, atol = _short(rtol), _short(_ATOL * rtol)
         settings = replace(self._settings, rtol=rtol, atol=atol, method=method)
         watch = Watch(self._told(), settings)
@@ -104,7 +108,7 @@ class Search:
         run = replace(run, start=(self._q, self._u))
         if not run.success:
             self._failed.append(_attempt(run, spent, None, run.message))
-            return None if self._made and run.status is not None else run
+            return run
         result = result_of(self._model, run, None, step)
         if self._measure is None:
             self._measure = Quantities(result, self._wanted.of)
@@ -151,25 +155,24 @@ class Search:
         start = np.broadcast_to(numbers[:1], numbers.shape)
         return float(self._measure.apart(numbers, start).max(initial=0.0)) or 1.0
 
-    def _settled(self) -> str | None:
-        """ "" where the wanted error is reached, why it never will be, or None where a further run
-        may."""
+    def _settled(self, lost: Trajectory | None) -> str | None:
+        """Nothing where the wanted error is reached, else why it never will be; None where a
+        further run may.  `lost` is a run that has just failed."""
         known = estimate(self._looks)
         if known is not None and known * self._size <= self._wanted.error:
             return ""
-        if self._failed:
-            return f"the next run, rtol {self._failed[-1].rtol:.0e}, failed: " + (
-                self._failed[-1].failure
-            )
+        if lost is not None:
+            return f"the next run, rtol {lost.settings.rtol:.0e}, failed: {lost.message}"
         return hopeless(self._looks) or None
 
     def _next(self) -> tuple[str, float]:
         """Method and tolerance of the next run."""
-        part, explicit = self._wanted.error / self._size, self._looks[-1].explicit
-        rtol = next_rtol(self._looks, part, explicit)
-        method = self._family.method(rtol, [one.run for one in self._made])
-        if self._family.is_explicit(method) != explicit:
-            rtol = next_rtol(self._looks, part, not explicit)
+        part, kind = self._wanted.error / self._size, self._looks[-1].explicit
+        rtol = next_rtol(self._looks, part, kind)
+        made = [one.run for one in self._made]
+        method = self._family.method(rtol, fresh_rtol(part), made)
+        if explicit(method) != kind:
+            rtol = next_rtol(self._looks, part, not kind)
         return method, rtol
 
     # --- results --------------------------------------------------------------------------------
