@@ -251,8 +251,8 @@ class Model(Compiled):
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for settings that make no sense.
         """
-        from .asked import Control, asked
         from .results import simulate
+        from .wanted.asked import Control, asked
 
         given = Control(method, step, rtol, atol)
         wanted = asked(error, error_of, given, checkpoint is not None or resume)
@@ -266,11 +266,14 @@ class Model(Compiled):
         )  # fmt: skip
         q, u = self.initial_state() if initial is None else pair("initial", initial)
         instead = "simulate_batch takes many"
+        q, u = one("initial q", q, self.nq, instead), one("initial u", u, self.nu, instead)
+        if wanted is not None:
+            from .wanted import search
+
+            return search.simulate(self, settings, wanted, q, u, certify=certify, progress=progress)
         return simulate(
-            self, settings, one("initial q", q, self.nq, instead),
-            one("initial u", u, self.nu, instead),
+            self, settings, q, u,
             certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
-            wanted=wanted,
         )  # fmt: skip
 
     def simulate_batch(

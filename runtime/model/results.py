@@ -16,7 +16,6 @@ from ..run.error_estimate import ErrorEstimate
 from ..run.execution import Watch, first_run, second_run
 from ..run.stability import StepCheck
 from ..run.trajectory import Trajectory
-from .asked import Asked
 
 
 def result_of(
@@ -45,14 +44,8 @@ def simulate(
     progress: Callable[[float, float], None] | None,
     checkpoint: str | Path | None,
     resume: bool,
-    wanted: Asked | None = None,
 ) -> Result:
     """One run, and a second one where its error is asked for; see `Model.simulate`."""
-    if wanted is not None:
-        from .wanted_error import Search
-
-        result = Search(model, settings, wanted, q, u, progress).result()
-        return certified(result, progress) if certify and result.trajectory.success else result
     watch = Watch(progress, settings, runs=2 if certify else 1)
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)

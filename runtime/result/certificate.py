@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..integrate.reached import ReachedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate
-from ..run.reached import ReachedError
 from ..run.stability import StepCheck
 from .conditioning import LARGEST, PivotLoss, SingularDistance
 from .evidence import Drift, Give

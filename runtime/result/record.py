@@ -12,11 +12,11 @@ from mstmm.scene.checks.flexible import short_beams
 
 from ..engine.compiled import Compiled
 from ..integrate.loop import Statistics
+from ..integrate.reached import ReachedError
 from ..integrate.settings import Settings
 from ..pack.layout import HingeSlots
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
-from ..run.reached import ReachedError
 from ..run.stability import StepCheck
 from ..run.stretches import Stretch
 from ..run.trajectory import Trajectory

@@ -11,8 +11,8 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..integrate.loop import Statistics, Status
+from ..integrate.reached import ReachedError
 from ..integrate.settings import Settings
-from .reached import ReachedError
 from .stretches import Stretch
 
 

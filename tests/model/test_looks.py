@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from mstmm.runtime.model.looks import (
+from mstmm.runtime.model.wanted.looks import (
     RUNS,
     TIGHTEST,
     Look,

@@ -16,8 +16,9 @@ from scipy.special import ellipj, ellipk
 import mstmm
 from mstmm.runtime.integrate.loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.model import wanted_error
+from mstmm.runtime.model.wanted import search
 from mstmm.runtime.result.output.provenance import attributes
+from mstmm.runtime.run import execution
 
 G = 9.81
 
@@ -198,14 +199,14 @@ def test_a_later_run_that_fails_leaves_the_one_before() -> None:
 def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first run of a stiff scene, by an implicit method, is made to fail."""
     model = stiff(2, 1e8, 1.0)
-    real = wanted_error.first_run
+    real = execution.first_run
 
     def first_run(model: Any, settings: Settings, *rest: Any) -> Any:
         run, step = real(model, settings, *rest)
         failing = settings.method == "rodas4p2"
         return (replace(run, status=Status.STEP_TOO_SMALL) if failing else run), step
 
-    monkeypatch.setattr(wanted_error, "first_run", first_run)
+    monkeypatch.setattr(search, "first_run", first_run)
     known = model.simulate(0.3, error=1e-3).error_estimate
     assert known is not None and known.met
     assert [one.method for one in known.runs if one.failure] == ["rodas4p2"]

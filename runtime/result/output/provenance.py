@@ -16,11 +16,11 @@ from mstmm.arrays import Array
 from ...classical.schemes import scheme_of
 from ...engine.identity import kernels_hash
 from ...integrate.loop import Statistics, Status
+from ...integrate.reached import from_dict
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, get
 from ...run import classical, second_opinion
 from ...run.error_estimate import ErrorEstimate
-from ...run.reached import from_dict
 from ...run.stretches import from_rows
 from ...run.trajectory import Trajectory
 

@@ -18,22 +18,22 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from ..integrate.settings import Settings
-from ..integrate.steppers import AUTO
-from ..result.measure import Coordinates, Measure, Quantities
-from ..run.error_estimate import compare
-from ..run.execution import Watch, first_run
-from ..run.reached import Attempt, ReachedError
-from ..run.stability import StepCheck
+from ...integrate.reached import Attempt, ReachedError
+from ...integrate.settings import Settings
+from ...integrate.steppers import AUTO
+from ...result.measure import Coordinates, Measure, Quantities
+from ...run.error_estimate import compare
+from ...run.execution import Watch, first_run
+from ...run.stability import StepCheck
+from ..results import certified, result_of
 from .asked import Asked
 from .family import Family, explicit, is_explicit
 from .looks import Look, estimate, first_rtol, fresh_rtol, hopeless, next_rtol
-from .results import result_of
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
-    from ..result.result import Result
-    from ..run.trajectory import Trajectory
+    from ...engine.compiled import Compiled
+    from ...result.result import Result
+    from ...run.trajectory import Trajectory
 
 #: Absolute tolerance in the relative one.
 _ATOL = 0.01
@@ -235,6 +235,15 @@ class Search:
             work=run.work[keep], event=run.event[keep],
             settings=replace(run.settings, output_times=self._times),
         )  # fmt: skip
+
+
+def simulate(
+    model: Compiled, settings: Settings, wanted: Asked, q: Array, u: Array, *, certify: bool,
+    progress: Progress | None,
+) -> Result:  # fmt: skip
+    """The result of a search, and with `certify` of a second run beside it."""
+    result = Search(model, settings, wanted, q, u, progress).result()
+    return certified(result, progress) if certify and result.trajectory.success else result
 
 
 def _looked_at(settings: Settings) -> tuple[float, ...]:

@@ -9,8 +9,8 @@ from mstmm.arrays import real
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
-from ..integrate.steppers import AUTO, get
-from ..run import classical, second_opinion
+from ...integrate.steppers import AUTO, get
+from ...run import classical, second_opinion
 
 #: Errors below this cannot be told from rounding.
 LEAST = 1e-12

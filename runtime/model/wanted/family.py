@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 
-from ..integrate.settings import Settings
-from ..integrate.steppers import AUTO, AUTO_EXPLICIT, get
-from ..run import second_opinion
-from ..run.fastest import Fastest
-from ..run.method_choice import implicit_method
+from ...integrate.settings import Settings
+from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
+from ...run import second_opinion
+from ...run.fastest import Fastest
+from ...run.method_choice import implicit_method
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
-    from ..run.trajectory import Trajectory
+    from ...engine.compiled import Compiled
+    from ...run.trajectory import Trajectory
 
 #: |lambda| T from which the first run is an implicit one; and for an error from which on it may
 #: leave small vibrations out.

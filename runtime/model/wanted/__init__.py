@@ -1,0 +1,1 @@
+"""A wanted error: what may be asked for, and the runs that reach it."""
