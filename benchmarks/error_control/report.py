@@ -33,7 +33,8 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
     lines = [
         "# Errors that were asked for",
         "",
-        f"{scenes} scenes, {data['each']} of each family, seed {data['seed']}; "
+        f"{scenes} scenes of {data['scenes_drawn']} drawn, {data['each']} of each family, "
+        f"seed {data['seed']}; "
         f"families that the rule was {'set' if data['families'] == 'tuning' else 'not set'} on.  "
         f"{machine['processor']}, load {machine['load']:.1f}.  "
         "A sure setting is one that meets the error as do all tighter ones of its method.",

@@ -345,8 +345,8 @@ TUNING: dict[str, Family] = {
 JUDGED: dict[str, Family] = {
     f.__name__: f
     for f in (
-        mixed_trees, spatial_chains, sprung_chains, falling_beams, flexible_trees,
-        shaken_pendulums, rubbing_slides, bouncing_weights,
+        mixed_trees, spatial_chains, sprung_chains, flexible_trees, shaken_pendulums,
+        rubbing_slides, bouncing_weights, falling_beams,
     )
 }  # fmt: skip
 

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import mstmm
 
-from .best import Reference, Single, single, timed
+from .best import Reference, Single, reference, single, singles, timed
+from .scenes import Drawn
 
 #: Errors that are asked for.
 ASKED = (1e-3, 1e-5, 1e-7)
+
+#: A reference that is off by more than this part of the smallest error asked for is none.
+_GOOD = 0.1
 
 
 @dataclass(frozen=True)
@@ -109,3 +113,16 @@ def outcome(
 def _all_tighter(one: Single, found: list[Single], asked: float) -> bool:
     """Whether this run and all tighter ones of its method err by no more."""
     return all(x.error <= asked for x in found if x.method == one.method and x.rtol <= one.rtol)
+
+
+def tried(task: tuple[str, Drawn, int]) -> tuple[str, list[Outcome], float]:
+    """A scene with its outcomes and the error of its reference; no outcomes where that is no
+    good."""
+    name, (tables, t_end), rounds = task
+    model = mstmm.compile(mstmm.Scene(**tables), engine="looped")
+    truth = reference(model, t_end)
+    if truth is None or truth.error > _GOOD * min(ASKED):
+        return name, [], float("inf") if truth is None else truth.error
+    found = singles(model, t_end, truth, min(ASKED) / 10, rounds)
+    outcomes = [outcome(name, model, t_end, truth, found, asked, rounds) for asked in ASKED]
+    return name, outcomes, truth.error
