@@ -14,12 +14,13 @@ from mstmm.errors import MstmmError, SceneError
 from mstmm.scene import Scene
 
 from ..integrate.steppers import AUTO
+from ..result.measure import Measure
 from .budget import EARLY, SETTINGS, Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
 from .families import PROMISING, checked_methods
 from .front import judged
-from .measure import Measure, measure_of
+from .measure import measure_of
 from .models import Variant, ladder
 from .planar import planar
 from .point import LeftOut, Level, Reference, Setting
@@ -124,8 +125,13 @@ class _Charting:
         if missed and asked.rounds:
             why = f"{missed} of {len(points)} runs were timed less often than the others, for time"
             self.left_out.append(LeftOut("", "", "", why, False))
+        own = {
+            level.name: level.error
+            for level in self.levels
+            if level.error is not None and level.name != reference.model
+        }
         return Chart(
-            title, asked.t_end, asked.samples, reference, judged(points, reference),
+            title, asked.t_end, asked.samples, reference, judged(points, reference, own),
             tuple(self.levels), (*self.left_out, *found.left_out), asked.error, asked.budget,
             self.budget.spent,
         )  # fmt: skip

@@ -17,9 +17,9 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
+from ..result.measure import Measure
 from .budget import REFERENCE, Budget
 from .families import family
-from .measure import Measure
 from .point import Setting
 from .trial import Runs, Trial, error_of
 

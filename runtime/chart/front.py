@@ -6,7 +6,7 @@ as cheap, and better in one of the two.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from mstmm.errors import NumericalFailure, SceneError
@@ -14,10 +14,13 @@ from mstmm.errors import NumericalFailure, SceneError
 from .point import Point, Reference
 
 
-def judged(points: Sequence[Point], reference: Reference) -> tuple[Point, ...]:
+def judged(
+    points: Sequence[Point], reference: Reference, own: Mapping[str, float] | None = None
+) -> tuple[Point, ...]:
     """The points with their sure errors, and marked where the reference limits them.
 
-    Tighter settings that failed have no error and do not count.
+    Tighter settings that failed have no error and do not count.  `own` are the errors of levels of
+    model by their names: settings that come below make up for it by chance.
     """
     found = []
     for point in points:
@@ -30,6 +33,7 @@ def judged(points: Sequence[Point], reference: Reference) -> tuple[Point, ...]:
             if other.curve == point.curve and other.setting.value <= point.setting.value
             and other.error is not None
         )  # fmt: skip
+        sure = max(sure, (own or {}).get(point.setting.model, 0.0))
         limited = point.error <= reference.floor
         found.append(replace(point, sure_error=sure, limited=limited))
     return tuple(found)

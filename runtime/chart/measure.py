@@ -1,76 +1,23 @@
-"""What errors are errors of: quantities of the user's, all coordinates, or the places of bodies.
-
-A measure reads numbers (n, k) from a result and tells how far two of them are apart, (n,).
+"""What the errors of a chart are errors of: measures of any result, or the places of bodies, which
+every level of model has.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
 
 from ..model.sizes import scene_length
-from ..run.error_estimate import differences, excursions, rotation_between
+from ..result.measure import Coordinates, Measure, Quantities
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
-    from ..result.names import Quantity
+    from ..result.record import Record
     from ..result.result import Result
-
-
-class Measure(ABC):
-    """What is compared.
-
-    Attributes:
-        name, unit, scaling: for readers; the unit is "1" where numbers are divided by something.
-    """
-
-    name = ""
-    unit = "1"
-    scaling = "none"
-
-    @abstractmethod
-    def read(self, result: Result) -> Array:
-        """(n, k) numbers of a run at its samples."""
-
-    @abstractmethod
-    def apart(self, a: Array, b: Array) -> Array:
-        """(n,) distances of two of them."""
-
-    def scale_by(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
-        """Take the sizes of what is compared from the reference, where they depend on the run."""
-
-
-class Coordinates(Measure):
-    """All coordinates of the scene."""
-
-    name = "all coordinates"
-    scaling = (
-        "angles in rad; lengths, modal coordinates and others in parts of the largest excursion of "
-        "any coordinate of that unit in the reference"
-    )
-
-    def __init__(self, model: Compiled) -> None:
-        self._layout = model.layout
-        self._sizes: dict[str, float] = {}
-
-    def read(self, result: Result) -> Array:
-        return result.q
-
-    def scale_by(self, numbers: Array) -> None:
-        moved = excursions(self._layout, numbers)
-        self._sizes = {unit: moved[unit] or 1.0 for unit in moved if unit != "rad"}
-
-    def apart(self, a: Array, b: Array) -> Array:
-        found = np.zeros(len(a))
-        for unit, difference in differences(self._layout, a, b, "q"):
-            found = np.maximum(found, difference / self._sizes.get(unit, 1.0))
-        return found
 
 
 class Places(Measure):
@@ -86,58 +33,12 @@ class Places(Measure):
         self._names = [name[: -len(ending)] for name in start.names() if name.endswith(ending)]
         self.scaling = f"parts of the length of the scene, {self._length:g} m"
 
-    def read(self, result: Result) -> Array:
+    def read(self, result: Record) -> Array:
         return np.hstack([result.position(name) for name in self._names])
 
     def apart(self, a: Array, b: Array) -> Array:
         ways = (a - b).reshape(len(a), -1, 3)
         return np.asarray(np.linalg.norm(ways, axis=2).max(axis=1) / self._length)
-
-
-class Quantities(Measure):
-    """Quantities by name: one in its own unit, several in parts of how far each goes."""
-
-    def __init__(self, start: Result, names: Sequence[str]) -> None:
-        self._names = tuple(dict.fromkeys(names))
-        found = [_quantity(start, name) for name in self._names]
-        self._widths = [1 if one.values.ndim == 1 else one.values.shape[1] for one in found]
-        self._turns = [one.labels == tuple("wxyz") for one in found]
-        self._sizes = [1.0] * len(found)
-        self.name = ", ".join(self._names)
-        if len(found) == 1:
-            self.unit = "rad" if self._turns[0] else found[0].unit or "1"
-            self.scaling = "none: the length of the difference" if self._widths[0] > 1 else "none"
-        else:
-            self.scaling = "each in parts of its largest excursion in the reference"
-
-    def read(self, result: Result) -> Array:
-        columns = [_quantity(result, name).values for name in self._names]
-        return np.hstack([values.reshape(len(values), -1) for values in columns])
-
-    def scale_by(self, numbers: Array) -> None:
-        if len(self._names) > 1:
-            start = np.broadcast_to(numbers[:1], numbers.shape)
-            self._sizes = [float(way.max()) or 1.0 for way in self._ways(numbers, start)]
-
-    def apart(self, a: Array, b: Array) -> Array:
-        ways = self._ways(a, b)
-        return np.max([way / size for way, size in zip(ways, self._sizes, strict=True)], axis=0)
-
-    def _ways(self, a: Array, b: Array) -> list[Array]:
-        """(n,) distances, one array for each quantity."""
-        cuts = np.cumsum(self._widths)[:-1]
-        pairs = zip(np.split(a, cuts, axis=1), np.split(b, cuts, axis=1), strict=True)
-        return [
-            rotation_between(x, y) if turn else np.linalg.norm(x - y, axis=1)
-            for (x, y), turn in zip(pairs, self._turns, strict=True)
-        ]
-
-
-def _quantity(result: Result, name: str) -> Quantity:
-    try:
-        return result.quantity(name)
-    except SceneError as error:
-        raise SceneError(f"quantity {error}") from None
 
 
 def measure_of(model: Compiled, start: Result, names: Sequence[str], models: bool) -> Measure:

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ..result.measure import Measure
 from .families import settings
-from .measure import Measure
 from .point import LeftOut, Point, Setting
 from .trial import Runs, Trial, error_of, factorizations
 

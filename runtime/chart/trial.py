@@ -12,10 +12,10 @@ from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
 from ..host.interruptible import interruptible
+from ..result.measure import Measure
 from ..result.one_way.result import OneWayResult
 from ..run import second_opinion
 from .budget import Budget, OutOfTime
-from .measure import Measure
 from .point import Setting
 
 if TYPE_CHECKING:

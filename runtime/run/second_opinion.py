@@ -130,12 +130,18 @@ def integrate(
 ) -> Trajectory:
     """One run by SciPy, or by SUNDIALS.
 
-    Raises SceneError for a fixed step, EnvironmentFailure where the package is not installed.
+    Raises SceneError for a fixed step, and by SUNDIALS for a scene without coordinates;
+    EnvironmentFailure where the package is not installed.
     """
     if settings.step is not None:
         raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
     if settings.method in sundials.METHODS:
         sundials.refuse_without(settings.method)
+        if not model.nq + model.nu:
+            raise SceneError(
+                f'method "{settings.method}": CVODE takes no scene in which nothing can move; '
+                "use another method, such as dop853"
+            )
     alone: AbstractContextManager[object] = nullcontext()
     if METHODS[settings.method] == "LSODA":
         alone = _ONE_LSODA

@@ -42,8 +42,8 @@ class Trajectory:
     start: tuple[Array, Array] | None = None
     unseen: tuple[str, ...] = ()  # of expressions: what the steps may have passed over
     methods: tuple[Stretch, ...] = ()  # of a run that chose among them
-    before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
     reached: ReachedError | None = None  # of a run that was asked for an error
+    before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
 
     @property
     def first(self) -> tuple[float, Array, Array]:

@@ -61,6 +61,15 @@ def test_sure_errors_are_the_largest_of_tighter_settings(rng: np.random.Generato
         assert point.limited == (point.error is not None and point.error <= 3e-11)
 
 
+def test_no_setting_is_surely_better_than_its_level_of_model() -> None:
+    near = Point(Setting("genalpha", "one shape", 1e-3), 4e-3, 1e-3, 1)
+    better = Point(Setting("genalpha", "two shapes", 1e-3), 4e-3, 2e-3, 1)
+    reference = replace(REFERENCE, model="two shapes")
+    found = judged([near, better], reference, {"one shape": 5e-3})
+    assert [point.sure_error for point in found] == [5e-3, 4e-3]
+    assert recommended(found, 4.5e-3, reference).model == "two shapes"
+
+
 def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.Generator) -> None:
     met = 0
     for _ in range(30):

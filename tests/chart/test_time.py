@@ -15,10 +15,10 @@ from mstmm.errors import NumericalFailure
 from mstmm.runtime.chart.budget import EARLY, REFERENCE, SETTINGS, Budget
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.charting import charted, request
-from mstmm.runtime.chart.measure import Coordinates
 from mstmm.runtime.chart.point import Setting
 from mstmm.runtime.chart.trial import Runs
 from mstmm.runtime.host.interruptible import interruptible
+from mstmm.runtime.result.measure import Coordinates
 from mstmm.runtime.run.simulate import advance
 
 METHODS = ("dop853", "dopri5", "rodas4")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from support.result_scenes import motor, pins, rod, tree
 
 import mstmm
+from mstmm.errors import SceneError
 from mstmm.runtime.integrate.loop import Status
 from mstmm.runtime.run import second_opinion
 
@@ -192,3 +193,14 @@ def test_settings_that_make_no_sense() -> None:
         model.simulate(1.0, method="scipy-Euler")
     with pytest.raises(mstmm.SceneError, match="keeps no checkpoints"):
         model.simulate(1.0, method="scipy-RK45", checkpoint="run.npz")
+
+
+def test_cvode_refuses_a_scene_in_which_nothing_moves() -> None:
+    pytest.importorskip("sksundae")
+    still = mstmm.Scene(
+        gravity=[0, 0, 0],
+        body=[{"name": "block", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}],
+        hinge=[{"name": "weld", "type": "fixed", "inboard": "ground", "outboard": "block"}],
+    )
+    with pytest.raises(SceneError, match="nothing can move"):
+        mstmm.compile(still).simulate(1.0, method="sundials-BDF")
