@@ -51,10 +51,12 @@ OWN_BY_PLACE = only(
     ),
 )
 
-_TAKEN, _APPLIED = LOADS.steps[:3], next(
+_APPLIED = next(
     step for step in LOADS.steps
     if isinstance(step, Call) and step.kernel == "frames.applied_load"
 )  # fmt: skip
+#: What makes the numbers that it is applied with.
+_TAKEN = LOADS.steps[: LOADS.steps.index(_APPLIED)]
 
 LOADS_BY_PLACE = Pass(
     "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",

@@ -44,7 +44,7 @@ def chart(
             stiffened with 1 to n shapes, planar where nothing leaves the plane.  Errors are then
             against the richest level.
         error: for which the cheapest setting is recommended.
-        budget: s of the clock that all of it may take; what did not fit in is told.
+        budget: s of the clock that the runs may take; what did not fit in is told.
         samples: times from 0 to t_end at which errors are looked at; the largest counts.
         rounds: how often the processor times are taken again, all points in turn.
         engine: as in `compile`, for what is compiled here; "auto" is "looped" with `models`, so

@@ -54,8 +54,8 @@ def chart(
                             "recommend the cheapest setting.")
     ] = CHART_ERROR,
     budget: Annotated[
-        float, typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that all of "
-                            "it may take, s of the clock.")
+        float, typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that the "
+                            "runs may take, s of the clock.")
     ] = CHART_BUDGET,
     samples: Annotated[
         int, typer.Option("--times", metavar="N", help="Times from 0 to the end at which errors "

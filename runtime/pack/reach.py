@@ -34,19 +34,18 @@ class Reach:
 def reach_of(system: System) -> Reach:
     """What the loads of a system reach."""
     depends = _depends_on_state(system.values)
-    turning = [_turns(load) for load in system.loads]
-    read = [_reads_state(load, depends) for load in system.loads]
+    changing = [_reads_state(load, depends) for load in system.loads]
     loads = tuple(
-        turns and not reading and load.axes == GROUND
-        for load, turns, reading in zip(system.loads, turning, read, strict=True)
+        load.axes == GROUND != load.body and not reading
+        for load, reading in zip(system.loads, changing, strict=True)
     )
     forces = tuple(map(_to_ground, system.forces))
-    own = {load.body for load, alone in zip(system.loads, loads, strict=True) if alone}
-    across = {
-        load.body
-        for load, alone, turns, reading in zip(system.loads, loads, turning, read, strict=True)
-        if not alone and (turns or reading)
-    }
+    own, across = set[int](), set[int]()
+    for load, alone, reading in zip(system.loads, loads, changing, strict=True):
+        if alone:
+            own.add(load.body)
+        elif reading or load.axes != load.body:  # a follower of given size turns with its body
+            across.add(load.body)
     for force, alone in zip(system.forces, forces, strict=True):
         (own if alone else across).update(body for body, _, _ in force.ends)
     return Reach(
@@ -63,11 +62,6 @@ def _to_the_root(system: System, bodies: set[int]) -> tuple[int, ...]:
             found.add(body)
             body = int(parents[body])
     return tuple(sorted(found))
-
-
-def _turns(load: LoadNumbers) -> bool:
-    """Whether a load turns against the axes of its body."""
-    return load.axes != load.body
 
 
 def _reads_state(load: LoadNumbers, depends: Sequence[bool]) -> bool:
