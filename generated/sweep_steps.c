@@ -7,6 +7,7 @@
 #include "hinge.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
+#include "tiles.h"
 
 mstmm_generic_forward_kernel *const mstmm_generic_forward_table[] = {
     mstmm_sweep_generic0_forward,
@@ -376,7 +377,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     }
     if (!body->generic) {
         const int nu = body->nu;
-        code = mstmm_hinge_forward(body->forward,
+        code = mstmm_hinge_forward(body->kernels->forward,
             .Rt = body->connection, .ro = body->connection + 9, .p = body->hinge_p,
             .q = state->q + body->q, .u = state->u + body->u,
             .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
@@ -399,9 +400,9 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
         code = mstmm_at_modal_own(state, index);
         if (code) return code;
     } else {
-        mstmm_body_inertia(body->inertia,
+        mstmm_body_inertia(body->kernels->inertia,
             .p = body->body_p, .S = block + MSTMM_BLOCK_S);
-        mstmm_body_bias_load(body->bias_load,
+        mstmm_body_bias_load(body->kernels->bias_load,
             .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION, .e = block + MSTMM_BLOCK_E);
     }
     mstmm_frames_pivot_floor(
@@ -743,7 +744,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         const int nu = body->nu;
-        code = mstmm_hinge_condense(body->condense,
+        code = mstmm_hinge_condense(body->kernels->condense,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .p = body->hinge_p,
             .q = state->q + body->q, .floor_ = block + MSTMM_BLOCK_FLOOR,
             .S = block + MSTMM_BLOCK_S, .e = block + MSTMM_BLOCK_E,
@@ -781,7 +782,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
     if (!body->generic) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        mstmm_hinge_recover(body->recover,
+        mstmm_hinge_recover(body->kernels->recover,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .p = body->hinge_p,
             .q = state->q + body->q, .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
             .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .delta_I = parent_delta,
@@ -1262,7 +1263,7 @@ static int mstmm_at_forward_slope(mstmm_state *state, int index)
         code = mstmm_at_modal_own_slope(state, index);
         if (code) return code;
     } else {
-        mstmm_body_bias_load_slope(body->bias_load_slope,
+        mstmm_body_bias_load_slope(body->kernels->bias_load_slope,
             .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
             .d_motion = d_block + MSTMM_BLOCK_MOTION, .d_e = d_block + MSTMM_BLOCK_E);
     }
@@ -1826,7 +1827,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
     if (!body->modal) {
         real *block = state->workspace + body->block;
         real *tangent = state->tangents->numbers + body->tangent;
-        mstmm_body_load_by_motion(body->load_by_motion,
+        mstmm_body_load_by_motion(body->kernels->load_by_motion,
             .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
             .J = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
     } else {
@@ -3669,10 +3670,20 @@ static int mstmm_pass_drives(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_forward(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+}
 static int mstmm_pass_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_forward(state, i, MSTMM_TILE);
         const int code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
         if (code) return code;
     }
@@ -3723,20 +3734,40 @@ static int mstmm_pass_strain(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_poses(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
 static int mstmm_pass_poses(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_poses(state, i, MSTMM_TILE);
         const int code = mstmm_at_poses(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_drag(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_V, block + MSTMM_BLOCK_V + 3);
+}
 static int mstmm_pass_drag(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_drag(state, i, MSTMM_TILE);
         const int code = mstmm_at_drag(state, i);
         if (code) return code;
     }
@@ -3763,80 +3794,125 @@ static int mstmm_pass_forces(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_condense(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+}
 static int mstmm_pass_condense(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_condense(state, i, -MSTMM_TILE);
         const int code = mstmm_at_condense(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_recover(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+}
 static int mstmm_pass_recover(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_recover(state, i, MSTMM_TILE);
         const int code = mstmm_at_recover(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_DELTA);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_drive_power(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
 static int mstmm_pass_drive_power(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_drive_power(state, i, MSTMM_TILE);
         const int code = mstmm_at_drive_power(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_required(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
 static int mstmm_pass_required(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_required(state, i, -MSTMM_TILE);
         const int code = mstmm_at_required(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_factorise(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_S + 21);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+}
 static int mstmm_pass_factorise(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_factorise(state, i, -MSTMM_TILE);
         const int code = mstmm_at_factorise(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_column(mstmm_state *state)
+MSTMM_AT_ONCE void mstmm_fetch_column_answered(const mstmm_state *state, int index, int ahead)
 {
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_column(state, i);
-        if (code) return code;
-    }
-    return 0;
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
-
-static int mstmm_pass_column_carried(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const int code = mstmm_at_column_carried(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_column_answered(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_column_answered(state, i, MSTMM_TILE);
         const int code = mstmm_at_column_answered(state, i);
         if (code) return code;
     }
@@ -3867,10 +3943,27 @@ static int mstmm_pass_drives_slope(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_forward_slope(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
 static int mstmm_pass_forward_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_forward_slope(state, i, MSTMM_TILE);
         const int code = mstmm_at_forward_slope(state, i);
         if (code) return code;
     }
@@ -3901,20 +3994,45 @@ static int mstmm_pass_laws_slope(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_poses_slope(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_V + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_A, d_block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_V, d_block + MSTMM_BLOCK_HINGE_V + 3);
+}
 static int mstmm_pass_poses_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_poses_slope(state, i, MSTMM_TILE);
         const int code = mstmm_at_poses_slope(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_drag_slope(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    mstmm_fetch(block + MSTMM_BLOCK_V, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(d_block + MSTMM_BLOCK_V, d_block + MSTMM_BLOCK_V + 3);
+}
 static int mstmm_pass_drag_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_drag_slope(state, i, MSTMM_TILE);
         const int code = mstmm_at_drag_slope(state, i);
         if (code) return code;
     }
@@ -3941,20 +4059,43 @@ static int mstmm_pass_forces_slope(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_required_slope(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
 static int mstmm_pass_required_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope(state, i, -MSTMM_TILE);
         const int code = mstmm_at_required_slope(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_no_loads(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *d_block = state->slope->workspace + body->block;
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+}
 static int mstmm_pass_no_loads(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_no_loads(state, i, MSTMM_TILE);
         const int code = mstmm_at_no_loads(state, i);
         if (code) return code;
     }
@@ -3981,10 +4122,24 @@ static int mstmm_pass_forces_across(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_own(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 54);
+    mstmm_fetch(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq) + nq * nq);
+}
 static int mstmm_pass_tangent_own(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_own(state, i, MSTMM_TILE);
         const int code = mstmm_at_tangent_own(state, i);
         if (code) return code;
     }
@@ -4021,162 +4176,450 @@ static int mstmm_pass_forces_by_place(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_condense(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+}
 static int mstmm_pass_tangent_condense(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_condense(state, i, -MSTMM_TILE);
         const int code = mstmm_at_tangent_condense(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_column(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
+}
 static int mstmm_pass_tangent_column(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_column(state, i, MSTMM_TILE);
         const int code = mstmm_at_tangent_column(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_carried(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
+}
 static int mstmm_pass_tangent_carried(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_carried(state, i, -MSTMM_TILE);
         const int code = mstmm_at_tangent_carried(state, i);
         if (code) return code;
     }
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_answered(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_W + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_MOTION, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
+}
 static int mstmm_pass_tangent_answered(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_answered(state, i, MSTMM_TILE);
         const int code = mstmm_at_tangent_answered(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_known_column(mstmm_state *state)
+MSTMM_AT_ONCE void mstmm_fetch_known_answered(const mstmm_state *state, int index, int ahead)
 {
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_known_column(state, i);
-        if (code) return code;
-    }
-    return 0;
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_W + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_MOTION, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
 }
-
-static int mstmm_pass_known_laws(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_laws; i++) {
-        const int code = mstmm_at_known_laws(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_known_carried(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const int code = mstmm_at_known_carried(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_known_answered(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_known_answered(state, i, MSTMM_TILE);
         const int code = mstmm_at_known_answered(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_laws_own(mstmm_state *state)
+MSTMM_AT_ONCE void mstmm_fetch_laws_column_answered(const mstmm_state *state, int index, int ahead)
 {
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_laws_own(state, i);
-        if (code) return code;
-    }
-    return 0;
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_DELTA, d_block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_RATES), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_RATES) + nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_Y(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-
-static int mstmm_pass_laws_rates(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_laws_rates(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_laws_own_slopes(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_laws; i++) {
-        const int code = mstmm_at_laws_own_slopes(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_laws_factorise(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const int code = mstmm_at_laws_factorise(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_laws_column(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_laws_column(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_modes_change(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_modes_change(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_laws_column_carried(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const int code = mstmm_at_laws_column_carried(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_laws_column_answered(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_answered(state, i, MSTMM_TILE);
         const int code = mstmm_at_laws_column_answered(state, i);
         if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_column_carried_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+}
+static int mstmm_tiles_column_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_column(state, i);
+            if (code) return code;
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_column_carried_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_column_carried(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_required_slope_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_tiles_required_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies, law = model->n_laws;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_efforts_slope(state, i);
+            if (code) return code;
+        }
+        for (int i = law; i < behind; i++) {
+            code = mstmm_at_laws_slope(state, i);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product) && model->n_flexible) {
+            for (int i = begun - 1; i >= least; i--) {
+                code = mstmm_at_drag_slope(state, i);
+                if (code) return code;
+            }
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_required_slope(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_tangent_condense_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq) + nq * nq);
+}
+static int mstmm_tiles_tangent_condense(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies, law = model->n_laws;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_tangent_own(state, i);
+            if (code) return code;
+        }
+        for (int i = law; i < behind; i++) {
+            code = mstmm_at_law_slopes(state, i);
+            if (code) return code;
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_condense_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_tangent_condense(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_tangent_carried_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
+}
+static int mstmm_tiles_tangent_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_tangent_column(state, i);
+            if (code) return code;
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_carried_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_tangent_carried(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_known_carried_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 54);
+    mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
+}
+static int mstmm_tiles_known_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies, law = model->n_laws;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_known_column(state, i);
+            if (code) return code;
+        }
+        for (int i = law; i < behind; i++) {
+            code = mstmm_at_known_laws(state, i);
+            if (code) return code;
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_known_carried_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_known_carried(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_laws_factorise_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_S + 21);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 21);
+    mstmm_fetch(tangent + MSTMM_TANGENT_W(body->nu, body->nq), tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq) + nu * nu);
+}
+static int mstmm_tiles_laws_factorise(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies, law = model->n_laws;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_laws_own(state, i);
+            if (code) return code;
+        }
+        if (model->n_laws) {
+            for (int i = begun - 1; i >= least; i--) {
+                code = mstmm_at_laws_rates(state, i);
+                if (code) return code;
+            }
+        }
+        if (model->n_laws) {
+            for (int i = law; i < behind; i++) {
+                code = mstmm_at_laws_own_slopes(state, i);
+                if (code) return code;
+            }
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_laws_factorise_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_laws_factorise(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_laws_column_carried_tile(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_Y(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
+}
+static int mstmm_tiles_laws_column_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, begun = model->n_bodies, law = model->n_laws;
+    for (int end = begun; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+        for (int i = begun - 1; i >= least; i--) {
+            code = mstmm_at_laws_column(state, i);
+            if (code) return code;
+        }
+        if (state->tangents->shifted && model->n_laws) {
+            for (int i = law; i < behind; i++) {
+                code = mstmm_at_known_laws(state, i);
+                if (code) return code;
+            }
+        }
+        if (state->tangents->shifted && model->n_flexible) {
+            for (int i = begun - 1; i >= least; i--) {
+                code = mstmm_at_modes_change(state, i);
+                if (code) return code;
+            }
+        }
+        if (least < begun) begun = least;
+        for (int i = end - 1; i >= first; i--) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_carried_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_laws_column_carried(state, i);
+            if (code) return code;
+        }
     }
     return 0;
 }
@@ -4395,9 +4838,7 @@ int mstmm_run_factorisation(mstmm_state *state)
 int mstmm_run_solution(mstmm_state *state)
 {
     int code;
-    code = mstmm_pass_column(state);
-    if (code) return code;
-    code = mstmm_pass_column_carried(state);
+    code = mstmm_tiles_column_carried(state);
     if (code) return code;
     code = mstmm_pass_column_answered(state);
     if (code) return code;
@@ -4425,28 +4866,33 @@ int mstmm_run_required_slope(mstmm_state *state)
     }
     code = mstmm_pass_forward_slope(state);
     if (code) return code;
-    code = mstmm_pass_efforts_slope(state);
-    if (code) return code;
-    code = mstmm_pass_laws_slope(state);
-    if (code) return code;
     if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_poses_slope(state);
+        code = mstmm_pass_efforts_slope(state);
+        if (code) return code;
+        code = mstmm_pass_laws_slope(state);
+        if (code) return code;
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_poses_slope(state);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product) && model->n_flexible) {
+            code = mstmm_pass_drag_slope(state);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_loads_slope(state);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_forces_slope(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_required_slope(state);
+        if (code) return code;
+    } else {
+        code = mstmm_tiles_required_slope(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product) && model->n_flexible) {
-        code = mstmm_pass_drag_slope(state);
-        if (code) return code;
-    }
-    if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_loads_slope(state);
-        if (code) return code;
-    }
-    if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_forces_slope(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_required_slope(state);
-    if (code) return code;
     return 0;
 }
 
@@ -4495,20 +4941,25 @@ int mstmm_run_tangent(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_tangent_own(state);
-    if (code) return code;
-    code = mstmm_pass_law_slopes(state);
-    if (code) return code;
     if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_loads_by_place(state);
+        code = mstmm_pass_tangent_own(state);
+        if (code) return code;
+        code = mstmm_pass_law_slopes(state);
+        if (code) return code;
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_loads_by_place(state);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_forces_by_place(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_tangent_condense(state);
+        if (code) return code;
+    } else {
+        code = mstmm_tiles_tangent_condense(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product)) {
-        code = mstmm_pass_forces_by_place(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_tangent_condense(state);
-    if (code) return code;
     return 0;
 }
 
@@ -4516,12 +4967,19 @@ int mstmm_run_tangent(mstmm_state *state)
 int mstmm_run_tangent_solution(mstmm_state *state)
 {
     int code;
-    code = mstmm_pass_tangent_column(state);
-    if (code) return code;
-    code = mstmm_hook_unit_load(state);
-    if (code) return code;
-    code = mstmm_pass_tangent_carried(state);
-    if (code) return code;
+    if (state->tangents->unit) {
+        code = mstmm_pass_tangent_column(state);
+        if (code) return code;
+        if (state->tangents->unit) {
+            code = mstmm_hook_unit_load(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_tangent_carried(state);
+        if (code) return code;
+    } else {
+        code = mstmm_tiles_tangent_carried(state);
+        if (code) return code;
+    }
     code = mstmm_pass_tangent_answered(state);
     if (code) return code;
     return 0;
@@ -4531,11 +4989,7 @@ int mstmm_run_tangent_solution(mstmm_state *state)
 int mstmm_run_tangent_beyond(mstmm_state *state)
 {
     int code;
-    code = mstmm_pass_known_column(state);
-    if (code) return code;
-    code = mstmm_pass_known_laws(state);
-    if (code) return code;
-    code = mstmm_pass_known_carried(state);
+    code = mstmm_tiles_known_carried(state);
     if (code) return code;
     code = mstmm_pass_known_answered(state);
     if (code) return code;
@@ -4545,19 +4999,8 @@ int mstmm_run_tangent_beyond(mstmm_state *state)
 /* The mass matrix and the slopes of laws factored, behind inverse dynamics. */
 int mstmm_run_laws_alone(mstmm_state *state)
 {
-    const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_laws_own(state);
-    if (code) return code;
-    if (model->n_laws) {
-        code = mstmm_pass_laws_rates(state);
-        if (code) return code;
-    }
-    if (model->n_laws) {
-        code = mstmm_pass_laws_own_slopes(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_laws_factorise(state);
+    code = mstmm_tiles_laws_factorise(state);
     if (code) return code;
     return 0;
 }
@@ -4565,19 +5008,8 @@ int mstmm_run_laws_alone(mstmm_state *state)
 /* One right-hand side through the mass matrix with laws. */
 int mstmm_run_laws_solution(mstmm_state *state)
 {
-    const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_laws_column(state);
-    if (code) return code;
-    if (state->tangents->shifted && model->n_laws) {
-        code = mstmm_pass_known_laws(state);
-        if (code) return code;
-    }
-    if (state->tangents->shifted && model->n_flexible) {
-        code = mstmm_pass_modes_change(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_laws_column_carried(state);
+    code = mstmm_tiles_laws_column_carried(state);
     if (code) return code;
     code = mstmm_pass_laws_column_answered(state);
     if (code) return code;

@@ -20,6 +20,7 @@ _TRAITS = {
     "turning": "body->turning",
     "moving": "!body->section && speeds", "product": "model->product",
     "shifted": "state->tangents->shifted", "coordinate": "law->kind == 0",
+    "united": "state->tangents->unit",
     "effort": "force->effort",
 }  # fmt: skip
 

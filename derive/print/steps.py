@@ -70,14 +70,14 @@ _SIZES: dict[str, tuple[str, set[str]]] = {
     "nq": ("nq", {"nq"}),
 }
 _INTERPRETED = {
-    "mstmm_hinge_hinge(body->hinge,": "mstmm_hinge_of(state, body,",
-    "mstmm_hinge_hinge_slope(body->hinge_slope,": "mstmm_hinge_slope_of(state, body,",
+    "mstmm_hinge_hinge(body->kernels->hinge,": "mstmm_hinge_of(state, body,",
+    "mstmm_hinge_hinge_slope(body->kernels->hinge_slope,": "mstmm_hinge_slope_of(state, body,",
     **{
-        f"mstmm_hinge_{name}(body->{name},": f"mstmm_hinge_{name}_of(state, body,"
+        f"mstmm_hinge_{name}(body->kernels->{name},": f"mstmm_hinge_{name}_of(state, body,"
         for name in ("rates_by_coordinates", "rates_by_speeds")
     },
 }
-_POINTERS = {"hinge": "body->{}", "body": "body->{}", "law": "law->evaluate{}",
+_POINTERS = {"hinge": "body->kernels->{}", "body": "body->kernels->{}", "law": "law->evaluate{}",
              "force": "force->wrench{}", "link": "at.{}"}  # fmt: skip
 
 

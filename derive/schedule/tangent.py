@@ -434,7 +434,7 @@ TANGENT_SOLUTION = Sweep(
     "One right-hand side through the factored tangent.",
     (
         Run(whole=TANGENT_COLUMN),
-        Run(hook="unit_load"),
+        Run(hook="unit_load", when="united"),
         Run(whole=TANGENT_CARRIED),
         Run(whole=TANGENT_ANSWERED),
     ),

@@ -294,5 +294,6 @@ TRAITS: dict[str, str] = {
     "own_force": "the element is between a body and the ground",
     "posed": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
+    "united": "a load is one in a right-hand side",
     "product": "the product of classical matrices is asked for too",
 }

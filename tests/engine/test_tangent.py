@@ -136,6 +136,12 @@ def test_solution_of_rigid_trees(draw: int, rng: Generator) -> None:
     check_solution(*rigid(rng), rng)
 
 
+@pytest.mark.parametrize("draw", range(6))
+def test_solution_of_trees_of_many_tiles(draw: int, rng: Generator) -> None:
+    """Bodies are begun tile by tile, ahead of what hangs on them in any other tile."""
+    check_solution(*rigid(rng, most=60, loads=draw % 2 == 0), rng)
+
+
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("draw", range(12))
 def test_solution_of_flexible_trees(draw: int, rng: Generator) -> None:
@@ -205,8 +211,8 @@ def test_hinges_without_kernels_for_their_rates(rng: Generator) -> None:
 
     own, record = answers(), model.looped.packed.model
     for i in range(record.n_bodies):
-        record.bodies[i].rates_by_coordinates = model.looped.ffi.NULL
-        record.bodies[i].rates_by_speeds = model.looped.ffi.NULL
+        record.bodies[i].kernels.rates_by_coordinates = model.looped.ffi.NULL
+        record.bodies[i].kernels.rates_by_speeds = model.looped.ffi.NULL
     for found, expected in zip(answers(), own, strict=True):
         assert worst(found, expected) < 1e-13
 

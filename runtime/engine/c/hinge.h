@@ -11,8 +11,8 @@ int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body,
 static inline int mstmm_hinge_of_by(mstmm_state *state, const mstmm_body *body,
                                     struct mstmm_hinge_hinge to)
 {
-    return body->tape ? mstmm_hinge_interpreted(state, body, to)
-                      : mstmm_hinge_hinge_by(body->hinge, to);
+    return body->kernels->tape ? mstmm_hinge_interpreted(state, body, to)
+                      : mstmm_hinge_hinge_by(body->kernels->hinge, to);
 }
 int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
                                   struct mstmm_hinge_hinge_slope to);
@@ -20,8 +20,8 @@ int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
 static inline int mstmm_hinge_slope_of_by(mstmm_state *state, const mstmm_body *body,
                                           struct mstmm_hinge_hinge_slope to)
 {
-    return body->slope_tape ? mstmm_hinge_slope_interpreted(state, body, to)
-                            : mstmm_hinge_hinge_slope_by(body->hinge_slope, to);
+    return body->kernels->slope_tape ? mstmm_hinge_slope_interpreted(state, body, to)
+                            : mstmm_hinge_hinge_slope_by(body->kernels->hinge_slope, to);
 }
 
 /* All derivatives of the rates, by kernels of the hinge's own or one direction at a time. */
@@ -30,15 +30,15 @@ int mstmm_hinge_rates_along(mstmm_state *state, const mstmm_body *body, int of_s
 static inline int mstmm_hinge_rates_by_coordinates_of_by(mstmm_state *state, const mstmm_body *body,
                                                          struct mstmm_hinge_rates_by_coordinates to)
 {
-    return body->rates_by_coordinates
-               ? mstmm_hinge_rates_by_coordinates_by(body->rates_by_coordinates, to)
+    return body->kernels->rates_by_coordinates
+               ? mstmm_hinge_rates_by_coordinates_by(body->kernels->rates_by_coordinates, to)
                : mstmm_hinge_rates_along(state, body, 0, to.J);
 }
 
 static inline int mstmm_hinge_rates_by_speeds_of_by(mstmm_state *state, const mstmm_body *body,
                                                     struct mstmm_hinge_rates_by_speeds to)
 {
-    return body->rates_by_speeds ? mstmm_hinge_rates_by_speeds_by(body->rates_by_speeds, to)
+    return body->kernels->rates_by_speeds ? mstmm_hinge_rates_by_speeds_by(body->kernels->rates_by_speeds, to)
                                  : mstmm_hinge_rates_along(state, body, 1, to.J);
 }
 #define mstmm_hinge_rates_by_coordinates_of(state, body, ...)                                      \

@@ -31,8 +31,8 @@ static int continues(const mstmm_model *model, const mstmm_branch *run, const in
 {
     const mstmm_body *body = &model->bodies[i], *before = body - 1;
     if (body->parent != i - 1) return 0;
-    if (!run->numbers) return !body->link_condense;
-    return body->link_condense == before->link_condense && children[i - 1] == 1 &&
+    if (!run->numbers) return !body->kernels->link_condense;
+    return body->kernels->link_condense == before->kernels->link_condense && children[i - 1] == 1 &&
            body->q == before->q + before->nq && body->u == before->u + before->nu;
 }
 
@@ -41,12 +41,12 @@ static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **
     const mstmm_body *body = &model->bodies[i];
     *run = (mstmm_branch){.first = i, .parent = body->parent, .q = body->q, .u = body->u,
                        .nq = body->nq, .nu = body->nu, .place = -1, .parent_place = -1};
-    if (!body->link_condense) return;
+    if (!body->kernels->link_condense) return;
     run->numbers = numbers + i;
-    run->angle = body->link_angle;
-    run->forward = body->link_forward;
-    run->condense = body->link_condense;
-    run->recover = body->link_recover;
+    run->angle = body->kernels->link_angle;
+    run->forward = body->kernels->link_forward;
+    run->condense = body->kernels->link_condense;
+    run->recover = body->kernels->link_recover;
 }
 
 static int64_t link_size(const mstmm_branch *run)
@@ -96,7 +96,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
     }
     for (int i = 0; i < model->n_bodies; i++) {
         numbers[i] = model->bodies[i].link;
-        if (!gathered || !model->bodies[i].link_condense) continue;
+        if (!gathered || !model->bodies[i].kernels->link_condense) continue;
         real *own = gathered + (int64_t)i * MSTMM_LINK_NUMBERS;
         memcpy(own, numbers[i], MSTMM_LINK_NUMBERS * sizeof(real));
         numbers[i] = own;

@@ -57,7 +57,7 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
                               .delta = block + MSTMM_BLOCK_DELTA, .A = block + MSTMM_BLOCK_A,
                               .f = load, .force = force, .moment = moment);
         if (wanted->loads) {
-            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->held, .f = load,
+            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12, .f = load,
                                    .moment = moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
@@ -85,8 +85,8 @@ static void observe_sums(mstmm_state *state, const mstmm_balance *balance, real 
             mstmm_frames_carried_momentum(.A = a, .x = x, .h = momentum, .p = sums + 4,
                                           .L = sums + 7);
         } else {
-            mstmm_body_inertia(body->inertia, .p = body->body_p, .S = inertia);
-            mstmm_body_energy(body->energy, .p = body->body_p, .v = v, .w = w, .T = &energy);
+            mstmm_body_inertia(body->kernels->inertia, .p = body->body_p, .S = inertia);
+            mstmm_body_energy(body->kernels->energy, .p = body->body_p, .v = v, .w = w, .T = &energy);
             mstmm_frames_momentum(.S = inertia, .A = a, .x = x, .v = v, .w = w, .L = sums + 4,
                                   .K = sums + 7);
         }

@@ -24,7 +24,7 @@ int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body,
     const real *inputs[MSTMM_HINGE_HINGE_INPUTS];
     real *outputs[MSTMM_HINGE_HINGE_OUTPUTS];
     mstmm_hinge_hinge_arrays(to, inputs, outputs);
-    return mstmm_tape_run(body->tape, inputs, mstmm_slots(state), outputs);
+    return mstmm_tape_run(body->kernels->tape, inputs, mstmm_slots(state), outputs);
 }
 
 int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
@@ -33,7 +33,7 @@ int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
     const real *inputs[MSTMM_HINGE_HINGE_SLOPE_INPUTS];
     real *outputs[MSTMM_HINGE_HINGE_SLOPE_OUTPUTS];
     mstmm_hinge_hinge_slope_arrays(to, inputs, outputs);
-    return mstmm_tape_run(body->slope_tape, inputs, mstmm_slots(state), outputs);
+    return mstmm_tape_run(body->kernels->slope_tape, inputs, mstmm_slots(state), outputs);
 }
 
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,

@@ -37,37 +37,43 @@ typedef struct {
     int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_section;
 
+/* What sweeps a body and its inboard hinge; all of one kind share it.  A sweep of many bodies waits
+ * for memory: what they do not share is kept small. */
+typedef struct {
+    void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+    void (*inertia)(void), (*bias_load)(void), (*energy)(void);
+    void (*rates_by_coordinates)(void), (*rates_by_speeds)(void);
+    void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
+    /* NULL: no such connection */
+    void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+    const mstmm_tape *tape;       /* hinge kernel without a compiler, else NULL */
+    const mstmm_tape *slope_tape; /* and its derivative */
+} mstmm_kernels;
+
 /* One body with its inboard hinge, in depth-first order. */
 typedef struct {
     int parent;       /* index of the parent body, -1 for the ground */
     int q, u, nq, nu; /* place and number of coordinates and speeds in the state */
     int block;        /* first number of its block in the workspace */
-    int generic;      /* swept by the hinge kernel and the generic steps */
-    int n_imposed;    /* speeds driven or held until release */
-    const int *imposed_mask; /* per speed: 1 where imposed */
     int release;      /* place in memory that is non-zero once they are free; -1: never */
-    const real *connection; /* Rt (9), ro (3) */
-    /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
-    const real *link;
-    real held[3];     /* the hinge's own P from the origin of the body's frame */
-    const real *hinge_p, *body_p;
-    const real *rotor;       /* reflected inertia per speed */
-    const mstmm_tape *tape;  /* hinge kernel without a compiler, else NULL */
-    const mstmm_tape *slope_tape; /* and its derivative */
-    int straight;     /* the rates of the coordinates are the speeds */
-    int steady;       /* H is the same in every position */
-    int turning;      /* and has turns alone */
+    signed char n_imposed; /* speeds driven or held until release */
+    signed char generic;   /* swept by the hinge kernel and the generic steps */
+    signed char straight;  /* the rates of the coordinates are the speeds */
+    signed char steady;    /* H is the same in every position */
+    signed char turning;   /* and has turns alone */
+    signed char placed; /* loads on it or outboard of it change with its place and nothing else */
+    signed char idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
     int64_t tangent;  /* of its numbers in those of the tangent */
     int64_t place;    /* and of those by place, where it is placed */
-    int placed;       /* loads on it or outboard of it change with its place and nothing else */
-    mstmm_modal *modal;     /* the body is the floating frame of a flexible one; else NULL */
-    mstmm_section *section; /* its connection is a section of a flexible body; else NULL */
-    int idle; /* an end that nothing hangs on or acts on: of interest to observers alone */
-    void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
-    void (*inertia)(void), (*bias_load)(void), (*energy)(void);
-    void (*rates_by_coordinates)(void), (*rates_by_speeds)(void);
-    void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
-    void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+    const mstmm_kernels *kernels;
+    const real *connection; /* Rt (9), ro (3), the frame's origin from the hinge's own P (3) */
+    const real *hinge_p, *body_p;
+    const real *rotor;       /* reflected inertia per speed */
+    const int *imposed_mask; /* per speed: 1 where imposed */
+    mstmm_modal *modal;      /* the body is the floating frame of a flexible one; else NULL */
+    mstmm_section *section;  /* its connection is a section of a flexible body; else NULL */
+    /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    const real *link;
 } mstmm_body;
 
 /* Bodies in a row, each a child of the one before.  With `numbers` they are swept by the kernels of
@@ -137,6 +143,7 @@ typedef struct {
 typedef struct {
     int n_bodies, nq, nu, n_memory;
     int n_flexible; /* bodies with modes */
+    int n_imposed;  /* bodies with speeds that are driven or held */
     const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
     mstmm_body *bodies;
     int n_runs;

@@ -18,8 +18,8 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
     int64_t place = MSTMM_TANGENT_B(0, 0) + MSTMM_PLACE_NUMBERS(0, 0);
     for (int i = 0; i < model->n_bodies; i++) {
         mstmm_body *body = &model->bodies[i];
-        const int known = body->slope_tape || body->hinge_slope;
-        if (!known || !body->bias_load_slope || !body->load_by_motion) return -1 - i;
+        const int known = body->kernels->slope_tape || body->kernels->hinge_slope;
+        if (!known || !body->kernels->bias_load_slope || !body->kernels->load_by_motion) return -1 - i;
         body->tangent = place;
         place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
         if (body->placed) {
@@ -83,7 +83,7 @@ static mstmm_parts parts_of(const mstmm_tangent *at)
 /* Rows of speeds that somebody imposes are no equations. */
 static void without_imposed(const mstmm_model *model, const real *memory, real *rows)
 {
-    for (int i = 0; i < model->n_bodies; i++) {
+    for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         if (!mstmm_imposed(body, memory)) continue;
         for (int j = 0; j < body->nu; j++)
@@ -101,7 +101,7 @@ static real power_of_imposed(const mstmm_state *state, const real *required)
 {
     const mstmm_model *model = state->model;
     real power = 0;
-    for (int i = 0; i < model->n_bodies; i++) {
+    for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         if (!mstmm_imposed(body, state->memory)) continue;
         for (int j = body->u; j < body->u + body->nu; j++)
@@ -284,7 +284,7 @@ static int coupled_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
 
 int mstmm_hook_unit_load(mstmm_state *state)
 {
-    if (state->tangents->unit) *state->tangents->unit = 1;
+    *state->tangents->unit = 1;
     return 0;
 }
 
@@ -430,7 +430,7 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *kno
 /* Coordinates and speeds that somebody imposes do not change, and have no rates of their own. */
 static void without_imposed_coordinates(const mstmm_model *model, const real *memory, real *dq)
 {
-    for (int i = 0; i < model->n_bodies; i++) {
+    for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         if (!mstmm_imposed(body, memory)) continue;
         if (body->n_imposed == body->nu)

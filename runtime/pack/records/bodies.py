@@ -35,7 +35,7 @@ class BodyRecords:
     def __init__(self, system: System, elements: Elements, memory: Memory, lib: Any) -> None:
         self.system, self.elements, self.memory = system, elements, memory
         self.modal = ModalRecords(memory, lib)
-        self._tapes: dict[Key, Any] = {}
+        self._made: dict[tuple[Key, Key, bool], Any] = {}
         self.records = self._filled()
         memory.kept.append(self.records)
         self.blocks, behind = self._blocks(lib)
@@ -67,13 +67,15 @@ class BodyRecords:
 
     def _fill(self, record: Any, body: BodyNumbers, place: int) -> None:
         """Numbers, and the kernels that read them."""
-        record.nq, record.nu, record.held[2] = body.nq, body.nu, -body.height
+        record.nq, record.nu = body.nq, body.nu
         record.straight, record.steady = int(body.straight), int(body.steady)
         record.turning = int(body.turning)
         record.release, record.idle = body.release, int(body.idle)
         record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
         self._numbers(record, body)
-        self._kernels(record, body)
+        unknown = not self.elements[body.hinge].functions.get("condense")
+        generic = unknown or body.section is not None or any(body.imposed) or any(body.rotor)
+        record.generic, record.kernels = int(generic), self._kernels(body, generic)
         if body.modal is not None:
             record.modal = self.modal.add_modal(place, body.modal)
         if body.section is not None:
@@ -87,32 +89,35 @@ class BodyRecords:
             link = (*body.link, *rigid, *(body.hinge_p or (0.0,)))  # every link has room for it
         own = (*body.body_p, *body.body_frame)
         start = self.memory.reals(
-            (*body.connection, *body.rotor, *body.hinge_p, *own, *link, 0.0)  # 0: never empty
+            (*body.connection, 0.0, 0.0, -body.height, *body.rotor, *body.hinge_p, *own, *link)
         )
-        record.connection, record.rotor = start, start + 12
-        record.hinge_p = start = start + (12 + len(body.rotor))
+        record.connection, record.rotor = start, start + 15
+        record.hinge_p = start = start + (15 + len(body.rotor))
         record.body_p = start = start + len(body.hinge_p)
         if link:
             record.link = start + len(own)
 
-    def _kernels(self, record: Any, body: BodyNumbers) -> None:
-        """Functions of the hinge, the body and the link; generic is what only these know."""
-        hinge, rigid = self.elements[body.hinge], self.elements[body.body].functions
+    def _kernels(self, body: BodyNumbers, generic: bool) -> Any:
+        """Functions of the hinge, the body and the link, shared by bodies of one kind."""
+        linked = bool(body.link) and body.body[1] == RIGID and not generic
+        kind = (body.hinge, body.body, linked)
+        if kind not in self._made:
+            self._made[kind] = self._kernels_of(body.hinge, body.body, linked)
+        return self._made[kind]
+
+    def _kernels_of(self, of_hinge: Key, of_body: Key, linked: bool) -> Any:
+        made, none = self.memory.new("mstmm_kernels *"), self.memory.ffi.NULL
+        hinge, rigid = self.elements[of_hinge], self.elements[of_body].functions
         for name in _HINGE:
-            setattr(record, name, hinge.functions.get(name, self.memory.ffi.NULL))
+            setattr(made, name, hinge.functions.get(name, none))
         for name in _BODY:
-            setattr(record, name, rigid[name])
+            setattr(made, name, rigid[name])
         for name in _BODY_SLOPES:
-            setattr(record, name, rigid.get(name, self.memory.ffi.NULL))
+            setattr(made, name, rigid.get(name, none))
         if hinge.tape is not None:
-            if body.hinge not in self._tapes:
-                slope, none = hinge.slope_tape, self.memory.ffi.NULL
-                tapes = self.memory.tape(hinge.tape), slope and self.memory.tape(slope)
-                self._tapes[body.hinge] = tapes[0], tapes[1] or none
-            record.tape, record.slope_tape = self._tapes[body.hinge]
-        unknown = not hinge.functions.get("condense")
-        generic = unknown or body.section is not None or any(body.imposed) or any(body.rotor)
-        record.generic = int(generic)
-        if body.link and body.body[1] == RIGID and not generic:
-            for name, function in self.elements["sweep", f"link_{body.hinge[1]}"].functions.items():
-                setattr(record, f"link_{name}", function)
+            made.tape = self.memory.tape(hinge.tape)
+            made.slope_tape = self.memory.tape(hinge.slope_tape) if hinge.slope_tape else none
+        if linked:
+            for name, function in self.elements["sweep", f"link_{of_hinge[1]}"].functions.items():
+                setattr(made, f"link_{name}", function)
+        return made

@@ -46,6 +46,7 @@ def write(system: System, elements: Elements) -> Written:
     bodies = BodyRecords(system, elements, memory, lib)
     model.bodies, model.n_bodies = bodies.records.array, system.count
     model.n_flexible = len(bodies.modal.modal)
+    model.n_imposed = int(system.rows(lambda body: any(body.imposed)).sum())
     drives = memory.new("mstmm_drive[]", max(1, len(system.driven)))
     for record, (body, k) in zip(drives, system.driven, strict=False):
         record.body, record.coordinate, record.speed = body, k, k

@@ -1,0 +1,113 @@
+"""What a pass reads and writes of a body, asked for from memory before the body is met."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple, dataclass, replace
+from math import prod
+
+from ..schedule.slope import D, ports_of
+from ..schedule.steps import Along, Call, Do, EachSpeed, Pass, Step
+from ..schedule.words import SLOTS
+from .steps import never
+from .storage import BLOCK, PER_SPEED, SHARED, TANGENT, VARIABLES, place, reads, size_of
+
+_NAMED = ("to", "source", "free", "imposed")
+_VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
+#: Steps that few bodies of a scene take part in.
+_RARE = frozenset({"modal", "section", "outward", "placed", "drag", "imposed", "parts"})
+#: Gaps of fewer numbers are as good as none: memory comes in lines of eight.
+_LINE = 8
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Numbers side by side, `begin` to `end` for a hinge of one speed, and as C expressions."""
+
+    variable: str
+    begin: int
+    end: int
+    first: str
+    last: str
+
+
+def fetching(name: str, passes: Iterable[Pass]) -> str:
+    """C of a function that asks for what the passes need of body `index`; "" for nothing."""
+    slots = {slot for whole in passes if whole.subject == "body" for slot in _slots(whole)}
+    stretches = _merged(stretch for slot in slots if (stretch := _stretch(slot)))
+    if not stretches:
+        return ""
+    lines = [f"    mstmm_fetch({one.first}, {one.last});" for one in stretches]
+    used = [word for word in _VARIABLES if any(reads(line, word) for line in lines)]
+    declared = [f"    {VARIABLES[word][0]}" for word in used]
+    given = "const mstmm_state *state, int index, int ahead"
+    return (
+        f"MSTMM_AT_ONCE void mstmm_fetch_{name}({given})\n{{\n"
+        "    const mstmm_body *body = mstmm_coming(state->model, index, ahead);\n"
+        "    if (!body) return;\n" + "\n".join([*declared, *lines]) + "\n}\n"
+    )
+
+
+def _slots(whole: Pass) -> Iterator[str]:
+    for step in whole.steps:
+        yield from _slots_of(step)
+
+
+def _slots_of(step: Step) -> Iterator[str]:
+    if never(step) or any(trait in _RARE and wanted for trait, wanted in step.traits):
+        return
+    if isinstance(step, Do) and step.whole is not None:
+        yield from _slots(step.whole)
+    elif isinstance(step, (EachSpeed, Along)):
+        for part in step.steps:
+            yield from _slots_of(part)
+    elif isinstance(step, Call):
+        yield from ports_of(step).values()
+    else:
+        yield from (str(value) for name, value in vars(step).items() if name in _NAMED)
+
+
+def _stretch(slot: str) -> _Stretch | None:
+    """Where a slot of the body's own lies; None for what lies elsewhere."""
+    name = slot.partition("[")[0]
+    own = name.removeprefix(D)
+    begin = _PLACES.get(SHARED.get(own, own))
+    found = place(name)
+    if begin is None or found is None or own not in SLOTS:
+        return None
+    numbers = prod(int(word) for word in SLOTS[own].size.split() if word.isdigit())
+    variable = next(word for word in ("d_block", "block", "tangent") if reads(found.text, word))
+    last = f"{found.text} + {size_of(own).replace('free', 'nu')}"
+    return _Stretch(variable, begin, begin + numbers, found.text, last)
+
+
+def _merged(stretches: Iterable[_Stretch]) -> list[_Stretch]:
+    """Those with little or nothing between them as one."""
+    found: list[_Stretch] = []
+    for one in sorted(stretches, key=astuple):
+        before = found[-1] if found else None
+        if before is None or before.variable != one.variable or one.begin > before.end + _LINE:
+            found.append(one)
+        elif one.end > before.end:
+            found[-1] = replace(before, end=one.end, last=one.last)
+    return found
+
+
+def _laid(layouts: Iterable[Iterable[tuple[str, int]]]) -> dict[str, int]:
+    """Where each slot begins in its layout, for a hinge of one speed."""
+    found: dict[str, int] = {}
+    for layout in layouts:
+        at = 0
+        for slot, count in layout:
+            found[slot] = at
+            at += count
+    return found
+
+
+_PLACES = _laid(
+    (
+        [(slot, int(SLOTS[slot].size)) for slot in BLOCK]
+        + [(slot, count) for slot, (_, count) in PER_SPEED.items()],
+        [(slot, sum(counts)) for slot, counts in TANGENT.items()],
+    )
+)

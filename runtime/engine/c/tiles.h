@@ -1,0 +1,49 @@
+/* Scenes that the cache does not hold: what is near is used while it is there, what comes is asked
+ * for in time. */
+#ifndef MSTMM_TILES_H
+#define MSTMM_TILES_H
+
+#include "sweep.h"
+
+/* Bodies that are begun and swept at a time.  So far ahead numbers are asked for, and the records
+ * that tell where they are by as much more. */
+#define MSTMM_TILE 8
+
+/* The least of bodies first..end-1 and of their parents. */
+static inline int mstmm_least_parent(const mstmm_model *model, int first, int end)
+{
+    int least = first;
+    for (int i = first; i < end; i++)
+        if (model->bodies[i].parent < least) least = model->bodies[i].parent;
+    return least < 0 ? 0 : least;
+}
+
+/* So many bodies are some 10 MB; numbers of fewer are not asked for, which would only take time. */
+static inline int mstmm_beyond_cache(const mstmm_model *model) { return model->n_bodies >= 4000; }
+
+/* Compilers drop calls of functions that do no more than ask for memory, if they are calls. */
+#ifdef __GNUC__
+#define MSTMM_AT_ONCE __attribute__((always_inline)) static inline
+#else
+#define MSTMM_AT_ONCE static inline
+#endif
+
+MSTMM_AT_ONCE void mstmm_fetch(const void *from, const void *to)
+{
+#ifdef __GNUC__
+    const uintptr_t line = 64;
+    for (uintptr_t at = (uintptr_t)from & ~(line - 1); at < (uintptr_t)to; at += line)
+        __builtin_prefetch((const void *)at);
+#endif
+}
+
+/* The body that will be met `ahead` of body `index`; NULL near the end of the sweep. */
+MSTMM_AT_ONCE const mstmm_body *mstmm_coming(const mstmm_model *model, int index, int ahead)
+{
+    const int near = index + ahead, far = near + ahead;
+    if (far < 0 || far >= model->n_bodies) return NULL;
+    mstmm_fetch(&model->bodies[far], &model->bodies[far] + 1);
+    return &model->bodies[near];
+}
+
+#endif
