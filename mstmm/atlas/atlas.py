@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import SceneError
+from ..errors import EnvironmentFailure, SceneError
 from ..runtime.host.files import replacing
 from . import cases as known
 from .case import Case, measure
@@ -40,13 +40,15 @@ class Atlas:
     def save(self, folder: str | Path, pictures: bool = True) -> list[Path]:
         """`atlas.json`, the page `atlas.md` and, if wanted, a picture of each case; their paths.
 
-        The folder is made if its parent is there.  Raises EnvironmentFailure where nothing can be
-        written.
+        The folder is made, with its parents.  Raises EnvironmentFailure where that cannot be.
         """
         from .page import page
 
         place = Path(folder)
-        place.mkdir(exist_ok=True)
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise EnvironmentFailure(f'folder "{place}" cannot be made: {error.strerror}') from None
         data, text = place / "atlas.json", place / "atlas.md"
         with replacing(data) as temporary:
             temporary.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")

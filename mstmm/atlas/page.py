@@ -11,18 +11,22 @@ HEAD = """\
 
 The atlas of failures, written by `mstmm stability --out DIR`. Every frontier is found in the run,
 by a coarse grid and bisection, and nothing of it is typed in. A method *fails* where what is
-measured is above the limit that its case states, or where there is no answer at all; arrows at the
-upper edge of a picture stand for no answer, or one far beyond the axis. "(end)" says that the
-remedy holds as far as it was tried.
+measured is above its limit, or where there is no answer at all; arrows at the upper edge of a
+picture stand for no answer, or one far beyond the axis, and "tried to" is written where the marks
+of a method end because nobody looked farther. "(end)" says that the remedy holds as far as it was
+tried.
 """
 
-_ROW = "| [{name}](#{name}) | {parameter} | {frontier} | {remedy} | {reach} |"
+_HEADINGS = ("case", "parameter", "measured", "limit", "fails", "remedy", "holds to")
+_ROW = (
+    "| [{name}](#{name}) | {parameter} | {measured} | {limit} | {frontier} | {remedy} | {reach} |"
+)
 
 
 def page(cases: Sequence[Found], pictures: bool) -> str:
     """The whole page; with `pictures`, NAME.png lies beside it for each case."""
     rows = "\n".join(_ROW.format(**_row(case)) for case in cases)
-    head = "| case | parameter | fails | remedy | holds to |\n|---|---|---|---|---|"
+    head = f"| {' | '.join(_HEADINGS)} |\n|{'---|' * len(_HEADINGS)}"
     parts = "\n".join(_part(case, pictures) for case in cases)
     return f"{HEAD}\n{head}\n{rows}\n\n{parts}"
 
@@ -31,6 +35,8 @@ def _row(case: Found) -> dict[str, str]:
     return {
         "name": case.name,
         "parameter": in_unit(case),
+        "measured": case.measured,
+        "limit": limit(case),
         "frontier": frontier(case),
         "remedy": case.remedy,
         "reach": held_to(case),
@@ -56,6 +62,17 @@ def frontier(case: Found) -> str:
     return f"{case.method}, from {number(case.fails_at)} {step}"
 
 
+def limit(case: Found) -> str:
+    """Above what it counts as a failure."""
+    return number(case.limit)
+
+
+def tried_to(case: Found) -> float:
+    """How far the method was tried on the side on which it fails."""
+    ends = [at for at, _ in case.points]
+    return max(ends) if case.fails == "above" else min(ends)
+
+
 def held_to(case: Found) -> str:
     """How far the remedy holds; with a plus where that is only as far as it was tried."""
     return number(case.remedy_holds_to) + (" (end)" if case.remedy_fails_at is None else "")
@@ -74,8 +91,8 @@ def _judged(case: Found) -> str:
     end = case.remedy_fails_at
     beyond = "the end of what is tried" if end is None else f"fails at {number(end, 4)}"
     return (
-        f"- measured: {case.measured}; a failure above {number(case.limit)}\n"
+        f"- measured: {case.measured}; a failure above {limit(case)}\n"
         f"- {case.method}: holds at {number(case.holds_at, 4)}, fails at "
-        f"{number(case.fails_at, 4)}{chance}\n"
+        f"{number(case.fails_at, 4)}{chance}; tried to {number(tried_to(case), 4)}\n"
         f"- {case.remedy}: holds to {number(case.remedy_holds_to, 4)}, {beyond}"
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import SceneError
 from ..extras import missing
 from ..runtime.host.files import replacing
-from .page import number
+from .page import number, tried_to
 
 if TYPE_CHECKING:
     from .found import Found
@@ -37,8 +37,11 @@ _LEAST, _MOST = 1e-17, 1e6
 #: Beyond such a ratio the axis of what is measured is logarithmic.
 _DECADE = 10.0
 
-#: Parts of the axis below and of what is measured, and where arrows stand.
-_FOOT, _FILLED, _ARROWS = 0.05, 0.73, 0.84
+#: Parts of the axis below and of what is measured, where arrows stand, and a word above them.
+_FOOT, _FILLED, _ARROWS, _WORD = 0.05, 0.73, 0.84, 0.865
+
+#: Letters that a line of the legend has room for.
+_LETTERS = 80
 
 
 def draw(case: Found, path: Path | None) -> Any:
@@ -71,10 +74,20 @@ def _fill(axis: Any, case: Found) -> None:
     _curve(axis, case.points, color=_FAILING, marker="o", label=case.method)
     _curve(axis, case.remedy_points, color=_REMEDY, marker="s", label=case.remedy)
     _name_frontier(axis, case.fails_at)
+    if tried_to(case) not in (left, right):
+        _name_end(axis, case)
     axis.set_title(case.title, loc="left", fontsize=10, fontweight="bold")
     axis.set_xlabel(f"{case.parameter} in {case.unit}" if case.unit else case.parameter)
     axis.set_ylabel(case.measured)
-    axis.figure.legend(loc="outside lower center", ncols=2, handlelength=1.6)
+    handles, _ = axis.get_legend_handles_labels()
+    if any(_lost(measured) for _, measured in everything):
+        handles += axis.plot([], [], color="#777777", marker=10, linestyle="none", markersize=5,
+                             label="no answer, or far above")  # fmt: skip
+    wide = sum(len(handle.get_label()) for handle in handles) > _LETTERS
+    axis.figure.legend(
+        handles=handles, loc="outside lower center", ncols=2 if wide else 3, handlelength=1.4,
+        columnspacing=1.2, fontsize=8,
+    )  # fmt: skip
 
 
 def _whole_ticks(axis: Any, left: float, right: float) -> None:
@@ -111,11 +124,31 @@ def _name_frontier(axis: Any, at: float) -> None:
     )  # fmt: skip
 
 
+def _name_end(axis: Any, case: Found) -> None:
+    """That nothing was tried beyond the last mark, above it, or below the end of a curve that
+    falls."""
+    before, last = sorted(case.points, reverse=case.fails == "below")[-2:]
+    at, measured = last
+    lost = _lost(measured)
+    falls = not lost and measured < before[1]
+    axis.annotate(
+        f"tried to {number(at)}", (at, _WORD if lost else max(measured, _LEAST)),
+        xycoords=("data", "axes fraction" if lost else "data"),
+        xytext=(0, -7 if falls else 2 if lost else 7), textcoords="offset points", fontsize=8,
+        color=_FAILING, ha="center", va="top" if falls else "bottom",
+    )  # fmt: skip
+
+
+def _lost(measured: float) -> bool:
+    """Whether there was no answer, or one far beyond the axis."""
+    return not measured <= _MOST
+
+
 def _curve(axis: Any, points: Points, **look: Any) -> None:
     """A line through what was measured; arrows above where there was no answer."""
-    shown = [(at, max(m, _LEAST)) for at, m in points if m <= _MOST]
+    shown = [(at, max(m, _LEAST)) for at, m in points if not _lost(m)]
     axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **look)
-    lost = [at for at, m in points if not m <= _MOST]
+    lost = [at for at, m in points if _lost(m)]
     axis.plot(
         lost, [_ARROWS] * len(lost), transform=axis.get_xaxis_transform(), color=look["color"],
         marker=10, linestyle="none", markersize=5,

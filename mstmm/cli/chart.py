@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
-from mstmm.errors import EnvironmentFailure, MstmmError
 
 from .extras import install, missing
-from .options import Json, output_file, positive, quoted
+from .options import Json, output_folder, positive
 from .progress import Bar, bar
 from .simulate import compiled, use_files
 
@@ -78,7 +76,7 @@ def chart(
     """Chart cost against accuracy: every method over its settings, and which one to take."""
     from . import output
 
-    folder = _folder(out)
+    folder = output_folder(out, "chart.json")
     use_files(hinge or [])
     import mstmm
 
@@ -95,24 +93,6 @@ def chart(
         output.emit_json({**made.to_dict(), "scene": scene, "files": files})
     else:
         _say(made, files)
-
-
-def _folder(text: str) -> Path:
-    """The folder, made, and checked before anything is computed.
-
-    MstmmError for something else of that name, EnvironmentFailure where nothing can be written.
-    """
-    if not text or "\0" in text:
-        raise MstmmError(f"--out: expected the name of a folder, found {quoted(text)}")
-    path = Path(text)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise MstmmError(f"--out {text}: this is not a folder; take another name") from None
-    except OSError as error:
-        raise EnvironmentFailure(f"--out {text}: it cannot be made: {error.strerror}") from None
-    output_file(str(path / "chart.json"), (), "--out")
-    return path
 
 
 def _title(scene: str) -> str:

@@ -135,6 +135,27 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
         ) from None
 
 
+def output_folder(text: str, file: str, option: str = "--out") -> Path:
+    """A folder, made with its parents, in which `file` can be written: before anything is computed.
+
+    Raises MstmmError for something else of that name, EnvironmentFailure where nothing can be
+    written.
+    """
+    if not text or "\0" in text:
+        raise MstmmError(f"{option}: expected the name of a folder, found {quoted(text)}")
+    path = Path(text)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise MstmmError(f"{option} {text}: this is not a folder; take another name") from None
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"{option} {text}: the folder cannot be made ({error.strerror}); take another place"
+        ) from None
+    output_file(str(path / file), (), option)
+    return path
+
+
 def python_file(path: str) -> str:
     """A Python file that is there.  MstmmError for anything else."""
     if not path.endswith(".py"):

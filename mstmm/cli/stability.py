@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mstmm.errors import EnvironmentFailure, MstmmError
-
-from .options import Json, output_file
+from .options import Json, output_folder
 
 if TYPE_CHECKING:
     from mstmm.atlas.atlas import Atlas
@@ -41,7 +38,7 @@ def stability(
     from .extras import install, missing
 
     cases.chosen(case)  # before a folder is made
-    folder, lacking = _folder(out), missing("plot")
+    folder, lacking = output_folder(out, "atlas.json"), missing("plot")
     atlas = _found(case)
     files = atlas.save(folder, pictures=not lacking)
     if json:
@@ -72,23 +69,6 @@ def _list(wanted: list[str] | None, json: bool) -> None:
     output.console().print(output.table("", ("case", "what", "parameter", "remedy"), lines))
 
 
-def _folder(text: str) -> Path:
-    """The folder, made if its parent is there; something can be written in it."""
-    place = Path(text)
-    try:
-        if "\0" in text or not text or (place.exists() and not place.is_dir()):
-            raise MstmmError(f"--out {text}: this is not a folder; take another name")
-        if not place.parent.is_dir():
-            raise MstmmError(f"--out {text}: there is no folder {place.parent}; create it first")
-        place.mkdir(exist_ok=True)
-    except OSError as error:
-        raise EnvironmentFailure(
-            f"--out {text}: the folder cannot be made ({error.strerror}); take another place"
-        ) from None
-    output_file(str(place / "atlas.json"), (), "--out")
-    return place
-
-
 def _found(wanted: list[str] | None) -> Atlas:
     from mstmm.atlas.atlas import stability as measured
 
@@ -104,12 +84,13 @@ def _found(wanted: list[str] | None) -> Atlas:
 
 
 def _tell(atlas: Atlas) -> None:
-    from mstmm.atlas.page import frontier, held_to, in_unit
+    from mstmm.atlas.page import frontier, held_to, in_unit, limit
 
     from . import output
 
-    columns = ("case", "parameter", "fails", "remedy", "holds to>")
+    columns = ("case", "parameter", "fails", "limit>", "remedy", "holds to>")
     rows = [
-        (one.name, in_unit(one), frontier(one), one.remedy, held_to(one)) for one in atlas.cases
+        (one.name, in_unit(one), frontier(one), limit(one), one.remedy, held_to(one))
+        for one in atlas.cases
     ]
     output.console().print(output.table("", columns, rows))

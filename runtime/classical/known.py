@@ -49,15 +49,17 @@ def hinge_kinds(packed: Packed) -> list[tuple[str, Springs | None]]:
     ]
 
 
+_LOADS = "loads are known as gravity and elastic hinges alone"
+
+
 def _refuse_loads(packed: Packed) -> None:
     scene = packed.described
-    for table, elements in (
-        ("load", scene.load), ("spring", scene.spring), ("event", scene.event),
+    for table, elements, why in (
+        ("load", scene.load, _LOADS), ("spring", scene.spring, _LOADS),
+        ("event", scene.event, "its steps neither find events nor act on them"),
     ):  # fmt: skip
         for element in elements:
-            raise refused(
-                f'{table} "{element.name}"', "loads are known as gravity and elastic hinges alone"
-            )
+            raise refused(f'{table} "{element.name}"', why)
     for body in packed.scene.bodies:
         if body.type != "rigid":
             raise refused(f'body "{body.name}"', f"the type {body.type} has no matrix")

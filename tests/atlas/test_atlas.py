@@ -10,7 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.atlas.page import number
-from mstmm.errors import SceneError
+from mstmm.errors import EnvironmentFailure, SceneError
 
 
 @pytest.mark.parametrize(
@@ -64,9 +64,31 @@ def test_a_picture_shows_both_methods_and_the_frontier(atlas: mstmm.Atlas) -> No
     figure = case.plot()
     (axes,) = figure.axes
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    assert labels == [case.method, case.remedy]
+    assert labels == [case.method, case.remedy, "no answer, or far above"]
     assert f"fails at {number(case.fails_at)}" in [text.get_text() for text in axes.texts]
     assert axes.get_title(loc="left") == case.title
+
+
+def test_marks_that_stop_part_way_say_so() -> None:
+    """The method was tried to 1e-3, the remedy a thousand times farther."""
+    (case,) = mstmm.stability(["product-masses"], points=5, tolerance=0.3).cases
+    words = [text.get_text() for text in case.plot().axes[0].texts]
+    assert f"tried to {number(min(at for at, _ in case.points))}" in words
+    assert min(case.remedy_points)[0] < min(case.points)[0]
+
+
+def test_no_word_where_both_were_tried_as_far(atlas: mstmm.Atlas) -> None:
+    case = atlas.cases[0]
+    assert min(case.points)[0] == min(case.remedy_points)[0]
+    words = [text.get_text() for text in case.plot().axes[0].texts]
+    assert not [word for word in words if word.startswith("tried to")]
+
+
+def test_a_folder_is_made_with_its_parents(atlas: mstmm.Atlas, tmp_path: Path) -> None:
+    assert atlas.save(tmp_path / "new" / "folder", pictures=False)[0].exists()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(EnvironmentFailure, match="cannot be made"):
+        atlas.save(tmp_path / "file")
 
 
 def test_a_picture_of_another_kind_is_refused(atlas: mstmm.Atlas, tmp_path: Path) -> None:

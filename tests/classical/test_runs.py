@@ -154,7 +154,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "event": (
         {"body": [_BODY], "hinge": [_PIN], "event": [{"name": "e", "when": "t > 1", "do": "stop"}]},
-        'event "e"',
+        'event "e".*neither find events',
     ),
     "hinge": (
         {"body": [_BODY], "hinge": [_PIN | {"type": "cylindrical"}]},

@@ -9,11 +9,12 @@ from cli.commands import Command
 
 
 def test_a_case_is_measured_told_and_drawn(mstmm: Command, folder: Path) -> None:
-    done = mstmm("stability", "--case", "product-angle", "--out", "found")
+    done = mstmm("stability", "--case", "product-angle", "--out", "new/found")
     assert done.code == 0, done.err
     assert "product-angle" in done.out
     assert "Riccati sweep" in done.out
-    found = sorted(path.name for path in (folder / "found").iterdir())
+    assert "limit" in done.out and "1e-6" in done.out
+    found = sorted(path.name for path in (folder / "new" / "found").iterdir())
     assert found == ["atlas.json", "atlas.md", "product-angle.png"]
 
 
@@ -40,7 +41,7 @@ def test_bad_input_is_told_in_a_line(mstmm: Command, folder: Path) -> None:
     for arguments, says in (
         (("--case", "product-lenght", "--out", "x"), 'did you mean "product-length"'),
         (("--case", "product-angle"), "--out DIR"),
-        (("--out", "no/such"), "there is no folder no"),
+        (("--out", ""), "expected the name of a folder"),
         (("--out", "pendulum.toml"), "not a folder"),
         (("--list", "--case", "none"), "no such case"),
     ):
