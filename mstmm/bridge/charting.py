@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
+from ..defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from ..errors import SceneError
 from ..scene import Scene
 from .compilation import compile_scene
@@ -24,7 +24,7 @@ def chart(
     models: bool = False,
     error: float = CHART_ERROR,
     budget: float = CHART_BUDGET,
-    samples: int = CHART_SAMPLES,
+    samples: int | None = None,
     rounds: int = CHART_ROUNDS,
     engine: str = "auto",
     title: str = "",
@@ -39,13 +39,15 @@ def chart(
         quantities: names such as "rod.tip.position": errors are of this quantity in its unit, of
             several each in parts of its largest excursion; otherwise of all coordinates, or with
             `models` of the places of all bodies and ends, scaled as `reference.scaling` says.
-        methods: names; otherwise every method that `simulate` knows.
+        methods: names, one or more; otherwise every method that `simulate` knows.
         models: also every level of model of the flexible bodies: rigid, one-way, linear and
             stiffened with 1 to n shapes, planar where nothing leaves the plane.  Errors are then
             against the richest level.
         error: for which the cheapest setting is recommended.
         budget: s of the clock that the runs may take; what did not fit in is told.
-        samples: times from 0 to t_end at which errors are looked at; the largest counts.
+        samples: how many even times from 0 to t_end errors are looked at; the largest counts.  By
+            default 101, and up to three times as many beside them where the motion is so fast that
+            a run takes several steps between two.
         rounds: how often the processor times are taken again, all points in turn.
         engine: as in `compile`, for what is compiled here; "auto" is "looped" with `models`, so
             that all levels run alike and no compiler takes the time.
@@ -54,7 +56,8 @@ def chart(
         state: called with the plan of the time, and with what the reference is.
 
     The reference is a run at tight tolerances that agrees with one of another method; its own error
-    is stated, and points below three times that are marked.
+    is stated, and points below three times that are marked.  A fixed step of which `simulate` says
+    that it is too long is never recommended; what else runs warn of goes with their points.
 
     Raises SceneError for arguments that make no sense, NumericalFailure where no reference is found
     within its part of the budget.

@@ -11,7 +11,7 @@ import typer
 from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
 
 from .extras import install, missing
-from .options import Json, output_folder, positive
+from .options import Json, at_least, output_folder, positive
 from .progress import Bar, bar
 from .simulate import compiled, use_files
 
@@ -56,11 +56,14 @@ def chart(
                             "runs may take, s of the clock.")
     ] = CHART_BUDGET,
     samples: Annotated[
-        int, typer.Option("--times", metavar="N", help="Times from 0 to the end at which errors "
-                          "are looked at; the largest counts.")
-    ] = CHART_SAMPLES,
+        int | None,
+        typer.Option("--times", metavar="N", parser=at_least(2), show_default=str(CHART_SAMPLES),
+                     help="Even times from 0 to the end at which errors are looked at; the largest "
+                     "counts. Unless given also more where the motion is fast."),
+    ] = None,
     rounds: Annotated[
-        int, typer.Option("--rounds", metavar="N", help="How often times are taken again.")
+        int, typer.Option("--rounds", metavar="N", parser=at_least(0), help="How often times are "
+                          "taken again.")
     ] = CHART_ROUNDS,
     engine: Annotated[
         str, typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled "
@@ -84,9 +87,9 @@ def chart(
     model = compiled(scene, mstmm.load_scene(scene), engine=alike)
     with bar("charting", moves_alone=False) as shown:
         made = mstmm.chart(
-            model, t_end, quantities=quantity or (), methods=method, models=models, error=error,
-            budget=budget, samples=samples, rounds=rounds, engine=engine, title=_title(scene),
-            progress=_follow(shown, budget), state=output.note,
+            model, t_end, quantities=quantity or (), methods=method or None, models=models,
+            error=error, budget=budget, samples=samples, rounds=rounds, engine=engine,
+            title=_title(scene), progress=_follow(shown, budget), state=output.note,
         )  # fmt: skip
     files = [str(path) for path in made.save(folder)]
     if json:

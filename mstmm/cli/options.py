@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -52,6 +52,21 @@ def not_negative(text: Any) -> float:
     if value < 0:
         raise typer.BadParameter(f"{quoted(text)}: expected 0 or more")
     return value
+
+
+def at_least(least: int) -> Callable[[Any], int]:
+    """A parser of whole numbers from `least` up."""
+
+    def whole(text: Any) -> int:
+        try:
+            value = int(text)
+        except (TypeError, ValueError):
+            raise typer.BadParameter(f"{quoted(text)} is not a whole number") from None
+        if value < least:
+            raise typer.BadParameter(f"{quoted(text)}: expected a whole number, {least} or more")
+        return value
+
+    return whole
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import real, whole
+from mstmm.arrays import Array, real, whole
+from mstmm.defaults import CHART_SAMPLES
 from mstmm.errors import MstmmError, SceneError
 from mstmm.scene import Scene
 
 from ..integrate.steppers import AUTO
 from ..result.measure import Measure
-from .budget import EARLY, SETTINGS, Budget
+from .budget import EARLY, REFERENCE, SETTINGS, Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
 from .families import PROMISING, checked_methods
@@ -26,6 +27,7 @@ from .planar import planar
 from .point import LeftOut, Level, Reference, Setting
 from .rounds import repeated
 from .survey import Curve, Survey, curve
+from .times import even, refined
 from .trial import Runs, Trial, error_of
 
 if TYPE_CHECKING:
@@ -33,10 +35,19 @@ if TYPE_CHECKING:
 
 #: Relative tolerance of the runs, by the choice among methods, for the levels' own errors.
 _TIGHT = 1e-8
+#: Relative tolerance of the run whose steps tell how fast the motion is.
+_SCOUT = 1e-6
+#: Coordinates that change by less than this, in m and rad or of their own size, do not move.
+_STILL = 1e-12
 #: Levels with errors below this many times that tolerance are run as the reference was.
 _GOOD = 1e3
 #: Part of the budget by which the levels' own errors are to be found.
 _LEVELS = 0.45
+#: Why there is but one level.
+_NO_MODELS = (
+    "no models to compare: the scene has no flexible bodies, and no hinge that a motion in a plane "
+    "would make smaller"
+)
 #: The name of the only level of a chart without levels of model.
 AS_GIVEN = "as given"
 
@@ -52,12 +63,13 @@ class Request:
     error: float
     budget: float
     samples: int
+    fixed: bool
     rounds: int
 
 
 def request(
     t_end: float, quantities: Sequence[str], methods: Sequence[str] | None, models: bool,
-    error: float, budget: float, samples: int, rounds: int,
+    error: float, budget: float, samples: int | None, rounds: int,
 ) -> Request:  # fmt: skip
     """SceneError naming the first argument that makes no sense."""
     if isinstance(quantities, str) or isinstance(methods, str):
@@ -66,7 +78,11 @@ def request(
         _above_zero("t_end", t_end, "a time in s"), tuple(quantities), checked_methods(methods),
         bool(models), _above_zero("error", error, "an error"),
         _above_zero("budget", budget, "a time in s"),
-        whole("samples", samples, 2, "a whole number of samples, 2 or more"),
+        whole(
+            "samples", CHART_SAMPLES if samples is None else samples, 2,
+            "a whole number of samples, 2 or more",
+        ),
+        samples is not None,
         whole("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
     )  # fmt: skip
 
@@ -99,8 +115,8 @@ class _Charting:
     ) -> None:  # fmt: skip
         self.model, self.asked, self.compile = model, asked, compile
         self.tell, self.state, self.budget = tell, state, budget
-        times = np.linspace(0.0, asked.t_end, asked.samples)
-        self.runs = Runs(asked.t_end, times, budget)
+        self.times = even(asked.t_end, asked.samples)
+        self.runs = Runs(asked.t_end, self.times.at, budget)
         self.left_out: list[LeftOut] = []
         self.levels: list[Level] = []
 
@@ -112,12 +128,17 @@ class _Charting:
         measure = measure_of(top, start, asked.quantities, asked.models)
         self.state(self.budget.plan(len(asked.methods) * max(1, len(variants))))
         name = variants[-1].name if variants else AS_GIVEN
+        if not asked.fixed:
+            self._refine(top, name)
         best = converged(top, name, measure, self.runs, self.tell)
         reference = Reference(
-            best.error, best.made_by, name, measure.name, measure.unit, measure.scaling
-        )
-        self.state(f"reference by {best.made_by}: its own error is {best.error:.1e}")
+            best.error, best.made_by, name, measure.name, measure.unit, measure.scaling,
+            best.run.ended, _still(best.run.q),
+        )  # fmt: skip
+        self._say(reference)
         curves = self._curves(variants, top, best, measure, reference)
+        if reference.still:
+            curves = []
         survey = Survey(best.run, measure, self.runs, self.tell)
         survey.make([one for one in curves if one.method in PROMISING], EARLY)
         found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
@@ -131,10 +152,29 @@ class _Charting:
             if level.error is not None and level.name != reference.model
         }
         return Chart(
-            title, asked.t_end, asked.samples, reference, judged(points, reference, own),
+            title, asked.t_end, len(self.times.at), reference, judged(points, reference, own),
             tuple(self.levels), (*self.left_out, *found.left_out), asked.error, asked.budget,
-            self.budget.spent,
+            self.budget.spent, self.times.words, top.scene.warnings,
         )  # fmt: skip
+
+    def _refine(self, top: Model, name: str) -> None:
+        """More times where the motion is faster than even ones; none where that takes too long."""
+        self.tell("times at which errors are looked at")
+        setting = Setting(AUTO, name, _SCOUT)
+        steps = self.runs.steps(top, setting, self.budget.share(REFERENCE))
+        if not len(steps):
+            return
+        self.times = refined(even(steps[-1], self.asked.samples), steps)
+        self.runs.times = self.times.at
+
+    def _say(self, reference: Reference) -> None:
+        """What is known once there is a reference."""
+        self.state(f"reference by {reference.made_by}: its own error is {reference.error:.1e}")
+        self.state(f"errors are looked at {self.times.words}")
+        if reference.ended:
+            self.state(f"the runs do not reach {self.asked.t_end:g} s: {reference.ended}")
+        if reference.still:
+            self.state("nothing moves in this scene: there is nothing to compare")
 
     def _top(self, variants: Sequence[Variant]) -> Model:
         """The model of the richest level; with others beside it compiled as they are."""
@@ -153,6 +193,8 @@ class _Charting:
             found = self._level(variant, best, measure)
             if found is not None:
                 models.append((variant.name, *found))
+        if self.asked.models and not others:
+            self.left_out.append(LeftOut("", "", "", _NO_MODELS, True))
         models.append((reference.model, top, None))
         self.levels.append(Level(reference.model, reference.error, top.nu, top.engine))
         return [
@@ -197,3 +239,8 @@ class _Charting:
         tight = replace(best.run.setting, model=level)
         tighter = self.runs.trial(model, tight, measure, limit)
         return run if tighter.numbers is None else tighter
+
+
+def _still(q: Array) -> bool:
+    """Whether no coordinate (n, nq) moves."""
+    return bool((q.max(axis=0) - q.min(axis=0) <= _STILL * np.maximum(1.0, abs(q[0]))).all())

@@ -57,23 +57,28 @@ def converged(model: Model, name: str, measure: Measure, runs: Runs, tell: Tell)
     """
     made: dict[str, list[Trial]] = {}
     reasons: list[str] = []
+    too_short = False
     late: set[str] = set()
     for method, tolerances in CANDIDATES.items():
         if family(method) in late:
             reasons.append(f"{method}: left out, for its family takes too long")
             continue
         found, why, slow = _tightening(model, name, method, tolerances, measure, runs, tell)
+        too_short |= slow
         if why:
             reasons.append(f"{method}: {why}")
-        if slow:
+        if slow and len(found) < 2:
             late.add(family(method))
         if len(found) > 1:
             made[method] = found
     if not made:
+        why = "; ".join(reasons)
+        if not too_short:
+            raise NumericalFailure(f"no reference was found: {why}")
         raise NumericalFailure(
-            "no reference was found within its part of the budget: " + "; ".join(reasons)
-            + "; give more --budget, or end earlier"
-        )  # fmt: skip
+            f"no reference was found within its part of the budget: {why}; give more budget, or "
+            "end earlier"
+        )
     return _best(made, measure)
 
 
@@ -81,17 +86,18 @@ def _tightening(
     model: Model, name: str, method: str, tolerances: Sequence[float], measure: Measure,
     runs: Runs, tell: Tell,
 ) -> tuple[list[Trial], str, bool]:  # fmt: skip
-    """Runs that ended well, loose to tight; why there are no tighter ones; whether it was slow."""
+    """Runs that ended well, loose to tight; why there are no tighter ones; whether that was for
+    want of time."""
     found: list[Trial] = []
     for tolerance in tolerances:
         setting = Setting(method, name, tolerance)
         limit = _limit(runs.budget)
         if found and _GROWTH * found[-1].cpu_s > limit:
-            return found, f"{setting} would take too long", not found[1:]
+            return found, f"{setting} would take too long", True
         tell(f"reference by {method}, {setting}")
         trial = runs.trial(model, setting, measure, limit)
         if trial.numbers is None:
-            return found, f"{setting}: {trial.failure}", trial.late and not found[1:]
+            return found, f"{setting}: {trial.failure}", trial.late
         found.append(trial)
     return found, "", False
 

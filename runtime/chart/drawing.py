@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 
 from .families import FAMILIES, family
 from .front import front
@@ -28,10 +29,12 @@ _PLANE, _LETTER = (450.0, 370.0), (5.3, 11.0)
 _BARS = 14.0
 #: A word is not said again nearer than this, in points.
 _AGAIN = 170.0
-#: Where a label may stand beside its point, in points to the right and down.
+#: Letters of a row of the legend.
+_ROW = 30
+#: Where a label may stand, in points to the right of its point and below it: there nothing else is.
 _BESIDE = (
-    (0, 15), (0, -13), (24, 15), (8, 26), (-30, 15), (-30, -13), (24, -13), (30, 28), (-50, 28),
-    (0, -26),
+    (0, 15), (24, 15), (-24, 15), (8, 26), (-30, 26), (34, 24), (-16, 36), (24, 36), (-50, 28),
+    (0, 46),
 )  # fmt: skip
 
 
@@ -57,7 +60,7 @@ class Label:
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the legend: a heading without a look, or a name with one."""
+    """A line of the legend: a name with a look; without one a heading, or a remark, not strong."""
 
     text: str
     look: Look | None = None
@@ -80,6 +83,7 @@ class Drawing:
     x_label: str
     y_label: str = "CPU time of the whole call"
     beyond: int = 0
+    empty: str = ""  # why there is nothing to show
     own: list[tuple[float, str, str]] = field(default_factory=list)  # levels' errors: x, colour
 
 
@@ -102,16 +106,35 @@ def drawing(chart: ChartRecord) -> Drawing:
         x, y, lines, steps, math.log10(reference.floor) if reference.floor > 0 else -math.inf,
         _labels(steps, words, x, y), _legend(lines, chart.points, levels),
         chart.title or "cost against accuracy",
-        f"{chart.t_end:g} s of motion; reference: {reference.made_by}, its own error "
-        f"{reference.error:.1e}" + ("" if shown else "; no point has an error above zero"),
+        _below(chart),
         f"largest error of {reference.measure}{unit}" + ("" if unit else " (scaled)"),
-        beyond=len(shown) - len(kept),
+        beyond=len(shown) - len(kept), empty=_empty(chart, shown),
         own=[
             (math.log10(level.error), colours[level.name], level.name)
             for level in chart.levels
             if several and level.error and level.name != reference.model
         ],
     )  # fmt: skip
+
+
+def _below(chart: ChartRecord) -> str:
+    """What stands below the title."""
+    reference = chart.reference
+    until = f", {reference.ended}" if reference.ended else ""
+    return (
+        f"{chart.t_end:g} s of motion{until}; reference: {reference.made_by}, its own error "
+        f"{reference.error:.1e}"
+    )
+
+
+def _empty(chart: ChartRecord, shown: Sequence[Point]) -> str:
+    """Why there is nothing to show; "" where there is."""
+    if shown:
+        return ""
+    if chart.reference.still:
+        return "nothing moves in this scene"
+    errors = [point.error for point in chart.points if point.error is not None]
+    return "no run has an error above zero" if errors else "no run came to its end"
 
 
 def place(point: Point) -> Place | None:
@@ -138,7 +161,7 @@ def _limits(shown: Sequence[Point], placed: dict[int, Place], floor: float) -> t
         largest, least = largest + 0.5, least - 0.5
     return (
         (largest + _MARGIN, least - _MARGIN),
-        (min(times) - 2 * _MARGIN, max(times) + _MARGIN),
+        (min(times) - 3 * _MARGIN, max(times) + _MARGIN),
     )
 
 
@@ -158,10 +181,14 @@ def _by_method(
 def _by_level(
     points: Sequence[Point], placed: dict[int, Place], levels: Sequence[str], chart: ChartRecord
 ) -> list[Line]:
-    """For every level of model its own front, joined, before the rest of its points."""
+    """For every level of model its own front, joined, before the rest of its points, which are
+    joined by their methods."""
     colours, found = of_levels(levels), []
     own_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.levels}
     own_errors[chart.reference.model] = 0.0
+    for curve in dict.fromkeys(p.curve for p in points):
+        path = tuple((placed[id(p)], p) for p in points if p.curve == curve)
+        found.append(Line(curve[0], Look(colours[curve[0]], ""), path, True, False))
     for strong in (False, True):
         for level in levels:
             own = [p for p in points if p.model == level]
@@ -231,13 +258,14 @@ def _legend(lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str
         colours = of_levels(levels)
         found = [Entry("level of model")]
         found += [Entry(level, Look(colours[level], "s")) for level in levels]
-        families = dict.fromkeys(map(family, _ordered(p.method for p in points)))
-        marks = {family(p.method): mark_of(p.method) for p in points}
-        return [
-            *found, Entry("methods"),
-            *(Entry(name, Look("#555555", marks[name])) for name in families),
-            Entry("bars below: errors of levels"),
-        ]  # fmt: skip
+        found.append(Entry("methods"))
+        methods = _ordered(p.method for p in points)
+        for name in dict.fromkeys(map(family, methods)):
+            own = [method for method in methods if family(method) == name]
+            found.append(Entry(name, Look("#555555", mark_of(own[0]))))
+            if own != [name]:
+                found += [Entry(row, None, False) for row in wrap(", ".join(own), _ROW)]
+        return [*found, Entry("bars below: errors of levels", None, False)]
     found = []
     known = {line.name: line for line in lines}
     for method in (m for m in _ordered(p.method for p in points) if m in known):

@@ -34,12 +34,19 @@ def every_method() -> tuple[str, ...]:
 
 
 def checked_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
-    """These methods, once each, or all.  SceneError, with the nearest name, for an unknown one."""
+    """These methods, once each, or all for None.
+
+    SceneError for none at all, and, with the nearest name, for an unknown one.
+    """
     known = every_method()
-    for name in methods or ():
+    if methods is None:
+        return known
+    for name in methods:
         if name not in known:
             raise SceneError(f"method {name!r} is not known{near(str(name), known)}")
-    return tuple(dict.fromkeys(methods)) if methods else known
+    if not len(methods):
+        raise SceneError("methods = []: expected one name or more; leave it out for all methods")
+    return tuple(dict.fromkeys(methods))
 
 
 def family(method: str) -> str:

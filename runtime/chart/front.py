@@ -1,7 +1,8 @@
 """Which points count: sure errors, Pareto's front, and the cheapest for an error.
 
 Pareto's front is of (sure error, processor time): a point is on it if no other is as accurate and
-as cheap, and better in one of the two.
+as cheap, and better in one of the two.  Runs whose step is longer than the motion needs have no
+place on it.
 """
 
 from __future__ import annotations
@@ -9,9 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from mstmm.arrays import real
 from mstmm.errors import NumericalFailure, SceneError
 
 from .point import Point, Reference
+
+#: What `recommended` expects.
+_ERROR = "a number above 0"
 
 
 def judged(
@@ -43,7 +48,11 @@ def front(points: Iterable[Point], floor: float = 0.0) -> tuple[Point, ...]:
     """Pareto's front, cheapest first; below `floor` no two errors can be told apart."""
     best: list[Point] = []
     for point in sorted(
-        (p for p in points if p.sure_error is not None and p.cpu_s is not None),
+        (
+            p
+            for p in points
+            if p.sure_error is not None and p.cpu_s is not None and not p.too_coarse
+        ),
         key=lambda p: (p.cpu_s, _sure(p, floor)),
     ):
         if not best or _sure(point, floor) < _sure(best[-1], floor):
@@ -56,14 +65,19 @@ def _sure(point: Point, floor: float) -> float:
     return max(point.sure_error, floor)
 
 
-def recommended(points: Iterable[Point], error: float, reference: Reference) -> Point:
+def recommended(points: Sequence[Point], error: float, reference: Reference) -> Point:
     """The cheapest point that errs by at most `error`, as all tighter settings of its curve do.
 
-    SceneError for an error that is not above 0, NumericalFailure where the reference cannot judge
-    so small an error, or no point meets it.
+    SceneError for an error that is not a number above 0, NumericalFailure where nothing moves, the
+    reference cannot judge so small an error, or no point meets it.
     """
-    if not error > 0:
-        raise SceneError(f"error = {error!r}: expected a number above 0")
+    if not real("error", error, _ERROR) > 0:
+        raise SceneError(f"error = {error!r}: expected {_ERROR}")
+    if reference.still:
+        raise NumericalFailure(
+            "nothing moves in this scene: every setting gives the same, so that there is nothing "
+            "to choose"
+        )
     if error < reference.floor:
         raise NumericalFailure(
             f"the reference itself errs by up to {reference.error:.1e}: it cannot judge errors "
@@ -74,4 +88,6 @@ def recommended(points: Iterable[Point], error: float, reference: Reference) -> 
         if point.sure_error is not None and point.sure_error <= error:
             return point
     best = f"; the best that ran errs by {found[-1].sure_error:.1e}" if found else ""
+    if any(p.too_coarse and p.sure_error is not None and p.sure_error <= error for p in points):
+        best += "; those that err less have steps longer than the fastest motion allows"
     raise NumericalFailure(f"no setting errs by at most {error:.1e}{best}")

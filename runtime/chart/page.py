@@ -30,6 +30,7 @@ p { margin: .3rem 0; } .soft { color: var(--soft); font-size: .92rem; }
 .keys li { break-inside: avoid; white-space: nowrap; }
 .keys .head { font-weight: 600; margin-top: .2rem; break-after: avoid; }
 .keys svg { width: 1em; height: 1em; vertical-align: -.1em; margin-right: .35em; }
+.keys .note { color: var(--soft); padding-left: 1.35em; white-space: normal; }
 .keys .faint { color: var(--soft); }
 .grid { stroke: #e6e6e6; stroke-width: .8; } .axis { stroke: #555; fill: none; }
 .beyond { fill: #f1f1f1; } .tick { fill: #333; } .mid { text-anchor: middle; }
@@ -66,6 +67,7 @@ def page(chart: ChartRecord) -> str:
         f'<p class="soft">Reference: {escape(reference.made_by)}. Its own error is '
         f"{reference.error:.1e}; errors below {reference.floor:.1e} may be its own. Scaling: "
         f"{escape(printable(reference.scaling))}.</p>",
+        *(f"<p>{escape(printable(text))}</p>" for text in _of_scene(chart)),
         '<div class="chart"><div class="plane">', svg(made, keys), "</div>",
         _legend(made.legend, keys), "</div>",
     ]  # fmt: skip
@@ -99,10 +101,19 @@ def _how(chart: ChartRecord) -> str:
     unit = "" if chart.reference.unit == "1" else f" in {chart.reference.unit}"
     return (
         f"{chart.t_end:g} s of motion. Errors: the largest of {printable(chart.reference.measure)}"
-        f"{unit} over {chart.samples} times. Times: processor time of the whole call of simulate, "
-        f"the least of several. Made in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
+        f"{unit} over {chart.looked}. Times: processor time of the whole call of simulate, the "
+        f"least of several. Made in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
         "Rest the pointer on a point, or on a name of the legend."
     )
+
+
+def _of_scene(chart: ChartRecord) -> list[str]:
+    """What holds for all runs: that they end early, that nothing moves, what the scene warns of."""
+    ended = chart.reference.ended
+    found = [f"The runs do not reach {chart.t_end:g} s: {ended}."] if ended else []
+    if chart.reference.still:
+        found.append("Nothing moves in this scene: there is nothing to compare.")
+    return [*found, *(f"The scene warns: {text}" for text in chart.warnings)]
 
 
 def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
@@ -110,7 +121,7 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
     for entry in entries:
         text = escape(printable(entry.text))
         if entry.look is None:
-            items.append(f'<li class="head">{text}</li>')
+            items.append(f'<li class="{"head" if entry.strong else "note"}">{text}</li>')
             continue
         key = f" e{keys[entry.text]}" if entry.text in keys else ""
         shape = mark(entry.look, 7, 7, 5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from mstmm.errors import SceneError
@@ -20,6 +21,9 @@ _STYLE: dict[str, Any] = {
     "grid.color": "#e6e6e6", "grid.linewidth": 0.6, "axes.axisbelow": True,
     "axes.edgecolor": "#555555", "savefig.dpi": 150,
 }  # fmt: skip
+
+#: Letters of a line below the title.
+_LETTERS = 150
 
 #: Inches: the figure, and how high a line of the legend is.
 _WIDTH, _HEIGHT, _ROW = 9.4, 5.9, 0.155
@@ -45,19 +49,25 @@ def plot(chart: ChartRecord, path: Path | None) -> Any:
     style: Any = _STYLE
     with mpl.rc_context(style):
         figure = Figure(figsize=(_WIDTH, height))
-        axes = figure.add_axes((0.085, 0.62 / height, 0.675, 1 - 1.28 / height))
+        axes = figure.add_axes((0.085, 0.62 / height, 0.675, 1 - 1.36 / height))
         _draw(axes, made)
         _legend(figure, made.legend, height)
         figure.text(0.085, 1 - 0.1 / height, printable(made.title), fontsize=12, va="top",
                     weight="bold", parse_math=False)  # fmt: skip
-        figure.text(0.085, 1 - 0.36 / height, printable(made.below), fontsize=8, va="top",
-                    color="#555555", parse_math=False)  # fmt: skip
+        for i, line in enumerate(wrap(printable(made.below), _LETTERS)):
+            figure.text(0.085, 1 - (0.34 + 0.15 * i) / height, line, fontsize=8, va="top",
+                        color="#555555", parse_math=False)  # fmt: skip
         if path is not None:
             _write(figure, path)
     return figure
 
 
 def _draw(axes: Any, made: Drawing) -> None:
+    if made.empty:
+        axes.set_axis_off()
+        axes.text(0.5, 0.5, made.empty, fontsize=11, ha="center", color="#555555",
+                  transform=axes.transAxes)  # fmt: skip
+        return
     right = made.x[1]
     if made.floor > right:
         axes.axvspan(made.floor, right, color="#f1f1f1", zorder=0)
@@ -101,7 +111,9 @@ def _legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
     for i, entry in enumerate(entries):
         y = 1 - (0.70 + _ROW * i) / height
         if entry.look is None:
-            figure.text(0.785, y, entry.text, fontsize=8, weight="bold", va="center")
+            look: dict[str, Any] = {"weight": "bold"} if entry.strong else {"color": "#666666"}
+            figure.text(0.785 if entry.strong else 0.826, y, printable(entry.text), va="center",
+                        fontsize=8 if entry.strong else 7, parse_math=False, **look)  # fmt: skip
             continue
         from matplotlib.lines import Line2D
 

@@ -48,6 +48,9 @@ class Point:
         limited: the error is so small that it may be the reference's own.
         sure_error: the largest error of this setting and all tighter ones of its curve, so that a
             lucky hit is not taken for accuracy.
+        warnings: what the run itself warns of.
+        too_coarse: among that, that its fixed step is longer than the fastest motion needs: such a
+            run is not to be trusted however near it came, and never recommended.
     """
 
     setting: Setting
@@ -60,6 +63,8 @@ class Point:
     failure: str = ""
     limited: bool = False
     sure_error: float | None = None
+    warnings: tuple[str, ...] = ()
+    too_coarse: bool = False
 
     @property
     def method(self) -> str:
@@ -84,6 +89,7 @@ class Point:
             "repeats": self.repeats, "evaluations": self.evaluations,
             "factorizations": self.factorizations, "steps": self.steps,
             "limited_by_reference": self.limited, "failure": self.failure or None,
+            "warnings": list(self.warnings), "too_coarse": self.too_coarse,
         }  # fmt: skip
 
 
@@ -139,6 +145,8 @@ class Reference:
         made_by: the runs that were compared, in words.
         model: its level of model.
         measure, unit, scaling: what is compared, in which unit, and what it is divided by.
+        ended: which event ended its run, and when; "" where none did.
+        still: nothing moves in it.
     """
 
     error: float
@@ -147,6 +155,8 @@ class Reference:
     measure: str
     unit: str
     scaling: str
+    ended: str = ""
+    still: bool = False
 
     @property
     def floor(self) -> float:
@@ -158,4 +168,5 @@ class Reference:
         return {
             "error": self.error, "made_by": self.made_by, "model": self.model,
             "measure": self.measure, "unit": self.unit, "scaling": self.scaling,
+            "ended": self.ended or None, "still": self.still,
         }  # fmt: skip

@@ -29,6 +29,8 @@ class ChartRecord:
         left_out: methods and levels that were refused, settings that were not run, and why.
         wanted: the error for which a setting was asked.
         budget, spent: s of the clock.
+        looked: how the times lie at which errors were looked at, in words.
+        warnings: what the scene itself warns of, whatever the method.
     """
 
     title: str
@@ -41,6 +43,8 @@ class ChartRecord:
     wanted: float
     budget: float
     spent: float
+    looked: str = ""
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def front(self) -> tuple[Point, ...]:
@@ -75,7 +79,7 @@ class ChartRecord:
         except MstmmError as error:
             why = str(error)
         return {
-            "scene": self.title, "t_end": self.t_end, "samples": self.samples,
+            "scene": self.title, "t_end": self.t_end, "samples": self.samples, "times": self.looked,
             "reference": self.reference.to_dict(),
             "points": [point.to_dict() for point in self.points],
             "front": [point.to_dict() for point in self.front],
@@ -83,7 +87,7 @@ class ChartRecord:
             "advice": [{"asked": e, **point.to_dict()} for e, point in self.advice()],
             "models": [level.to_dict() for level in self.levels],
             "left_out": [one.to_dict() for one in self.left_out],
-            "budget_s": self.budget, "spent_s": self.spent,
+            "warnings": list(self.warnings), "budget_s": self.budget, "spent_s": self.spent,
         }  # fmt: skip
 
     def to_json(self) -> str:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _GROWTH, _MOST, _LEAST = 2.0, 10.0, 1.0
 
 #: Processor time (s) beside which the loading of a method does not count.
-_LOADING = 0.1
+_LOADING = 1.0
 
 #: Why a curve ends before its last setting.
 _NO_TIME = "it would have taken more than its part of the time left"
@@ -145,4 +145,5 @@ def point_of(trial: Trial, reference: Trial, measure: Measure) -> Point:
         trial.setting, error, trial.cpu_s, 1,
         None if counts is None else counts.evaluations, factorizations(trial.setting, counts),
         None if counts is None else counts.steps,
+        warnings=trial.warnings, too_coarse=trial.too_coarse,
     )  # fmt: skip

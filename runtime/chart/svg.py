@@ -8,7 +8,7 @@ from html import escape
 from .drawing import Drawing, Line, Place, decades, time_text
 from .looks import MARKS, Look
 from .point import Point
-from .tables import time_of
+from .tables import notes, time_of
 
 #: The plane within its box, in units of the picture; room at the left, below, above, at the right.
 WIDTH, HEIGHT = 760.0, 520.0
@@ -35,6 +35,11 @@ class Plane:
 def svg(made: Drawing, keys: dict[str, int]) -> str:
     """The plane; lines of name `n` have the class `k` + keys[n]."""
     plane = Plane(made)
+    if made.empty:
+        return (
+            f'<svg viewBox="0 0 {WIDTH:g} 60" role="img" aria-label="{escape(made.empty)}">'
+            f'<text class="tick mid" x="{WIDTH / 2:g}" y="34">{escape(made.empty)}</text></svg>'
+        )
     parts = [
         f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         f'aria-label="{escape(made.y_label)} over {escape(made.x_label)}">',
@@ -84,10 +89,10 @@ def words(point: Point) -> str:
         )
         if count
     ]  # fmt: skip
-    limited = "\nnot more than the reference's own error" if point.limited else ""
+    said = "".join(f"\n{note}" for note in notes(point))
     return (
-        f"{point.method}, {point.setting}\n{point.model}\nerror {point.error:.2e}{limited}\n"
-        f"{time_of(point.cpu_s)} CPU, least of {point.repeats}\n{', '.join(counts)}"
+        f"{point.method}, {point.setting}\n{point.model}\nerror {point.error:.2e}\n"
+        f"{time_of(point.cpu_s)} CPU, least of {point.repeats}\n{', '.join(counts)}{said}"
     )
 
 

@@ -6,8 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from mstmm.errors import MstmmError
 
-from .point import LeftOut
+from .point import LeftOut, Point
 from .record import ChartRecord
+
+#: Of a point whose error may be the reference's own.
+LIMITED = "not more than the reference's own error"
 
 #: Headings, the columns that hold numbers, rows.
 Table = tuple[Sequence[str], Sequence[int], Sequence[Sequence[str]]]
@@ -21,20 +24,24 @@ def recommendation(chart: ChartRecord) -> str:
     except MstmmError as problem:
         return f"{asked}: nothing to recommend, {problem}"
     level = f" on the model {best.model}" if len(chart.levels) > 1 else ""
+    warned = "".join(f"; it warns: {text}" for text in best.warnings)
     return (
         f"{asked}: {best.method}, {best.setting}{level}, {time_of(best.cpu_s or 0.0)} CPU, error "
-        f"{best.error:.1e}"
+        f"{best.error:.1e}{warned}"
     )
 
 
 def advice(chart: ChartRecord) -> Table:
     """The cheapest setting for every power of ten that one meets."""
-    head = ("error asked", "method", "setting", "model", "CPU time", "error")
+    head = ("error asked", "method", "setting", "model", "CPU time", "error", "warnings")
     rows = [
-        (f"{e:.0e}", p.method, str(p.setting), p.model, time_of(p.cpu_s or 0.0), f"{p.error:.1e}")
+        (
+            f"{e:.0e}", p.method, str(p.setting), p.model, time_of(p.cpu_s or 0.0),
+            f"{p.error:.1e}", str(len(p.warnings) or ""),
+        )
         for e, p in chart.advice()
-    ]
-    return head, (0, 4, 5), rows
+    ]  # fmt: skip
+    return head, (0, 4, 5, 6), rows
 
 
 def levels(chart: ChartRecord) -> Table:
@@ -61,11 +68,17 @@ def points(chart: ChartRecord) -> Table:
             p.model, p.method, str(p.setting), "" if p.error is None else f"{p.error:.2e}",
             "" if p.cpu_s is None else time_of(p.cpu_s), str(p.repeats or ""), _count(p.steps),
             _count(p.evaluations), _count(p.factorizations),
-            p.failure or ("limited by the reference" if p.limited else ""),
+            p.failure or "; ".join(notes(p)),
         )
         for p in chart.points
     ]  # fmt: skip
     return head, (3, 4, 5, 6, 7, 8), rows
+
+
+def notes(point: Point) -> list[str]:
+    """What is to be said of a run beside its numbers."""
+    found = [LIMITED] if point.limited else []
+    return [*found, *(f"warns: {text}" for text in point.warnings)]
 
 
 def told(entries: Iterable[LeftOut], refused: bool, most: int = 1000) -> list[str]:

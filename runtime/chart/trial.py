@@ -12,6 +12,7 @@ from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
 from ..host.interruptible import interruptible
+from ..integrate.loop import Status
 from ..result.measure import Measure
 from ..result.one_way.result import OneWayResult
 from ..run import second_opinion
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from ..integrate.loop import Statistics
     from ..model.model import Model
     from ..result.result import Result
+
+#: Runs that an event ends part by at most this part of their time.
+_APART = 0.01
 
 #: Longest sentence of a reason.
 _LONGEST = 300
@@ -38,6 +42,9 @@ class Trial:
         q: (n, nq) coordinates there.
         numbers: (n, k) of the measure there; None where there are none.
         statistics: counts.
+        ended: which event ended the run, and when; "" where none did.
+        warnings: what the run itself warns of, apart from what the scene does.
+        too_coarse: its fixed step is longer than the motion needs; see `run.stability`.
         failure: why there are no numbers.
         refused: the scene or the machine does not allow the method.
         late: it was ended because it took too long.
@@ -49,6 +56,9 @@ class Trial:
     q: Array = field(default_factory=lambda: np.zeros((0, 0)))
     numbers: Array | None = None
     statistics: Statistics | None = None
+    ended: str = ""
+    warnings: tuple[str, ...] = ()
+    too_coarse: bool = False
     failure: str = ""
     refused: bool = False
     late: bool = False
@@ -58,18 +68,29 @@ class Runs:
     """Makes runs of models to `t_end` (s), sampled at `times` (s)."""
 
     def __init__(self, t_end: float, times: Array, budget: Budget) -> None:
-        self.t_end, self.times, self.budget = t_end, tuple(times.tolist()), budget
+        self.t_end, self.times, self.budget = t_end, times, budget
 
-    def simulate(self, model: Model, setting: Setting, limit: float) -> tuple[Result, float]:
-        """The result and the processor time of the call, s.
+    def steps(self, model: Model, setting: Setting, limit: float) -> Array:
+        """Times (n,) of the steps that a run takes, s, up to its end; none where it fails."""
+        try:
+            result, _ = self.simulate(model, setting, limit, own_steps=True)
+        except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
+            return np.zeros(0)
+        return result.t if result.success else np.zeros(0)
+
+    def simulate(
+        self, model: Model, setting: Setting, limit: float, own_steps: bool = False
+    ) -> tuple[Result, float]:
+        """The result and the processor time of the call, s; sampled at every step if asked.
 
         OutOfTime after `limit` s of the clock, KeyboardInterrupt after an interrupt.
         """
+        times = None if own_steps else self.times
         alarm = self.budget.alarm(limit)
         with interruptible() as interrupted:  # short runs end before they look at it
             begin = time.process_time()
             result = model.simulate(
-                self.t_end, output_times=self.times, progress=alarm, **setting.options
+                self.t_end, output_times=times, progress=alarm, **setting.options
             )
             if isinstance(result, OneWayResult) and result.success:
                 _ = result.cost  # makes the elastic response, which is part of what it is for
@@ -100,7 +121,23 @@ class Runs:
             return without(str(error))
         if not np.isfinite(numbers).all():
             return without("not all of its numbers are finite")
-        return Trial(setting, spent, result.t, result.q, numbers, result.statistics)
+        warnings, too_coarse = _told(result)
+        ended = result.message if result.status is Status.STOPPED else ""
+        return Trial(
+            setting, spent, result.t, result.q, numbers, result.statistics, ended, warnings,
+            too_coarse,
+        )  # fmt: skip
+
+
+def _told(result: Result) -> tuple[tuple[str, ...], bool]:
+    """What a run warns of beyond what its scene does, and whether its step is too long."""
+    try:
+        found, step = result.warnings, result.certificate.step
+    except MstmmError as error:  # quantities that no sample gives
+        return (_short(str(error)),), False
+    of_scene = result.model.scene.warnings
+    own = tuple(_short(text) for text in found if text not in of_scene)
+    return own, step is not None and step.warning is not None
 
 
 def factorizations(setting: Setting, statistics: Statistics | None) -> int | None:
@@ -113,11 +150,14 @@ def factorizations(setting: Setting, statistics: Statistics | None) -> int | Non
 def error_of(trial: Trial, reference: Trial, measure: Measure) -> float | str:
     """Largest error over the samples that both reached, or why there is none.
 
-    Runs that an event stops may part by one sample.
+    Runs that an event stops may part by a sample, or by a hundredth of their time.
     """
     assert trial.numbers is not None and reference.numbers is not None
     n = min(len(trial.t), len(reference.t))
-    if abs(len(trial.t) - len(reference.t)) > 1 or not n:
+    if not n or (
+        abs(len(trial.t) - len(reference.t)) > 1
+        and abs(trial.t[-1] - reference.t[-1]) > _APART * reference.t[-1]
+    ):
         at = [f"{run.t[-1]:.6g} s" if len(run.t) else "the start" for run in (trial, reference)]
         return f"it ended at {at[0]}, the reference at {at[1]}"
     return float(measure.apart(trial.numbers[:n], reference.numbers[:n]).max())

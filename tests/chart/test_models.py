@@ -169,3 +169,5 @@ def test_a_scene_of_rigid_bodies_has_one_level() -> None:
         pendulum(), 0.5, methods=["dop853"], models=True, samples=3, rounds=0, budget=300
     )
     assert [level.name for level in made.levels] == ["rigid"]
+    (told,) = [one for one in made.left_out if one.refused]
+    assert "no models to compare: the scene has no flexible bodies" in str(told)

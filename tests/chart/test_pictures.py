@@ -14,7 +14,7 @@ import pytest
 from chart.scenes import hub, pendulum
 
 import mstmm
-from mstmm.errors import SceneError
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.drawing import decades, drawing, place, time_text
 from mstmm.runtime.chart.families import FAMILIES, every_method, family
@@ -114,16 +114,55 @@ def test_wild_errors_do_not_shrink_the_rest() -> None:
     assert "beyond the picture" in chart.to_html()
 
 
-def test_errors_of_zero_have_no_place_on_the_axes(tmp_path: Path) -> None:
+def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
     """A pendulum at rest without gravity stays where it is, by every method."""
-    scene = pendulum()
-    hanging = scene.model_copy(update={"gravity": (0.0, 0.0, 0.0)})
-    made = mstmm.chart(hanging, 1.0, methods=METHODS, samples=3, rounds=0, budget=300)
-    assert {point.error for point in made.points} == {0.0}
-    assert made.recommended(1e-3).error == 0.0
-    assert "no point has an error above zero" in drawing(made).below
-    assert "no point has an error" not in drawing(one_level()).below
+    said: list[str] = []
+    hanging = pendulum().model_copy(update={"gravity": (0.0, 0.0, 0.0)})
+    made = mstmm.chart(
+        hanging, 1.0, methods=METHODS, samples=3, rounds=0, budget=300, state=said.append
+    )
+    assert "nothing moves in this scene" in said[-1]
+    assert not made.points
+    with pytest.raises(NumericalFailure, match="nothing moves in this scene"):
+        made.recommended(1e-3)
+    assert made.to_dict()["reference"]["still"] is True
+    assert made.advice() == []
+    assert drawing(made).empty == "nothing moves in this scene"
+    assert not made.plot().axes[0].axison
+    assert "Nothing moves in this scene" in made.to_html()
+    assert not drawing(one_level()).empty
     assert len(made.save(tmp_path)) == 3
+
+
+def test_long_words_below_the_title_are_not_cut() -> None:
+    chart = one_level()
+    reference = replace(chart.reference, ended='stopped by event "end" at t = 0.5 s')
+    figure = replace(chart, reference=reference).plot()
+    lines = [text.get_text() for text in figure.texts]
+    first = next(i for i, line in enumerate(lines) if line.startswith("1 s of motion"))
+    assert " ".join(lines[first : first + 2]) == drawing(replace(chart, reference=reference)).below
+    assert max(map(len, lines)) <= 150
+
+
+def test_points_of_levels_are_joined_by_their_methods() -> None:
+    made = drawing(levels())
+    paths = [line for line in made.lines if not line.look.mark and not line.strong]
+    curves = {p.curve for p in levels().points if place(p) is not None}
+    assert len(paths) == len(curves)
+    assert all(line.joined for line in paths)
+    assert all(len({p.curve for _, p in line.points}) == 1 for line in paths)
+
+
+def test_the_legend_of_levels_names_their_methods() -> None:
+    rows = [entry.text for entry in drawing(levels()).legend]
+    assert rows[rows.index("explicit") + 1] == "dop853, dopri5"
+    assert rows[rows.index("Rosenbrock") + 1] == "rodas4p2"
+    assert all(f">{method}<" in levels().to_html() for method in ("rodas4p2",))
+
+
+def test_labels_stand_below_the_front() -> None:
+    for chart in (one_level(), levels()):
+        assert all(label.at[1] > 0 for label in drawing(chart).labels)
 
 
 def test_labels_do_not_meet() -> None:

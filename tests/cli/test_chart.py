@@ -63,8 +63,9 @@ def test_as_json(mstmm: Command, folder: Path) -> None:
         (("pendulum.toml", "--out", "out", "--error", "-1"), "expected a number above 0"),
         (("pendulum.toml", "--out", "out", "-m", "rodas"), "is not known"),
         (("pendulum.toml", "--out", "out", "-q", "rod.tip.positon"), "did you mean"),
-        (("pendulum.toml", "--out", "out", "--times", "1"), "2 or more"),
-        (("pendulum.toml", "--out", "out", "--rounds", "-1"), "0 or more"),
+        (("pendulum.toml", "--out", "out", "--times", "1"), "'--times': '1': expected a whole"),
+        (("pendulum.toml", "--out", "out", "--times", "x"), "'--times': 'x' is not a whole number"),
+        (("pendulum.toml", "--out", "out", "--rounds", "-1"), "'--rounds': '-1': expected a whole"),
         (("pendulum.toml", "--out", "out", "--engine", "fast"), "there are: auto, fused, looped"),
     ],
 )

@@ -1,0 +1,114 @@
+"""What runs warn of: kept with their points, told with what is recommended, and heeded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from chart.scenes import pendulum, stiff
+from chart.test_front import REFERENCE
+
+import mstmm
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.chart.chart import Chart
+from mstmm.runtime.chart.front import front, judged, recommended
+from mstmm.runtime.chart.point import Point, Setting
+from mstmm.runtime.chart.tables import points, recommendation
+
+
+@cache
+def damped() -> Chart:
+    """A bushing so damped that rk4 is stable only with steps of which most runs warn."""
+    return mstmm.chart(stiff(1e4), 0.3, methods=["rk4", "rodas4p2"], rounds=0, budget=300)
+
+
+def test_warnings_are_those_of_the_run() -> None:
+    model = mstmm.compile(stiff(1e4), engine="looped")
+    compared = 0
+    for point in damped().points:
+        if point.error is not None:
+            result = model.simulate(0.3, output_times=[0.0, 0.3], **point.setting.options)
+            step = result.certificate.step
+            assert point.too_coarse == (step is not None and step.warning is not None)
+            compared += point.too_coarse
+        assert point.to_dict()["warnings"] == list(point.warnings)
+    assert any(point.warnings for point in damped().points)
+
+
+def test_warnings_stand_beside_their_points() -> None:
+    chart = damped()
+    warned = next(p for p in chart.points if p.warnings and p.error)
+    assert (
+        f"warns: {warned.warnings[0]}"
+        in [row[-1] for row in points(chart)[2]][chart.points.index(warned)]
+    )
+    page = chart.to_html()
+    assert page.count("warns: ") > len([p for p in chart.points if p.warnings])  # pointer and table
+
+
+def test_a_step_that_is_too_long_is_never_recommended() -> None:
+    """However near the run came."""
+    lucky = Point(Setting("rk4", "m", 0.1, True), 1e-6, 1e-4, 1, too_coarse=True)
+    slow = Point(Setting("dop853", "m", 1e-6), 1e-6, 1e-3, 1)
+    found = judged([lucky, slow], REFERENCE)
+    assert [p.method for p in front(found)] == ["dop853"]
+    assert recommended(found, 1e-3, REFERENCE).method == "dop853"
+    with pytest.raises(NumericalFailure, match="longer than the fastest motion allows"):
+        recommended(found[:1], 1e-3, REFERENCE)
+
+
+def test_what_is_recommended_is_told_with_its_warnings() -> None:
+    chart = mstmm.chart(pendulum(), 1.0, methods=["dop853"], samples=11, rounds=0, budget=300)
+    best = chart.recommended()
+    other = replace(best, warnings=("beware",))
+    shown = [other if p is best else p for p in chart.points]
+    changed = replace(chart, points=tuple(shown))
+    assert recommendation(changed).endswith("; it warns: beware")
+    assert "it warns: beware" in changed.to_html()
+
+
+def test_what_the_scene_warns_of_is_told_once() -> None:
+    chart = replace(damped(), warnings=("a body is hollow",))
+    assert chart.to_html().count("a body is hollow") == 1
+    assert chart.to_dict()["warnings"] == ["a body is hollow"]
+
+
+def test_a_run_that_an_event_ends_is_told() -> None:
+    scene = pendulum()
+    stop = mstmm.Scene(
+        gravity=scene.gravity, body=[b.model_dump(by_alias=True) for b in scene.body],
+        hinge=[{"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "bob",
+                "initial": {"q": [0.0]}}],
+        event=[{"name": "low", "when": "bob.tip.y < -0.5", "do": "stop"}],
+    )  # fmt: skip
+    said: list[str] = []
+    made = mstmm.chart(
+        stop, 3.0, methods=["dop853", "rk4"], rounds=0, budget=300, state=said.append
+    )
+    assert 'stopped by event "low" at t = 0.328' in made.reference.ended
+    assert any("do not reach 3 s" in text for text in said)
+    assert "The runs do not reach 3 s: stopped by event" in made.to_html()
+    assert made.to_dict()["reference"]["ended"] == made.reference.ended
+    assert made.looked.startswith("101 even times up to 0.328")
+    assert all(p.error is not None for p in made.points if p.method == "dop853")
+
+
+def test_arguments_that_say_nothing() -> None:
+    with pytest.raises(SceneError, match=r"methods = \[\]: expected one name or more"):
+        mstmm.chart(pendulum(), 1.0, methods=[])
+    for error in ("a", True, float("inf"), [1e-3]):
+        with pytest.raises(SceneError, match=r"error = .*: expected a number above 0"):
+            damped().recommended(error)  # type: ignore[arg-type]
+
+
+def test_no_reference_for_other_reasons_than_time() -> None:
+    """A pendulum whose support is pulled away at a speed beyond all numbers."""
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0], body=[b.model_dump(by_alias=True) for b in pendulum().body],
+        hinge=[{"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "bob",
+                "law": {"effort": "1/(0.5 - t)"}}],
+    )  # fmt: skip
+    with pytest.raises(NumericalFailure, match="no reference was found: ") as failure:
+        mstmm.chart(scene, 1.0, methods=["dop853"], rounds=0, budget=300)
+    assert "budget" not in str(failure.value)
