@@ -73,7 +73,7 @@ def links_of(scene: dict[str, Any]) -> Tree:
     """Links of a scene whose bodies are hung up at their origins; hinges sorted from the root."""
     bodies = {body["name"]: body for body in scene["body"]}
     number = {"ground": -1}
-    links = []
+    links: list[Link] = []
     for hinge in scene["hinge"]:
         carrier, _, end = hinge["inboard"].partition(".")
         place, axes = end_of(bodies[carrier], end) if end else (np.zeros(3), np.eye(3))

@@ -81,6 +81,15 @@ def cpu(work: Callable[[], object]) -> float:
     return time.process_time() - begin
 
 
+def once(work: Callable[[], object], least: float = 5e-3) -> float:
+    """CPU seconds of one run; short ones are repeated until they last `least` s."""
+    first = cpu(work)
+    if first > least:
+        return first
+    count = max(2, int(least / max(first, 1e-5)))
+    return cpu(lambda: [work() for _ in range(count)]) / count
+
+
 def summary(samples: list[float]) -> str:
     """Minimum and median."""
     return f"{min(samples):12.4g} {statistics.median(samples):12.4g}"

@@ -91,6 +91,7 @@ class Subject:
     memory: np.ndarray | None = None
     keep: object = None
     record: _Subject = field(init=False)
+    order: np.ndarray = field(init=False)  # where a peer's speeds stand among ours, if elsewhere
 
     def __post_init__(self) -> None:
         self.q, self.u = aligned(self.q), aligned(self.u)

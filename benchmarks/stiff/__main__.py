@@ -54,7 +54,7 @@ def measured(case: Case, options: Namespace) -> dict[str, Any]:
     for _ in range(options.rounds):
         for point, run in timed:
             if sum(point["cpu_ms"]) < 1e3 * options.budget:
-                point["cpu_ms"].append(once(run))
+                point["cpu_ms"].append(round(1e3 * measure.once(run), 4))
     return {"case": case.name, "title": case.title, "t_end_s": case.t_end,
             "reference_apart_m": apart, "curves": found}  # fmt: skip
 
@@ -83,14 +83,6 @@ def tried(
         accurate = accurate + 1 if error < min(ASKED) / 10 else 0
         if accurate == 2 or (number > 1 and spent > options.limit):
             return
-
-
-def once(run: contestants.Run) -> float:
-    """CPU ms of one run; short ones are repeated until they last 5 ms."""
-    first = measure.cpu(run)
-    count = 1 if first > 5e-3 else max(2, int(5e-3 / max(first, 1e-5)))
-    spent = first if count == 1 else measure.cpu(lambda: [run() for _ in range(count)]) / count
-    return round(1e3 * spent, 4)
 
 
 def tools(result: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:

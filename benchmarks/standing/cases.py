@@ -1,0 +1,43 @@
+"""The eight scenes: scene, time, and the end whose place at the end is compared."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from ..common import scenes as rigid
+from ..common.flexible_scenes import Spin
+from ..stiff import scenes as stiff
+from ..stiff.cases import Case
+
+#: Bodies of the long chain, and how far its first rod is turned at the start, rad.
+_LINKS, _TURNED = 100, 0.3
+#: Rods on bushings: how many, N/m, damping ratio.
+_BUSHINGS = (10, 1e8, 0.01)
+
+
+def long_chain() -> rigid.Scene:
+    """A hundred rods of 1 m hanging in a plane, turned in one piece and let go."""
+    still = [[0.0]] * _LINKS
+    return rigid.hanging(rigid.planar(_LINKS), [[_TURNED], *still[1:]], still)
+
+
+CASES = {case.name: case for case in (
+    Case("arm", "arm of three rods on pins, not stiff", rigid.swinging_arm, 10.0, ("rod2.tip",)),
+    Case("balls", "three rods on balls", rigid.swinging_balls, 10.0, ("rod2.tip",)),
+    Case("chain", f"chain of {_LINKS} rods", long_chain, 2.0, (f"rod{_LINKS - 1}.tip",)),
+    Case("bushings", f"{_BUSHINGS[0]} rods on stiff bushings, 1e{math.log10(_BUSHINGS[1]):g} N/m",
+         partial(stiff.bushed_rods, *_BUSHINGS), 1.0, (f"rod{_BUSHINGS[0] - 1}.tip",),
+         bushings=_BUSHINGS),
+    Case("springs", "arm whose pins are springs and dampers",
+         partial(rigid.example, "three_pin_arm_springs"), 1.0, ("body3.tip",)),
+    Case("pendulum", "flexible pendulum, four shapes", partial(stiff.falling_beam, 4, 500.0, 0.0),
+         1.0, ("beam.tip",)),
+    Case("spin-up", "beam spun up, three shapes", partial(Spin.scene, 3), Spin.T_END,
+         ("blade.tip",)),
+    Case("satellite", "satellite with two flexible panels",
+         partial(rigid.example, "satellite_panels"), 10.0, ("east.tip",)),
+)}  # fmt: skip
+
+#: Those of links on pins and balls without laws, which every tool for rigid trees can run.
+TREES = ("arm", "balls", "chain")

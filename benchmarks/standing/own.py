@@ -1,0 +1,94 @@
+"""mstmm's methods on a case: reference and points as `mstmm chart` finds them, at the end alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+import mstmm
+from mstmm.runtime.chart.budget import EARLY, SETTINGS, Budget
+from mstmm.runtime.chart.converged import converged
+from mstmm.runtime.chart.families import FAMILIES, PROMISING, every_method, family
+from mstmm.runtime.chart.measure import measure_of
+from mstmm.runtime.chart.point import LeftOut, Point, Reference, Setting
+from mstmm.runtime.chart.survey import Survey, curve
+from mstmm.runtime.chart.trial import Runs
+
+from ..stiff.cases import Case
+
+#: Families of integrators of others, which are peers.
+OTHERS = FAMILIES[-2:]
+#: Engines, which stand where a chart has levels of model; the first one has every scene.
+LOOPED, FUSED = "looped", "fused"
+#: Up to so many speeds there is code of the scene's own too, compiled before anything is timed.
+_MOST_FUSED = 20
+
+
+@dataclass(frozen=True)
+class Own:
+    """What is known of a case: models by engine, reference and the watched end's place in it (3,),
+    m, and every setting of mstmm's methods, timed once."""
+
+    models: dict[str, mstmm.Model]
+    reference: Reference
+    exact: np.ndarray
+    points: list[Point]
+    left_out: list[LeftOut]
+
+    @property
+    def model(self) -> mstmm.Model:
+        """The one that every scene has."""
+        return self.models[LOOPED]
+
+
+def surveyed(case: Case, seconds: float, say: Callable[[str], None]) -> Own:
+    """A case within so many seconds of the clock, a part of them for the reference."""
+    scene = mstmm.Scene(**case.scene())
+    models = {LOOPED: mstmm.compile(scene, engine=LOOPED)}
+    if models[LOOPED].nu <= _MOST_FUSED:
+        models[FUSED] = mstmm.compile(scene, engine=FUSED)
+    for one in models.values():
+        _warm(one, case.t_end)
+    model = models[LOOPED]
+    budget = Budget(seconds)
+    runs = Runs(case.t_end, np.array([case.t_end]), budget)
+    start = model.simulate(0.0, method="dop853")
+    measure = measure_of(model, start, [f"{case.watched[-1]}.position"], False)
+    best = converged(model, LOOPED, measure, runs, _quiet)
+    reference = Reference(
+        best.error, best.made_by, LOOPED, measure.name, measure.unit, measure.scaling
+    )
+    say(f"{case.name}: reference good to {best.error:.1e} m after {budget.spent:.0f} s")
+    curves = [
+        curve(name, engine, one, case.t_end, reference.floor, None)
+        for name in every_method()
+        if family(name) not in OTHERS
+        for engine, one in models.items()
+    ]
+    survey = Survey(best.run, measure, runs, _quiet)
+    survey.make([one for one in curves if one.method in PROMISING], EARLY)
+    found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
+    assert best.run.numbers is not None
+    return Own(models, reference, best.run.numbers[-1], found.points, found.left_out)
+
+
+def call(own: Own, case: Case, setting: Setting) -> Callable[[], object]:
+    """The call of `simulate` that a point of mstmm stands for, one sample at the end."""
+    return lambda: own.models[setting.model].simulate(
+        case.t_end, output_times=[case.t_end], **setting.options
+    )
+
+
+def _warm(model: mstmm.Model, t_end: float) -> None:
+    """Short runs of all kinds of methods, which compile and load what those need."""
+    for name in every_method():
+        if family(name) not in OTHERS:
+            with suppress(mstmm.MstmmError):
+                model.simulate(t_end, method=name, output_times=[t_end], max_steps=2)
+
+
+def _quiet(_: str) -> None:
+    """Nobody listens."""
