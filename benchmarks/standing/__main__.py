@@ -38,6 +38,7 @@ def arguments() -> ArgumentParser:
                         help="clock s of mstmm's settings, for each scene")  # fmt: skip
     parser.add_argument("--limit", type=float, default=Limits.run,
                         help="CPU s of a peer's run behind which its curve ends")  # fmt: skip
+    parser.add_argument("--methods", default="", help="mstmm's, by name, with commas; all of them")
     parser.add_argument("--no-peers", action="store_true", help="mstmm alone")
     parser.add_argument(
         "--quick", action="store_true", help="few settings and rounds: does it run?"
@@ -52,9 +53,10 @@ def main(given: list[str] | None = None) -> None:
     options = parser.parse_args(given)
     if unknown := [name for name in options.scene if name not in CASES]:
         parser.error(f"no scene {unknown[0]!r}; there are {', '.join(CASES)}")
-    limits = Limits(options.budget, options.limit, options.rounds)
+    methods = tuple(name for name in options.methods.split(",") if name)
+    limits = Limits(options.budget, options.limit, options.rounds, 1, methods)
     if options.quick:
-        limits = Limits(min(5.0, options.budget), 0.2, 1, 4)
+        limits = Limits(min(5.0, options.budget), 0.2, 1, 4, methods)
     file = options.out / "result.json"
     kept = {}
     if file.exists():

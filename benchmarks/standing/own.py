@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -44,8 +44,11 @@ class Own:
         return self.models[LOOPED]
 
 
-def surveyed(case: Case, seconds: float, say: Callable[[str], None]) -> Own:
-    """A case within so many seconds of the clock, a part of them for the reference."""
+def surveyed(
+    case: Case, seconds: float, say: Callable[[str], None], methods: Sequence[str] = ()
+) -> Own:
+    """A case within so many seconds of the clock, a part of them for the reference, by these
+    methods or all of them."""
     scene = mstmm.Scene(**case.scene())
     models = {LOOPED: mstmm.compile(scene, engine=LOOPED)}
     if models[LOOPED].nu <= _MOST_FUSED:
@@ -64,7 +67,7 @@ def surveyed(case: Case, seconds: float, say: Callable[[str], None]) -> Own:
     say(f"{case.name}: reference good to {best.error:.1e} m after {budget.spent:.0f} s")
     curves = [
         curve(name, engine, one, case.t_end, reference.floor, None)
-        for name in every_method()
+        for name in methods or every_method()
         if family(name) not in OTHERS
         for engine, one in models.items()
     ]

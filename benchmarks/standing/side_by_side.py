@@ -33,18 +33,20 @@ Call = Callable[[], object]
 @dataclass(frozen=True)
 class Limits:
     """How much time there is: clock s of mstmm's survey, CPU s of a peer's run after which no
-    tighter one is tried, alternating rounds, and every how many-th setting of a peer is run."""
+    tighter one is tried, alternating rounds, every how many-th setting of a peer is run, and which
+    of mstmm's methods (all for none)."""
 
     budget: float = 40.0
     run: float = 2.0
     rounds: int = 5
     stride: int = 1
+    methods: tuple[str, ...] = ()
 
 
 def compared(case: Case, limits: Limits, with_peers: bool, say: Callable[[str], None]) -> Any:
     """Plain values: reference, points of every tool, what is recommended, who did not run."""
     missing: list[str] = []
-    own = ours.surveyed(case, limits.budget, say)
+    own = ours.surveyed(case, limits.budget, say, limits.methods)
     reference = own.reference
     say(f"{case.name}: mstmm: {len(own.points)} settings")
     points: dict[str, list[Point]] = {OWN: list(own.points)}

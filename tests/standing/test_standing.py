@@ -33,7 +33,9 @@ def quiet(_: str) -> None:
 @cache
 def arm() -> dict[str, Any]:
     """mstmm and SciPy, a few settings."""
-    found: dict[str, Any] = compared(CASES["arm"], Limits(8.0, 0.05, 1, 8), True, quiet)
+    found: dict[str, Any] = compared(
+        CASES["arm"], Limits(300.0, 300.0, 1, 8, ("dop853", "rodas4p2")), True, quiet
+    )
     return found
 
 
