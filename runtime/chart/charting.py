@@ -20,7 +20,7 @@ from .budget import EARLY, REFERENCE, SETTINGS, Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
 from .families import PROMISING, checked_methods
-from .front import judged
+from .front import judged, shared
 from .measure import measure_of
 from .models import Variant, ladder
 from .planar import planar
@@ -28,7 +28,7 @@ from .point import LeftOut, Level, Reference, Setting
 from .rounds import repeated
 from .survey import Curve, Survey, curve
 from .times import even, refined
-from .trial import Runs, Trial, error_of
+from .trial import Runs, Trial, error_of, warnings_of
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -151,10 +151,12 @@ class _Charting:
             for level in self.levels
             if level.error is not None and level.name != reference.model
         }
+        settled, warned = shared(judged(points, reference, own))
         return Chart(
-            title, asked.t_end, len(self.times.at), reference, judged(points, reference, own),
+            title, asked.t_end, len(self.times.at), reference, settled,
             tuple(self.levels), (*self.left_out, *found.left_out), asked.error, asked.budget,
-            self.budget.spent, self.times.words, top.scene.warnings,
+            self.budget.spent, self.times.words,
+            (*warnings_of(top.scene), *warned),
         )  # fmt: skip
 
     def _refine(self, top: Model, name: str) -> None:

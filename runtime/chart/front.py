@@ -44,6 +44,20 @@ def judged(
     return tuple(found)
 
 
+def shared(points: Sequence[Point]) -> tuple[tuple[Point, ...], tuple[str, ...]]:
+    """The points without the warnings that all runs give, and these: no setting is to blame."""
+    ran = [set(point.warnings) for point in points if point.error is not None]
+    common = set.intersection(*ran) if len(ran) > 1 else set()
+    if not common:
+        return tuple(points), ()
+    order = next(point.warnings for point in points if common <= set(point.warnings))
+    without = tuple(
+        replace(point, warnings=tuple(text for text in point.warnings if text not in common))
+        for point in points
+    )
+    return without, tuple(text for text in order if text in common)
+
+
 def front(points: Iterable[Point], floor: float = 0.0) -> tuple[Point, ...]:
     """Pareto's front, cheapest first; below `floor` no two errors can be told apart."""
     best: list[Point] = []

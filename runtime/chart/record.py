@@ -30,7 +30,7 @@ class ChartRecord:
         wanted: the error for which a setting was asked.
         budget, spent: s of the clock.
         looked: how the times lie at which errors were looked at, in words.
-        warnings: what the scene itself warns of, whatever the method.
+        warnings: what the scene, and every run of it, warns of, whatever the method.
     """
 
     title: str

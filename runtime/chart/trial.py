@@ -10,6 +10,8 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+from mstmm.scene import Scene
+from mstmm.scene.checks.flexible import short_beams
 
 from ..host.interruptible import interruptible
 from ..integrate.loop import Status
@@ -129,14 +131,19 @@ class Runs:
         )  # fmt: skip
 
 
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """What is warned of in every run of a scene, whatever the method."""
+    return (*scene.warnings, *short_beams(scene))
+
+
 def _told(result: Result) -> tuple[tuple[str, ...], bool]:
     """What a run warns of beyond what its scene does, and whether its step is too long."""
     try:
         found, step = result.warnings, result.certificate.step
     except MstmmError as error:  # quantities that no sample gives
         return (_short(str(error)),), False
-    of_scene = result.model.scene.warnings
-    own = tuple(_short(text) for text in found if text not in of_scene)
+    scene = warnings_of(result.model.scene)
+    own = tuple(_short(text) for text in found if text not in scene)
     return own, step is not None and step.warning is not None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 from chart.scenes import pendulum, stiff
@@ -12,9 +13,11 @@ from chart.test_front import REFERENCE
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.front import front, judged, recommended
+from mstmm.runtime.chart.front import front, judged, recommended, shared
 from mstmm.runtime.chart.point import Point, Setting
 from mstmm.runtime.chart.tables import points, recommendation
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @cache
@@ -72,6 +75,26 @@ def test_what_the_scene_warns_of_is_told_once() -> None:
     chart = replace(damped(), warnings=("a body is hollow",))
     assert chart.to_html().count("a body is hollow") == 1
     assert chart.to_dict()["warnings"] == ["a body is hollow"]
+
+
+def test_what_every_run_warns_of_is_told_once() -> None:
+    """Of a panel whose highest shape is too short for a beam no setting is to blame."""
+    scene = mstmm.load_scene(EXAMPLES / "satellite_panels" / "scene.toml")
+    made = mstmm.chart(scene, 0.05, methods=["dop853"], samples=3, rounds=0, budget=300)
+    assert len([text for text in made.warnings if "too short for a beam" in text]) == 1
+    assert not [text for p in made.points for text in p.warnings if "too short" in text]
+    assert len(made.points) > 1
+
+
+def test_what_some_runs_warn_of_stays_with_them() -> None:
+    some = [
+        Point(Setting("a", "m", 10.0**-i), 1e-3, 1.0, 1, warnings=texts)
+        for i, texts in enumerate((("x", "all"), ("all", "y"), ("all",)))
+    ]
+    found, common = shared([*some, Point(Setting("a", "m", 1.0), failure="no")])
+    assert common == ("all",)
+    assert [p.warnings for p in found] == [("x",), ("y",), (), ()]
+    assert shared(some[:1]) == ((some[0],), ())
 
 
 def test_a_run_that_an_event_ends_is_told() -> None:
