@@ -17,6 +17,7 @@ from mstmm.runtime.chart.point import LeftOut, Point, Reference, Setting
 from mstmm.runtime.chart.survey import Survey, curve
 from mstmm.runtime.chart.trial import Runs
 
+from ..common import measure
 from ..stiff.cases import Case
 
 #: Families of integrators of others, which are peers.
@@ -59,10 +60,10 @@ def surveyed(
     budget = Budget(seconds)
     runs = Runs(case.t_end, np.array([case.t_end]), budget)
     start = model.simulate(0.0, method="dop853")
-    measure = measure_of(model, start, [f"{case.watched[-1]}.position"], False)
-    best = converged(model, LOOPED, measure, runs, _quiet)
+    distance = measure_of(model, start, [f"{case.watched[-1]}.position"], False)
+    best = converged(model, LOOPED, distance, runs, _quiet)
     reference = Reference(
-        best.error, best.made_by, LOOPED, measure.name, measure.unit, measure.scaling
+        best.error, best.made_by, LOOPED, distance.name, distance.unit, distance.scaling
     )
     say(f"{case.name}: reference good to {best.error:.1e} m after {budget.spent:.0f} s")
     curves = [
@@ -71,7 +72,7 @@ def surveyed(
         if family(name) not in OTHERS
         for engine, one in models.items()
     ]
-    survey = Survey(best.run, measure, runs, _quiet)
+    survey = Survey(best.run, distance, runs, _quiet)
     survey.make([one for one in curves if one.method in PROMISING], EARLY)
     found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
     assert best.run.numbers is not None
@@ -83,6 +84,13 @@ def call(own: Own, case: Case, setting: Setting) -> Callable[[], object]:
     return lambda: own.models[setting.model].simulate(
         case.t_end, output_times=[case.t_end], **setting.options
     )
+
+
+def shortest_call(own: Own, case: Case) -> float:
+    """CPU s of a call of `simulate` over next to no time: what every call costs at least."""
+    model = own.models.get(FUSED, own.model)
+    t_end = 1e-6 * case.t_end
+    return min(measure.once(lambda: model.simulate(t_end, output_times=[t_end])) for _ in range(5))
 
 
 def _warm(model: mstmm.Model, t_end: float) -> None:

@@ -33,11 +33,11 @@ def draw(record: dict[str, Any], path: Path) -> None:
     results = record["results"]
     columns = min(COLUMNS, len(results))
     rows = -(-len(results) // columns)
-    width, height = 3.6 * columns + 0.3, 3.0 * rows + 1.1  # inches
+    width, height = 3.6 * columns + 0.3, 3.1 * rows + 1.2  # inches
     figure, panels = plt.subplots(rows, columns, figsize=(width, height), squeeze=False)
     figure.subplots_adjust(
-        left=0.8 / width, right=1 - 0.15 / width, top=1 - 0.65 / height, bottom=0.75 / height,
-        wspace=0.24, hspace=0.26,
+        left=0.8 / width, right=1 - 0.3 / width, top=1 - 1.0 / height, bottom=0.75 / height,
+        wspace=0.24, hspace=0.42,
     )  # fmt: skip
     for axes, result in zip(panels.flat, results, strict=False):
         _panel(axes, result)
@@ -51,7 +51,7 @@ def draw(record: dict[str, Any], path: Path) -> None:
     style.footer(
         figure, record,
         "Least CPU time of a whole warm call; peers and mstmm's cheapest settings timed in "
-        "alternating rounds.",
+        "alternating rounds.  The numbers above the panels: mstmm's time in that of the best peer.",
     )  # fmt: skip
     style.save(figure, path)
 
@@ -68,36 +68,46 @@ def _legend(figure: Any, results: list[dict[str, Any]]) -> None:
 
 
 def _panel(axes: Any, result: dict[str, Any]) -> None:
-    curves: dict[str, list[tuple[float, float]]] = {}
+    curves: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for p in result["others"][OWN]:
-        curves.setdefault(p["method"], []).append((p["error_m"], p["cpu_ms"]))
+        curves.setdefault((p["method"], p["manner"]), []).append((p["error_m"], p["cpu_ms"]))
     for points in curves.values():
         axes.plot(*zip(*points, strict=True), **_BEHIND)
     heights = []
     for tool, looks in LOOKS.items():
-        points = [(p["sure_error_m"], p["cpu_ms"]) for p in result["fronts"].get(tool, [])]
-        points = [(error, time) for error, time in points if error > 0]
-        heights += [time for _, time in points]
+        points = _lowest(result["fronts"].get(tool, []))
+        heights += [time for error, time in points if ERRORS[1] <= error <= ERRORS[0]]
         if points:
             axes.plot(*zip(*points, strict=True), **looks)
-    for asked in ASKED:
-        axes.axvline(asked, color="black", lw=0.7, ls=":")
-        _name(axes, result["recommended"][f"{asked:g}"])
-    low, high = min(heights), max(heights)
-    axes.set(xscale="log", yscale="log", xlim=ERRORS, ylim=(0.35 * low, 1.6 * high))
+            first = points[0]  # what is less accurate costs as much: no cheaper setting is known
+            axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
+    axes.set(xscale="log", yscale="log", xlim=ERRORS, ylim=(0.6 * min(heights), 1.6 * max(heights)))
     axes.xaxis.minorticks_off()
-    axes.set_title(result["title"], fontsize=9)
+    axes.text(0.0, 1.14, result["title"], transform=axes.transAxes, fontsize=9, weight="bold")
+    for row, asked in enumerate(ASKED):
+        axes.axvline(asked, color="black", lw=0.7, ls=":")
+        said = _told(result["recommended"][f"{asked:g}"])
+        axes.text(0.0, 1.075 - 0.06 * row, f"{asked:.0e} m: {said}", transform=axes.transAxes,
+                  fontsize=7, color="#7a0a14")  # fmt: skip
 
 
-def _name(axes: Any, found: dict[str, Any]) -> None:
-    """mstmm's method for an error, below its point, and how it stands beside the best peer."""
+def _lowest(front: list[dict[str, Any]]) -> list[tuple[float, float]]:
+    """(error, time) that no other point beats in both."""
+    kept: list[tuple[float, float]] = []
+    for error, time in sorted(((p["sure_error_m"], p["cpu_ms"]) for p in front), reverse=True):
+        while kept and kept[-1][1] >= time:
+            kept.pop()
+        if error > 0:
+            kept.append((error, time))
+    return kept
+
+
+def _told(found: dict[str, Any]) -> str:
+    """mstmm's method for an error, and how it stands beside the best peer."""
     own = found["tools"][OWN]
     if "missed" in own:
-        return
-    text = own["method"]
-    if found["ratio"] is not None:
-        text += f"\n{found['ratio']:.2g} of {found['best_peer']}"
-    axes.annotate(
-        text, (own["sure_error_m"], own["cpu_ms"]), (0, -8), textcoords="offset points",
-        ha="center", va="top", fontsize=6.5, zorder=7, color="#7a0a14",
-    )  # fmt: skip
+        return "not met by mstmm"
+    text = f"{own['method']}, {own['manner']}, {own['cpu_ms']:.2g} ms"
+    if found["ratio"] is None:
+        return f"{text}; by no peer"
+    return f"{text}; {found['ratio']:.2g} of {found['best_peer']}"

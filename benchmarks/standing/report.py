@@ -29,6 +29,8 @@ The cheapest setting of mstmm that errs by at most so much in the place of one e
 all tighter ones of its method do, beside the cheapest of the best peer that does. CPU time of one
 whole warm call that gives the end of the motion (`simulate`, `solve_ivp`, a loop in C,
 `SolveDynamic`), everything set up before, the least of {rounds} rounds in which all take turns.
+A call of `simulate` looks at its arguments, makes a result and keeps what vouches for it; CasADi's
+C and Pinocchio run in a bare loop: where a motion takes no time, that is the difference.
 {processor}, {cores} cores, load {load:.1f}: what means something elsewhere is the ratio.
 
 {table}
@@ -69,7 +71,8 @@ def scene(result: dict[str, Any]) -> str:
     return (
         f"- **{result['case']}**: {result['title']}, {result['t_end_s']:g} s, error of "
         f"`{result['of']}`; engines: {', '.join(result['engines'])}; the reference's own error is "
-        f"{result['reference']['error']:.1e} m. Peers: {tools}."
+        f"{result['reference']['error']:.1e} m; the shortest call of `simulate` takes "
+        f"{result['shortest_call_ms']:.2g} ms. Peers: {tools}."
         + "".join(f" Left out: {why}." for why in result["missing"])
     )
 

@@ -64,7 +64,9 @@ def compared(case: Case, limits: Limits, with_peers: bool, say: Callable[[str], 
     best = timed(fronts, calls, limits.rounds)
     return {
         "case": case.name, "title": case.title, "t_end_s": case.t_end, "of": case.watched[-1],
-        "engines": list(own.models), "reference": reference.to_dict(),
+        "engines": list(own.models),
+        "shortest_call_ms": float(f"{1e3 * ours.shortest_call(own, case):.3g}"),
+        "reference": reference.to_dict(),
         "fronts": {tool: [plain(p) for p in some] for tool, some in best.items()},
         "others": {tool: [plain(p) for p in some if p.error] for tool, some in known.items()},
         "recommended": {f"{asked:g}": choice(best, asked, reference) for asked in ASKED},
