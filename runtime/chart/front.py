@@ -97,6 +97,12 @@ def recommended(points: Sequence[Point], error: float, reference: Reference) -> 
             f"the reference itself errs by up to {reference.error:.1e}: it cannot judge errors "
             f"below {reference.floor:.1e}"
         )
+    errors = [point.error for point in points if point.error is not None]
+    if errors and not any(errors):
+        raise NumericalFailure(
+            f"no run errs at all in {reference.measure}, whatever its setting: that does not "
+            "change in this motion; compare another quantity"
+        )
     found = front(points, reference.floor)
     for point in found:
         if point.sure_error is not None and point.sure_error <= error:

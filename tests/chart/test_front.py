@@ -106,6 +106,15 @@ def test_errors_that_the_reference_cannot_judge() -> None:
             recommended(points, error, REFERENCE)
 
 
+def test_what_never_changes_recommends_nothing() -> None:
+    """As the origin of a body that turns about it."""
+    exact = [Point(Setting("a", "m", 10.0**-i), 0.0, 1e-3, 1) for i in range(3)]
+    with pytest.raises(NumericalFailure, match="no run errs at all in all coordinates"):
+        recommended(judged(exact, REFERENCE), 1e-3, REFERENCE)
+    some = [*exact, Point(Setting("b", "m", 1e-2), 1e-5, 1e-3, 1)]
+    assert recommended(judged(some, REFERENCE), 1e-3, REFERENCE).error == 0.0
+
+
 def test_json_says_why_nothing_is_recommended() -> None:
     points = judged([Point(Setting("a", "m", 1e-3), 1e-2, 1e-3, 1)], REFERENCE)
     chart = Chart(
