@@ -114,6 +114,7 @@ class MujocoRun:
     """Fixed steps of MuJoCo's own Runge-Kutta integrator of fourth order, in C."""
 
     def __init__(self, tree: Tree) -> None:
+        mujoco.set_mju_user_warning(lambda _: None)  # or steps too long for it fill a file
         self.model = model_of(tree)
         option = self.model.opt
         option.integrator = mujoco.mjtIntegrator.mjINT_RK4
