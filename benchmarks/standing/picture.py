@@ -26,6 +26,7 @@ _BEHIND: dict[str, Any] = {"color": "#c1121f", "lw": 0.7, "alpha": 0.3, "zorder"
 #: Largest and smallest error that is shown, m.
 ERRORS = (1e-1, 1e-10)
 COLUMNS = 4
+_DPI = 110
 
 
 def draw(record: dict[str, Any], path: Path) -> None:
@@ -53,7 +54,8 @@ def draw(record: dict[str, Any], path: Path) -> None:
         "Least CPU time of a whole warm call; peers and mstmm's cheapest settings timed in "
         "alternating rounds.  The numbers above the panels: mstmm's time in that of the best peer.",
     )  # fmt: skip
-    style.save(figure, path)
+    figure.savefig(path, dpi=_DPI)
+    plt.close(figure)
 
 
 def _legend(figure: Any, results: list[dict[str, Any]]) -> None:
@@ -68,18 +70,15 @@ def _legend(figure: Any, results: list[dict[str, Any]]) -> None:
 
 
 def _panel(axes: Any, result: dict[str, Any]) -> None:
-    curves: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for p in result["others"][OWN]:
-        curves.setdefault((p["method"], p["manner"]), []).append((p["error_m"], p["cpu_ms"]))
-    for points in curves.values():
+    for points in result["single"].values():
         axes.plot(*zip(*points, strict=True), **_BEHIND)
     heights = []
     for tool, looks in LOOKS.items():
-        points = _lowest(result["fronts"].get(tool, []))
-        heights += [time for error, time in points if ERRORS[1] <= error <= ERRORS[0]]
-        if points:
-            axes.plot(*zip(*points, strict=True), **looks)
-            first = points[0]  # what is less accurate costs as much: no cheaper setting is known
+        lowest = _lowest(result["fronts"].get(tool, []))
+        heights += [time for error, time in lowest if ERRORS[1] <= error <= ERRORS[0]]
+        if lowest:
+            axes.plot(*zip(*lowest, strict=True), **looks)
+            first = lowest[0]  # what is less accurate costs as much: no cheaper setting is known
             axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
     axes.set(xscale="log", yscale="log", xlim=ERRORS, ylim=(0.6 * min(heights), 1.6 * max(heights)))
     axes.xaxis.minorticks_off()

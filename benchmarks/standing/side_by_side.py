@@ -68,7 +68,7 @@ def compared(case: Case, limits: Limits, with_peers: bool, say: Callable[[str], 
         "shortest_call_ms": float(f"{1e3 * ours.shortest_call(own, case):.3g}"),
         "reference": reference.to_dict(),
         "fronts": {tool: [plain(p) for p in some] for tool, some in best.items()},
-        "others": {tool: [plain(p) for p in some if p.error] for tool, some in known.items()},
+        "single": behind(known[OWN]),
         "recommended": {f"{asked:g}": choice(best, asked, reference) for asked in ASKED},
         "missing": missing,
     }  # fmt: skip
@@ -131,6 +131,16 @@ def choice(
     peer = min(met, key=met.__getitem__, default=None)
     ratio = found[OWN]["cpu_ms"] / met[peer] if peer and "cpu_ms" in found[OWN] else None
     return {"tools": found, "best_peer": peer, "ratio": ratio}
+
+
+def behind(points: Sequence[Point]) -> dict[str, list[list[float]]]:
+    """Pairs of error (m) and CPU ms, timed once, by method and engine."""
+    found: dict[str, list[list[float]]] = {}
+    for p in points:
+        if p.error and p.cpu_s:
+            pair = [float(f"{p.error:.3g}"), float(f"{1e3 * p.cpu_s:.3g}")]
+            found.setdefault(f"{p.method}, {p.model}", []).append(pair)
+    return found
 
 
 def plain(point: Point) -> dict[str, Any]:
