@@ -30,9 +30,11 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .atlas.atlas import Atlas, stability
+    from .bridge.advising import advise
     from .bridge.charting import chart
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
+    from .runtime.advice.record import Advice
     from .runtime.chart.chart import Chart
     from .runtime.model.loading import load_result
     from .runtime.model.model import Model
@@ -44,10 +46,12 @@ if TYPE_CHECKING:
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
+    "advise": (".bridge.advising", "advise"),
     "chart": (".bridge.charting", "chart"),
     "compile": (".bridge.compilation", "compile_scene"),
     "register": (".bridge.compilation", "register"),
     "generate_file": (".bridge.compilation", "generate_file"),
+    "Advice": (".runtime.advice.record", "Advice"),
     "Chart": (".runtime.chart.chart", "Chart"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
@@ -57,9 +61,9 @@ _LAZY = {
 }
 
 __all__ = [
-    "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
-    "MstmmError", "NumericalFailure", "Result", "Scene", "SceneError", "chart", "compile",
-    "generate_file", "load_result", "load_scene", "register", "stability",
+    "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
+    "MstmmError", "NumericalFailure", "Result", "Scene", "SceneError", "advise", "chart",
+    "compile", "generate_file", "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from typer.core import TyperGroup
 
 from mstmm.errors import Interrupted
 
+from .advise import advise
 from .cache import cache
 from .chart import chart
 from .check import check
@@ -71,6 +72,7 @@ def mstmm(
 app.command("demo")(demo)
 app.command("simulate")(simulate)
 app.command("chart")(chart)
+app.command("advise")(advise)
 app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)

@@ -89,7 +89,7 @@ def chart(
         made = mstmm.chart(
             model, t_end, quantities=quantity or (), methods=method or None, models=models,
             error=error, budget=budget, samples=samples, rounds=rounds, engine=engine,
-            title=_title(scene), progress=_follow(shown, budget), state=output.note,
+            title=_title(scene), progress=follow(shown, budget), state=output.note,
         )  # fmt: skip
     files = [str(path) for path in made.save(folder)]
     if json:
@@ -103,7 +103,7 @@ def _title(scene: str) -> str:
     return scene if len(scene) <= _LONGEST else "..." + scene[3 - _LONGEST :]
 
 
-def _follow(shown: Bar, budget: float) -> Callable[[str], None]:
+def follow(shown: Bar, budget: float) -> Callable[[str], None]:
     """What goes on, beside the time that is gone."""
     begin = time.monotonic()
 

@@ -21,16 +21,18 @@ if TYPE_CHECKING:
 
 
 class Places(Measure):
-    """The places of all bodies and ends, which every level of model has."""
+    """The places of all bodies and ends, which every level of model has.
+
+    Of a flexible body its ends alone: its floating frame lies elsewhere on every level.
+    """
 
     name = "places of all bodies and ends"
 
     def __init__(self, model: Compiled, start: Result) -> None:
-        ports = [port for body in model.flexible.values() for port in body.ports.values()]
-        lengths = [float(np.linalg.norm(port.position)) for port in ports]
-        self._length = max(scene_length(model), *lengths, 0.0)
-        ending = ".position"
-        self._names = [name[: -len(ending)] for name in start.names() if name.endswith(ending)]
+        self._length, scene = whole_length(model), model.scene
+        ending, floating = ".position", {one.name for one in (*scene.beam, *scene.elastic)}
+        names = [name[: -len(ending)] for name in start.names() if name.endswith(ending)]
+        self._names = [name for name in names if name not in floating]
         self.scaling = f"parts of the length of the scene, {self._length:g} m"
 
     def read(self, result: Record) -> Array:
@@ -39,6 +41,12 @@ class Places(Measure):
     def apart(self, a: Array, b: Array) -> Array:
         ways = (a - b).reshape(len(a), -1, 3)
         return np.asarray(np.linalg.norm(ways, axis=2).max(axis=1) / self._length)
+
+
+def whole_length(model: Compiled) -> float:
+    """The length of a scene, m, by its rigid and its flexible bodies."""
+    ports = [port for body in model.flexible.values() for port in body.ports.values()]
+    return max([scene_length(model), *(float(np.linalg.norm(port.position)) for port in ports)])
 
 
 def measure_of(model: Compiled, start: Result, names: Sequence[str], models: bool) -> Measure:

@@ -32,7 +32,7 @@ def ladder(scene: Scene) -> tuple[Variant, ...]:
     """Levels from the smallest to the richest, all flexible bodies on one level; a scene without
     flexible bodies has one.  The shapes of an elastic body are those beside its static ones."""
     modes = modes_of(scene)
-    soft = [_free_modes(body) for body in scene.elastic if body.model != "rigid"]
+    soft = [free_modes(body) for body in scene.elastic if body.model != "rigid"]
     most = max([0, *soft, *(max(counts.counts) for counts in modes.values())])
     if not most:
         return (Variant("rigid", scene),)
@@ -75,7 +75,7 @@ def reduced(scene: Scene, modes: Mapping[str, Modes], n: int, stiffening: bool) 
         for beam in scene.beam
     )
     bodies = tuple(
-        body.model_copy(update=change | {"modes": min(n, _free_modes(body))})
+        body.model_copy(update=change | {"modes": min(n, free_modes(body))})
         for body in scene.elastic
     )
     return with_tables(scene, beam=beams, elastic=bodies)
@@ -110,5 +110,6 @@ def _at_most(modes: Modes, n: int) -> Modes:
     return Modes(**{word: min(n, getattr(modes, word)) for word in DIRECTIONS})
 
 
-def _free_modes(body: Elastic) -> int:
+def free_modes(body: Elastic) -> int:
+    """Vibration shapes of an elastic body beside its static ones."""
     return AUTO_MODES if body.modes is None else body.modes

@@ -1,0 +1,309 @@
+"""From a model to its advice: evidence, reference, search, setting, and what each choice does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import real, whole
+from mstmm.defaults import METHOD, RTOL
+from mstmm.errors import MstmmError, NumericalFailure, SceneError
+
+from ..chart.budget import Budget, OutOfTime
+from ..chart.measure import Places, measure_of, whole_length
+from ..chart.models import Variant, at_level, ladder
+from ..chart.planar import planar
+from ..chart.point import Point, Setting
+from ..integrate.steppers import AUTO
+from ..result.flexible.certify import SLOPE
+from ..result.measure import Measure
+from .choice import RIGID, Bodies, Choice, given
+from .evidence import Evidence, gathered
+from .record import Advice, BodyAdvice, TriedModel
+from .search import Choices, Search
+from .settings import Chosen, cheapest, compared
+from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
+from .words import reason
+
+if TYPE_CHECKING:
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.elastic import Elastic
+
+    from ..model.model import Model
+    from ..result.result import Result
+
+#: A model may err by this part of what is asked, and with the integration by this one; the rest is
+#: for what lies between the samples.
+_ENOUGH, _WITH_SETTING = 0.9, 0.95
+
+#: The search ends when this part of the budget is spent; methods may take this part of it.
+_SEARCH, _SETTINGS = 0.6, 0.3
+
+#: Models whose settings are tried: the one found, and others that suffice and took no longer than
+#: so many times its time.
+_FINALISTS, _NEARLY = 3, 1.5
+
+#: A planar scene is the same motion: it may err by this part of what is asked.
+_SAME = 0.01
+
+#: Names of two of the models tried.
+RICHEST, AS_GIVEN = "the richest model", "as given"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for, checked."""
+
+    t_end: float
+    error: float
+    of: tuple[str, ...]
+    budget: float
+    samples: int
+    rounds: int
+
+
+def request(
+    t_end: float, error: float, of: str | Sequence[str], budget: float, samples: int, rounds: int
+) -> Request:
+    """SceneError naming the first argument that makes no sense."""
+    asked = real("error", error, "an error above 0 and below 1")
+    if not 0 < asked < 1:
+        raise SceneError(f"error = {asked:g}: expected an error above 0 and below 1, such as 1e-3")
+    return Request(
+        _above_zero("t_end", t_end), asked, (of,) if isinstance(of, str) else tuple(of),
+        _above_zero("budget", budget),
+        whole("samples", samples, 2, "a whole number of samples, 2 or more"),
+        whole("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
+    )  # fmt: skip
+
+
+def _above_zero(name: str, value: float) -> float:
+    found = real(name, value, "a time in s above 0")
+    if not found > 0 or not math.isfinite(found):
+        raise SceneError(f"{name} = {found:g}: expected a time in s above 0")
+    return found
+
+
+def advised(
+    model: Model, asked: Request, compile: Compile, tell: Tell, state: Tell,
+    budget: Budget | None = None,
+) -> Advice:  # fmt: skip
+    """The advice for a model; `compile` makes models of its other levels.
+
+    `state` hears what is compared, `tell` every run.  Raises SceneError for an unknown quantity,
+    NumericalFailure where the scene cannot be run or no error of this size be judged.
+    """
+    return _Advising(model, asked, compile, tell, state, budget or Budget(asked.budget)).advice()
+
+
+class _Advising:
+    def __init__(
+        self, model: Model, asked: Request, compile: Compile, tell: Tell, state: Tell,
+        budget: Budget,
+    ) -> None:  # fmt: skip
+        self.scene, self.asked, self.budget = model.scene, asked, budget
+        self.compile, self.tell, self.state = compile, tell, state
+        self.notes: list[str] = []
+        self.hinges: list[str] = []
+
+    def advice(self) -> Advice:
+        asked = self.asked
+        top = ladder(self.scene)[-1]
+        model = self.compile(top.scene)
+        start = model.simulate(0.0, method="dop853")
+        self.measure = measure_of(model, start, asked.of, True)
+        rigid = self._least()
+        self.length = whole_length(model)
+        self.size = _size(self.measure, rigid)
+        evidence, why = gathered(rigid, self.length)
+        if why:
+            self.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
+        self.bench, richest = self._bench(top, model)
+        base = self._in_plane(top, model, richest)
+        self.whole = Bodies(top.scene).richest
+        self.bodies = Bodies(base.scene)
+        search = Search(
+            self.bodies, self.bench, evidence, _ENOUGH * asked.error, self.in_measure,
+            lambda: self.budget.left(_SEARCH) > 0,
+        )  # fmt: skip
+        search.made |= {RICHEST: self.bodies.richest, "planar": self.bodies.richest}
+        choices, best = search.run() if self.bodies.richest else ({}, base)
+        if search.out_of_time:
+            self.notes.append("time ended before every smaller model was tried: give more --budget")
+        chosen = self._chosen(best)
+        choices = search.made.get(chosen.tried.name, choices)
+        return self._told(choices, evidence, chosen, search)
+
+    # --- what is known beforehand ---------------------------------------------------------------
+
+    def _least(self) -> Result | None:
+        """The run in which all bodies respond one way, or none deform; None where there is none."""
+        self.tell("one-way, before anything else")
+        limit = self.budget.alarm(_SEARCH * self.budget.left())
+        times = np.linspace(0.0, self.asked.t_end, self.asked.samples)
+        rtol = first_rtol(self.asked.error)
+        try:
+            model = self.compile(at_level(self.scene, "one-way"))
+            return model.simulate(
+                self.asked.t_end, method=AUTO, rtol=rtol, atol=0.01 * rtol,
+                output_times=times, progress=limit,
+            )  # fmt: skip
+        except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
+            return None
+
+    @property
+    def in_measure(self) -> float:
+        """What turns a displacement in m into the unit of errors."""
+        if isinstance(self.measure, Places):
+            return 1.0 / self.length
+        return 1.0 if self.measure.unit == "m" else self.size / self.length
+
+    @property
+    def part(self) -> float:
+        """The error asked in parts of the motion."""
+        return (
+            self.asked.error
+            if self.measure.unit in ("1", "rad")
+            else (self.asked.error / self.size)
+        )
+
+    # --- reference ------------------------------------------------------------------------------
+
+    def _bench(self, top: Variant, model: Model) -> tuple[Bench, Tried]:
+        asked = self.asked
+        rtol = first_rtol(self.part)
+        span = probe(model, asked.t_end, asked.samples, self.budget, self.measure, rtol)
+        bench = Bench(span, asked.samples, self.budget, self.measure, self.compile, self.tell)
+        richest = bench.refer_to(top.scene, model, RICHEST, asked.error, self.part)
+        self.state(f"models are compared over {span}; the reference itself errs by about "
+                   f"{richest.error:.1e}")  # fmt: skip
+        return bench, richest
+
+    def _in_plane(self, top: Variant, model: Model, richest: Tried) -> Tried:
+        """The richest scene in its plane where that is the same motion."""
+        flat = planar(top, model, self.bench.reference.q)
+        if flat is None:
+            return richest
+        found = self.bench.tried("planar", flat.scene)
+        if found.error > max(_SAME * self.asked.error, 3 * self.bench.floor):
+            return richest
+        for old, new in zip(top.scene.hinge, flat.scene.hinge, strict=True):
+            if old != new:
+                self.hinges.append(
+                    f'hinge "{old.name}": {new.type} instead of {old.type}, for the motion stays '
+                    "in a plane"
+                )
+        return found
+
+    # --- what was found -------------------------------------------------------------------------
+
+    def _chosen(self, best: Tried) -> Chosen:
+        """The cheapest setting of the model found, or of another one that nearly is as cheap."""
+        enough = [
+            one for one in self.bench.all
+            if one.error <= _ENOUGH * self.asked.error and one.cpu_s <= _NEARLY * best.cpu_s
+        ]  # fmt: skip
+        others = sorted((one for one in enough if one is not best), key=lambda one: one.cpu_s)
+        finalists = [best, *others][:_FINALISTS]
+        seconds = max(_SETTINGS * self.asked.budget, self.budget.left())
+        asked, growth = _WITH_SETTING * self.asked.error, self.bench.span.growth
+        try:
+            return cheapest(
+                finalists, self.bench, asked / growth, self.asked.of, self.asked.rounds, seconds
+            )
+        except NumericalFailure:  # then as all models were run
+            setting = Setting(AUTO, best.name, self.bench.rtol)
+            return Chosen(best, Point(setting, best.error / growth, best.cpu_s, 1))
+
+    def _told(
+        self, choices: Mapping[str, Choice], evidence: Mapping[str, Evidence], chosen: Chosen,
+        search: Search,
+    ) -> Advice:  # fmt: skip
+        asked, bench = self.asked, self.bench
+        bodies = tuple(
+            self._body(name, choice, evidence.get(name), search) for name, choice in choices.items()
+        )
+        model_saving, setting_saving = self._savings(chosen)
+        if not bodies and not self.hinges:
+            self.notes.append("there is nothing to reduce in the bodies: none of them deforms")
+        growth = bench.span.growth
+        error = chosen.point.error
+        assert error is not None and chosen.point.cpu_s is not None
+        return Advice(
+            asked.error, self.measure.name, self.measure.unit, self.measure.scaling, asked.t_end,
+            str(bench.span), bench.span.whole, bench.floor, bodies, tuple(self.hinges),
+            chosen.point.setting, error * growth, chosen.point.cpu_s, model_saving,
+            setting_saving, chosen.tried.scene, tuple(self.notes),
+            tuple(
+                TriedModel(
+                    one.name, one.error if math.isfinite(one.error) else None, one.cpu_s, one.why
+                )
+                for one in bench.all
+                if math.isfinite(one.cpu_s)
+            ),
+        )  # fmt: skip
+
+    def _body(
+        self, name: str, choice: Choice, known: Evidence | None, search: Search
+    ) -> BodyAdvice:
+        """What is said of one body; its choice is tried alone beside the richest of all others."""
+        most = self.bodies.richest
+        as_in_most = choice == most.get(name, choice)
+        error, saving = (self.bench.floor, 1.0) if as_in_most else (None, None)
+        if not as_in_most and self.budget.left():
+            alone = search.tried({**most, name: choice})
+            if math.isfinite(alone.error):
+                whole_model = search.tried(most)
+                error, saving = alone.error, whole_model.cpu_s / alone.cpu_s
+        split = None
+        if known is not None:
+            frame = known.frame_error * self.in_measure
+            split = frame if frame > self.asked.error or known.slope > SLOPE else None
+        why = reason(choice, self.whole[name], known, self.in_measure, self.asked.error)
+        if split is not None and known is not None:
+            why += (
+                f"; it bends by a slope of {known.slope:.2g}, so that any model of it with one "
+                f"floating frame may err by {split:.1e}: split it into welded beams"
+            )
+        return BodyAdvice(name, self._given(name), choice, error, saving, why, known, split)
+
+    def _straightened(self) -> Choices:
+        """Bodies that do not bend at all in the plane of the motion."""
+        return {name: Choice(RIGID) for name in self.whole if name not in self.bodies.richest}
+
+    def _given(self, name: str) -> Choice:
+        bodies: tuple[Beam | Elastic, ...] = (*self.scene.beam, *self.scene.elastic)
+        written = next(body for body in bodies if body.name == name)
+        return given(written, self.whole[name])
+
+    def _savings(self, chosen: Chosen) -> tuple[float | None, float | None]:
+        """Time of the scene as given over that of the advised one, by the same tolerance; of the
+        default method and tolerance over the advised ones."""
+        setting, tried, rounds = chosen.point.setting, chosen.tried, self.asked.rounds
+        rtol = RTOL if setting.fixed else setting.value
+        alike = Setting(AUTO, tried.name, rtol)
+        as_given = self.bench.tried(AS_GIVEN, self.scene)
+        found: list[float | None] = [None, None]
+        pairs = (
+            (as_given, alike, alike), (tried, Setting(METHOD, tried.name, RTOL), setting),
+        )  # fmt: skip
+        for k, (other, theirs, ours) in enumerate(pairs):
+            if other.model is not None:
+                times = compared(other, theirs, tried, ours, self.bench, rounds)
+                found[k] = None if times is None else times[0] / times[1]
+        return found[0], found[1]
+
+
+def _size(measure: Measure, result: Result | None) -> float:
+    """How far what is compared goes in a run; 1 where that is not known."""
+    if result is None or not result.success:
+        return 1.0
+    numbers = measure.read(result)
+    measure.scale_by(numbers)
+    start = np.broadcast_to(numbers[:1], numbers.shape)
+    far = float(measure.apart(numbers, start).max(initial=0.0))
+    return far if np.isfinite(far) and far > 0 else 1.0

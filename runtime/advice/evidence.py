@@ -1,0 +1,145 @@
+"""What is expected of each flexible body before any richer model runs.
+
+From one run in which all of them respond one way, and from invariants.  Per body: how far its
+ends deflect (d), the share of the inertia at its hinge that a shape holds (chi), what its loads
+change of its stiffness (gamma), its largest slope (kappa).  A rigid body errs by d, a one-way
+response by about 3 d chi / (1 - chi), linear kinematics by d gamma, shapes left out by what they
+deflect the ends, and any single floating frame by up to d kappa^2 / 2.
+
+Padilla, von Flotow, J. Guidance 15 (1992) 148-155 (when stress stiffening may be left out).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.errors import MstmmError
+from mstmm.scene import split
+
+from ..result.flexible.certify import GAMMA, Flexibility
+from ..result.one_way.response import rigidity
+from ..result.one_way.result import OneWayResult
+from .choice import LINEAR, ONE_WAY, RIGID, Choice
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..flexible.modal_body import ModalBody
+    from ..result.result import Result
+
+#: Recoil and phase of a response that is not coupled, in d chi / (1 - chi); and the most that it
+#: may err by, in d: out of phase with a recoil as large as itself.
+_RECOIL, _MOST = 3.0, 2.0
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a one-way run tells of one body.
+
+    Attributes:
+        deflection: d, m, the largest of its ends, with what its rotation displaces.
+        by_shape: name of a shape -> its part of that, m.
+        coupling: chi.
+        load_ratio: gamma.
+        slope: kappa.
+        frequency: rad/s, of its first shape.
+        spin_ratio: spin across the body over its first frequency.
+        missed: part of the bending energy that all its shapes miss; None where it is not known.
+    """
+
+    deflection: float
+    by_shape: Mapping[str, float]
+    coupling: float
+    load_ratio: float
+    slope: float
+    frequency: float
+    spin_ratio: float
+    missed: float | None = None
+
+    def error(self, choice: Choice) -> float:
+        """Expected of a choice, m."""
+        d, chi = self.deflection, self.coupling
+        if choice.level == RIGID:
+            return d
+        shortening = d * self.load_ratio
+        if choice.level == ONE_WAY:
+            recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MOST
+            return d * min(recoil, _MOST) + shortening
+        left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps(name))
+        return left_out + (shortening if choice.level == LINEAR else 0.0)
+
+    @property
+    def frame_error(self) -> float:
+        """Of one floating frame, d kappa^2 / 2, m."""
+        return self.deflection * min(self.slope**2 / 2, 1.0)
+
+    @property
+    def stiffens(self) -> bool:
+        """Whether linear kinematics may diverge."""
+        return self.load_ratio > GAMMA or self.spin_ratio > 1.0
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return (
+            f"deflection {self.deflection:.1e} m, coupling chi {self.coupling:.2g}, load ratio "
+            f"gamma {self.load_ratio:.1e}, slope {self.slope:.1e}, first frequency "
+            f"{self.frequency:.3g} rad/s"
+        )
+
+
+def evidence_of(result: Result, reach: float) -> dict[str, Evidence]:
+    """Body -> what a one-way run tells; `reach` (m) is how far rotations of ends displace what is
+    fixed there.
+
+    Raises NumericalFailure where the response cannot be had.
+    """
+    if not isinstance(result, OneWayResult):
+        return {}
+    known = {one.name: one for one in result.certificate.flexible}
+    found = {}
+    for name, body in rigidity(result.model).one_way.items():
+        if name in known:
+            eta = result.response(name).eta
+            found[name] = _one(body, np.abs(eta), known[name], _loaded(result.model, name), reach)
+    return found
+
+
+def _loaded(model: Compiled, name: str) -> set[str]:
+    """Ends at which another body is fixed."""
+    return {
+        end for h in model.scene.hinge for body, end in (split(h.inboard),) if body == name
+    } | {
+        end for c in model.scene.chain for body, end in (split(c.inboard),) if body == name
+    }  # fmt: skip
+
+
+def _one(
+    body: ModalBody, eta: np.ndarray, seen: Flexibility, loaded: set[str], reach: float
+) -> Evidence:
+    by_shape, deflection = np.zeros(body.n), 0.0
+    for end, port in body.ports.items():
+        each = np.linalg.norm(port.phi, axis=0)
+        if end in loaded:
+            each = each + reach * np.linalg.norm(port.theta, axis=0)
+        moved = each * eta
+        by_shape = np.maximum(by_shape, moved.max(axis=0, initial=0.0))
+        deflection = max(deflection, float(moved.sum(axis=1).max(initial=0.0)))
+    return Evidence(
+        deflection, dict(zip(body.modes, by_shape.tolist(), strict=True)),
+        0.0 if seen.coupling is None else seen.coupling[0], seen.load_ratio, seen.slope,
+        seen.first_frequency, seen.spin_ratio, seen.tail,
+    )  # fmt: skip
+
+
+def gathered(result: Result | None, reach: float) -> tuple[dict[str, Evidence], str]:
+    """The evidence, and why there is none."""
+    if result is None or not result.success:
+        return {}, "" if result is None else result.message
+    try:
+        return evidence_of(result, reach), ""
+    except (MstmmError, np.linalg.LinAlgError) as problem:
+        return {}, str(problem)

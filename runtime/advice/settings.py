@@ -1,0 +1,100 @@
+"""Method and tolerance of a model: what a wanted error leads to, or what is cheaper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mstmm.errors import MstmmError, NumericalFailure
+
+from ..chart.budget import ALL, EARLY, Budget, OutOfTime
+from ..chart.families import PROMISING
+from ..chart.front import judged, recommended
+from ..chart.point import Point, Reference, Setting
+from ..chart.rounds import repeated
+from ..chart.survey import Curve, Survey, curve
+from ..chart.trial import Runs
+from .trials import Bench, Tried
+
+#: What is left of the error asked beside the model's own: this part of it is wanted of the
+#: integration, and where an error is down to this part of what is asked, tighter settings show
+#: nothing more.
+_WANTED, _ENOUGH = 0.5, 0.3
+
+#: Settings whose times are taken again.
+_AGAIN = 8
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A setting of a model: its point holds error and processor time over the span."""
+
+    tried: Tried
+    point: Point
+
+
+def cheapest(
+    finalists: list[Tried], bench: Bench, asked: float, of: tuple[str, ...], rounds: int,
+    seconds: float,
+) -> Chosen:  # fmt: skip
+    """The cheapest setting of any of these models that errs by at most `asked` over the span.
+
+    `seconds` of the clock may be taken.  Raises NumericalFailure where no setting does.
+    """
+    budget = Budget(seconds, bench.budget.clock)
+    runs = Runs(bench.span.t_end, np.array(bench.runs.times), budget)
+    survey = Survey(bench.reference, bench.measure, runs, bench.tell)
+    reference = Reference(0.0, "", "", bench.measure.name, bench.measure.unit, "")
+    own = {one.name: one.error / bench.span.growth for one in finalists}
+    curves = []
+    for one in finalists:
+        model, enough = one.running, _ENOUGH * asked
+        found = _wanted(one, runs, of, _WANTED * (asked - own[one.name]))
+        if found is not None:
+            curves.append(Curve(found.method, one.name, model, enough, "", iter((found,))))
+        curves += [
+            curve(method, one.name, model, bench.span.t_end, enough, own[one.name])
+            for method in PROMISING
+        ]
+    found_all = survey.make(curves, EARLY)
+    points = judged(found_all.points, reference)
+    good = [i for i, p in enumerate(points) if p.sure_error is not None and p.sure_error <= asked]
+    if not good:
+        raise NumericalFailure(f"none of the methods that were tried errs by at most {asked:.1e}")
+    few = sorted(good, key=lambda i: points[i].cpu_s or 0.0)[:_AGAIN]
+    models = [found_all.models[i] for i in few]
+    again, _ = repeated([points[i] for i in few], models, rounds, runs, bench.tell)
+    best = recommended(again, asked, reference)
+    return Chosen(next(one for one in finalists if one.name == best.model), best)
+
+
+def _wanted(one: Tried, runs: Runs, of: tuple[str, ...], error: float) -> Setting | None:
+    """The setting to which an error of the integration alone leads; None where it leads to none."""
+    alarm = runs.budget.alarm(runs.budget.share(ALL))
+    try:
+        result = one.running.simulate(
+            runs.t_end, output_times=runs.times, error=error, error_of=of, progress=alarm
+        )
+    except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
+        return None
+    known = result.error_estimate
+    if known is None or not result.success:
+        return None
+    return Setting(known.method, one.name, known.rtol)
+
+
+def compared(
+    a: Tried, setting: Setting, b: Tried, other: Setting, bench: Bench, rounds: int
+) -> tuple[float, float] | None:
+    """Processor times of two runs in alternating rounds, s; None where one fails or takes too
+    long."""
+    points, models = [], [a.running, b.running]
+    for model, one in zip(models, (setting, other), strict=True):
+        trial = bench.runs.trial(model, one, bench.measure, bench.budget.left() / 2)
+        if trial.numbers is None:
+            return None
+        points.append(Point(one, 0.0, trial.cpu_s, 1))
+    timed, _ = repeated(points, models, rounds, bench.runs, bench.tell)
+    first, second = (point.cpu_s or 0.0 for point in timed)
+    return first, second

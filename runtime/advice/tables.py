@@ -1,0 +1,55 @@
+"""What an advice says in lines and tables on the terminal."""
+
+from __future__ import annotations
+
+from ..chart.tables import Table, time_of
+from .record import Advice
+
+
+def summary(advice: Advice) -> list[str]:
+    """The advice in a few lines."""
+    unit = "" if advice.unit == "1" else f" {advice.unit}"
+    asked = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}"
+    met = "" if advice.error <= advice.asked else ", MORE than was asked"
+    lines = [
+        f"{asked}: {_model(advice)} by {advice.method}, {advice.setting}: error "
+        f"{advice.error:.1e}{met}, {time_of(advice.cpu_s)} CPU over {advice.compared}",
+    ]
+    savings = [
+        f"the model saves a factor of {advice.model_saving:.2g}" if advice.model_saving else "",
+        f"method and tolerance one of {advice.setting_saving:.2g} beside the default ones"
+        if advice.setting_saving
+        else "",
+    ]
+    told = ", ".join(text for text in savings if text)
+    return [*lines, *([told] if told else [])]
+
+
+def _model(advice: Advice) -> str:
+    if not advice.reduced:
+        return "the scene as it is"
+    return "a reduced scene"
+
+
+def bodies(advice: Advice) -> Table:
+    """The choice for each flexible body."""
+    head = ("body", "given", "advised", "error of this alone", "saves a factor of")
+    rows = [
+        (
+            one.name, str(one.given), str(one.choice),
+            "" if one.error is None else f"{one.error:.1e}",
+            "" if one.saving is None else f"{one.saving:.2g}",
+        )
+        for one in advice.bodies
+    ]  # fmt: skip
+    return head, (3, 4), rows
+
+
+def tried(advice: Advice) -> Table:
+    """Every model that was run."""
+    head = ("model", "error", "CPU time", "note")
+    rows = [
+        (one.name, "" if one.error is None else f"{one.error:.1e}", time_of(one.cpu_s), one.why)
+        for one in advice.tried
+    ]
+    return head, (1, 2), rows

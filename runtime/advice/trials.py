@@ -1,0 +1,220 @@
+"""Models tried: each one run beside the richest one, over the whole time or a part of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.errors import MstmmError, NumericalFailure
+from mstmm.scene import Scene
+
+from ..chart.budget import Budget
+from ..chart.point import Setting
+from ..chart.trial import Runs, Trial, error_of
+from ..integrate.steppers import AUTO
+from ..result.measure import Measure
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+#: Relative tolerance of runs that are compared, in the relative error asked for, and its bounds;
+#: the reference's is so many times tighter, and they may be apart by this part of what is asked.
+_PART, _LOOSEST, _TIGHTEST, _TIGHTER, _AGREE = 1e-3, 1e-6, 1e-12, 1e-2, 0.05
+
+#: The part of the run by which its time is guessed, the parts of the budget that reference runs may
+#: take and that a window aims at, and the part that one model may take.
+_LOOK, _WHOLE, _WINDOW, _ONE = 1 / 20, 0.25, 0.1, 0.2
+
+#: Runs shorter than this (s) are made so many times: the least time counts.
+_SHORT, _REPEATS = 0.03, 3
+
+Compile = Callable[[Scene], "Model"]
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Span:
+    """The time over which models are compared.
+
+    Attributes:
+        t_end: s, of a window from the start, or of the whole run.
+        wanted: s, end of the run that the advice is for.
+    """
+
+    t_end: float
+    wanted: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of the run is compared."""
+        return self.t_end >= self.wanted
+
+    @property
+    def growth(self) -> float:
+        """What errors of a window are multiplied by: they grow with the time at least."""
+        return self.wanted / self.t_end
+
+    def __str__(self) -> str:
+        if self.whole:
+            return f"the whole run of {self.wanted:g} s"
+        return f"the first {self.t_end:.3g} s of {self.wanted:g} s, errors times {self.growth:.3g}"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A model that was run, or why it was not.
+
+    Attributes:
+        name: in words.
+        error: against the richest model, over the whole run; inf where it gave none.
+        cpu_s: processor time of the call, s.
+        why: what kept it from a number, "" where nothing did.
+    """
+
+    name: str
+    scene: Scene
+    model: Model | None
+    error: float
+    cpu_s: float
+    why: str = ""
+
+    @property
+    def running(self) -> Model:
+        """The model of one that ran."""
+        assert self.model is not None
+        return self.model
+
+
+def probe(model: Model, t_end: float, samples: int, budget: Budget, measure: Measure,
+          rtol: float) -> Span:  # fmt: skip
+    """The whole run where the reference's runs fit into their part of the budget, else a window.
+
+    NumericalFailure where the model does not run.
+    """
+    look = Runs(_LOOK * t_end, np.linspace(0.0, _LOOK * t_end, samples), budget)
+    limit = budget.left() * _WHOLE
+    begin = budget.clock()
+    trial = look.trial(model, Setting(AUTO, "", rtol), measure, limit)
+    spent = max(budget.clock() - begin, 1e-9)
+    if trial.late:
+        raise NumericalFailure(
+            f"a twentieth of the run, {_LOOK * t_end:.3g} s, takes the richest model more than "
+            f"{limit:.3g} s; give more --budget, or end earlier"
+        )
+    if trial.numbers is None:
+        raise NumericalFailure(trial.failure)
+    cost = 3.0 * spent / _LOOK  # two runs, one of them tighter
+    if cost <= _WHOLE * budget.left():
+        return Span(t_end, t_end)
+    part = _WINDOW * budget.left() / cost
+    return Span(max(min(part, 1.0), _LOOK) * t_end, t_end)
+
+
+class Bench:
+    """Runs models beside the reference and keeps what they gave.
+
+    `measure` is scaled by the reference; `rtol` is the tolerance of the runs.
+    """
+
+    def __init__(
+        self, span: Span, samples: int, budget: Budget, measure: Measure, compile: Compile,
+        tell: Tell,
+    ) -> None:  # fmt: skip
+        self.span, self.measure, self.budget = span, measure, budget
+        self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
+        self.compile, self.tell = compile, tell
+        self.rtol = _LOOSEST
+        self.reference: Trial
+        self.floor = 0.0
+        self._found: dict[str, Tried] = {}
+
+    def refer_to(self, scene: Scene, model: Model, name: str, asked: float, part: float) -> Tried:
+        """Run the richest model until two tolerances agree; `part` is what is asked in parts.
+
+        NumericalFailure where they do not.
+        """
+        self.rtol = first_rtol(part)
+        run = self._run(model, name, self.rtol)
+        while True:
+            tight = max(self.rtol * _TIGHTER, _TIGHTEST)
+            tighter = self._run(model, name, tight)
+            self.measure.scale_by(_numbers(tighter))
+            apart = error_of(run, tighter, self.measure)
+            far = math.inf if isinstance(apart, str) else apart * self.span.growth
+            if far <= _AGREE * asked:
+                break
+            if tight <= _TIGHTEST:
+                raise NumericalFailure(
+                    f"two runs of the richest model are {far:.1e} apart at tolerances of "
+                    f"{self.rtol:.0e} and {tight:.0e}, so that no error of {asked:.1e} can be "
+                    "judged: end earlier, or ask for less"
+                )
+            self.rtol, run = tight, tighter
+        self.reference, self.floor = tighter, far
+        tried = self._kept(name, scene, model, run)
+        return replace(tried, error=far)
+
+    def tried(self, name: str, scene: Scene) -> Tried:
+        """A model that was run."""
+        if name not in self._found:
+            self.tell(name)
+            self._found[name] = self._try(name, scene)
+        return self._found[name]
+
+    @property
+    def all(self) -> tuple[Tried, ...]:
+        """Everything that was tried, in its order."""
+        return tuple(self._found.values())
+
+    def _try(self, name: str, scene: Scene) -> Tried:
+        try:
+            model = self.compile(scene)
+        except MstmmError as problem:
+            return Tried(name, scene, None, math.inf, math.inf, str(problem))
+        limit = self.budget.left() * _ONE
+        trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
+        return self._kept(name, scene, model, trial)
+
+    def _kept(self, name: str, scene: Scene, model: Model, trial: Trial) -> Tried:
+        if trial.numbers is None:
+            tried = Tried(name, scene, None, math.inf, trial.cpu_s, trial.failure)
+        else:
+            found = error_of(trial, self.reference, self.measure)
+            error, why = (math.inf, found) if isinstance(found, str) else (found, "")
+            spent = self._least(model, trial)
+            tried = Tried(name, scene, model, error * self.span.growth, spent, why)
+        self._found[name] = tried
+        return tried
+
+    def _least(self, model: Model, trial: Trial) -> float:
+        """The least time of several runs where they are short."""
+        times = [trial.cpu_s]
+        if trial.cpu_s < _SHORT:
+            times += [
+                self.runs.simulate(model, trial.setting, self.budget.left())[1]
+                for _ in range(_REPEATS - 1)
+            ]
+        return min(times)
+
+    def _run(self, model: Model, name: str, rtol: float) -> Trial:
+        """One run of the richest model; NumericalFailure where it gives nothing."""
+        limit = self.budget.left() * 2 * _WHOLE
+        self.tell(f"{name}, rtol {rtol:.0e}")
+        trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
+        if trial.numbers is None:
+            raise NumericalFailure(f"the richest model, {name}: {trial.failure}")
+        return trial
+
+
+def first_rtol(part: float) -> float:
+    """The tolerance to begin with for an error in parts of the motion."""
+    return min(max(_PART * part, 100 * _TIGHTEST), _LOOSEST)
+
+
+def _numbers(trial: Trial) -> np.ndarray:
+    assert trial.numbers is not None
+    return trial.numbers

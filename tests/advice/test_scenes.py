@@ -1,0 +1,96 @@
+"""What is advised for scenes with a known answer, and whether it keeps what was asked."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from advice.scenes import HUBS, TIP, hub_and_beam, period, tip, two_beams
+
+import mstmm
+
+
+@cache
+def advised(name: str, error: float) -> mstmm.Advice:
+    return mstmm.advise(hub_and_beam(name), period(name), error=error, of=TIP, rounds=1)
+
+
+@pytest.mark.parametrize("error", [1e-3, 1e-2])
+@pytest.mark.parametrize("name", HUBS)
+def test_keeps_what_was_asked(name: str, error: float) -> None:
+    made = advised(name, error)
+    truth = tip(hub_and_beam(name), period(name))
+    found = tip(made.scene, period(name), **made.options)
+    assert np.linalg.norm(found - truth, axis=1).max() <= error
+    assert made.error <= error
+
+
+def test_levels() -> None:
+    """As the published ladder of these scenes has them: rigid for a stiff beam on a heavy hub,
+    one shape for softer ones, and stiffening where the loads change the stiffness."""
+    (a,), (b,), (c,), (d,) = (advised(name, 1e-3).bodies for name in "ABCD")
+    assert a.choice.level == "rigid"
+    for body in (b, c, d):
+        assert body.choice.coupled
+        assert body.choice.shapes == (("y", 1),)
+    assert d.choice.level == "stiffened"
+
+
+def test_a_heavy_hub_lets_a_looser_error_be_rigid() -> None:
+    """A light hub makes a one-way response worse than none (chi 0.6): rigid errs by 4.7e-3."""
+    (body,) = advised("C", 1e-2).bodies
+    assert body.choice.level == "rigid"
+    assert body.error == pytest.approx(4.7e-3, rel=0.05)
+
+
+def test_estimates() -> None:
+    """d, d chi / (1 - chi) and d gamma of the published ladder."""
+    published = {
+        "A": (9.1e-4, 5.9e-5, 7e-7), "B": (1.0e-2, 6.7e-4, 1.7e-5), "C": (1.3e-2, 2.0e-2, 3.2e-5),
+        "D": (2.2e-1, 1.4e-1, 8.1e-2),
+    }  # fmt: skip
+    for name, (d, recoil, shortening) in published.items():
+        known = advised(name, 1e-3).bodies[0].evidence
+        assert known is not None
+        assert known.deflection == pytest.approx(d, rel=0.06)
+        chi = known.coupling
+        assert known.deflection * chi / (1 - chi) == pytest.approx(recoil, rel=0.06)
+        assert known.deflection * known.load_ratio == pytest.approx(shortening, rel=0.06)
+
+
+def test_tells_of_a_beam_to_be_split() -> None:
+    """A slope of 0.27 to 0.3: one frame errs by about 8e-3, more than 1e-3 and less than 1e-2."""
+    (strict,), (loose,) = (advised("D", error).bodies for error in (1e-3, 1e-2))
+    assert strict.split == pytest.approx(8e-3, rel=0.3)
+    assert "split it into welded beams" in strict.reason
+    assert loose.split is None
+    assert advised("B", 1e-3).bodies[0].split is None
+
+
+def test_each_body_by_itself_and_in_its_plane() -> None:
+    scene = two_beams()
+    made = mstmm.advise(scene, 1.0, error=1e-3, of="lash.tip.position", rounds=1)
+    boom, lash = made.bodies
+    assert boom.name == "boom"
+    assert boom.choice.level == "rigid"
+    assert dict(boom.given.shapes) == {"y": 2, "z": 1}
+    assert boom.error is not None and boom.error < 1e-4
+    assert lash.choice.coupled
+    assert made.scene.hinge[1].type == "pin"
+    assert any("elbow" in text for text in made.hinges)
+    assert made.model_saving is not None and made.model_saving > 2
+    truth = tip(scene, 1.0, "lash.tip.position", method="rodas5p", rtol=1e-8, atol=1e-10)
+    found = tip(made.scene, 1.0, "lash.tip.position", **made.options)
+    assert np.linalg.norm(found - truth, axis=1).max() <= 1e-3
+
+
+def test_a_given_model_that_is_too_little() -> None:
+    """Linear kinematics where the loads change the stiffness by a third err by 4e-2."""
+    scene = hub_and_beam("D", 2, stiffening=False)
+    made = mstmm.advise(scene, period("D"), error=1e-2, of=TIP, rounds=0)
+    (body,) = made.bodies
+    assert body.given.level == "linear"
+    assert body.choice.level == "stiffened"
+    tried = {one.name: one.error for one in made.tried}
+    assert tried["as given"] == pytest.approx(4.2e-2, rel=0.05)
