@@ -9,3 +9,6 @@ RTOL, ATOL = 1e-9, 1e-12
 #: A chart: seconds of the clock, error for which a setting is recommended, times at which errors
 #: are looked at, rounds in which processor times are taken again.
 CHART_BUDGET, CHART_ERROR, CHART_SAMPLES, CHART_ROUNDS = 60.0, 1e-3, 101, 3
+
+#: An advice: times at which errors are looked at.
+ADVICE_SAMPLES = 201

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
+from ..defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from ..errors import SceneError
 from ..scene import Scene
 from .compilation import compile_scene
@@ -22,7 +22,7 @@ def advise(
     error: float = CHART_ERROR,
     of: str | Sequence[str] = (),
     budget: float = CHART_BUDGET,
-    samples: int = CHART_SAMPLES,
+    samples: int = ADVICE_SAMPLES,
     rounds: int = CHART_ROUNDS,
     engine: str = "looped",
     progress: Callable[[str], None] | None = None,

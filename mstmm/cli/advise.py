@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
+from mstmm.defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 
 from .chart import follow
 from .options import Json, finite, output_file, positive
@@ -43,7 +43,7 @@ def advise(
     samples: Annotated[
         int, typer.Option("--times", metavar="N", help="Times from 0 to the end at which errors "
                           "are looked at; the largest counts.")
-    ] = CHART_SAMPLES,
+    ] = ADVICE_SAMPLES,
     rounds: Annotated[
         int, typer.Option("--rounds", metavar="N", help="How often times are taken again.")
     ] = CHART_ROUNDS,

@@ -44,8 +44,8 @@ _ENOUGH, _WITH_SETTING = 0.9, 0.95
 _SEARCH, _SETTINGS = 0.6, 0.3
 
 #: Models whose settings are tried: the one found, and others that suffice and took no longer than
-#: so many times its time.
-_FINALISTS, _NEARLY = 3, 1.5
+#: so many times its time; than so many where they err by less than this part of what is asked.
+_FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
 
 #: A planar scene is the same motion: it may err by this part of what is asked.
 _SAME = 0.01
@@ -134,7 +134,7 @@ class _Advising:
         choices, best = search.run() if self.bodies.richest else ({}, base)
         if search.out_of_time:
             self.notes.append("time ended before every smaller model was tried: give more --budget")
-        chosen = self._chosen(best)
+        chosen = self._chosen(best, choices, search)
         choices = search.made.get(chosen.tried.name, choices)
         return self._told(choices, evidence, chosen, search)
 
@@ -201,16 +201,19 @@ class _Advising:
 
     # --- what was found -------------------------------------------------------------------------
 
-    def _chosen(self, best: Tried) -> Chosen:
-        """The cheapest setting of the model found, or of another one that nearly is as cheap."""
-        enough = [
-            one for one in self.bench.all
-            if one.error <= _ENOUGH * self.asked.error and one.cpu_s <= _NEARLY * best.cpu_s
-        ]  # fmt: skip
-        others = sorted((one for one in enough if one is not best), key=lambda one: one.cpu_s)
+    def _chosen(self, best: Tried, choices: Choices, search: Search) -> Chosen:
+        """The cheapest setting of the model found, or of another one that nearly is as cheap; a
+        model that leaves more of the error to the integration may be cheaper in the end."""
+        asked = self.asked.error
+        if best.error > _ROOMY * asked and choices != self.bodies.richest:
+            search.tried(search.richer(choices))
+        others = sorted(
+            (one for one in self.bench.all if one is not best and self._may_be_cheapest(one, best)),
+            key=lambda one: one.cpu_s,
+        )
         finalists = [best, *others][:_FINALISTS]
         seconds = max(_SETTINGS * self.asked.budget, self.budget.left())
-        asked, growth = _WITH_SETTING * self.asked.error, self.bench.span.growth
+        asked, growth = _WITH_SETTING * asked, self.bench.span.growth
         try:
             return cheapest(
                 finalists, self.bench, asked / growth, self.asked.of, self.asked.rounds, seconds
@@ -218,6 +221,10 @@ class _Advising:
         except NumericalFailure:  # then as all models were run
             setting = Setting(AUTO, best.name, self.bench.rtol)
             return Chosen(best, Point(setting, best.error / growth, best.cpu_s, 1))
+
+    def _may_be_cheapest(self, one: Tried, best: Tried) -> bool:
+        times = _NEARLY if one.error > _ROOMY * self.asked.error else _ROOMIER
+        return one.error <= _ENOUGH * self.asked.error and one.cpu_s <= times * best.cpu_s
 
     def _told(
         self, choices: Mapping[str, Choice], evidence: Mapping[str, Evidence], chosen: Chosen,

@@ -78,7 +78,7 @@ class Search:
                 return choices, tried
             if not self._more_time():
                 return dict(self.bodies.richest), self.tried(self.bodies.richest)
-            choices = self._richer(choices)
+            choices = self.richer(choices)
 
     def _first(self, name: str) -> Choice:
         """The least choice that is expected to suffice."""
@@ -129,7 +129,7 @@ class Search:
             return -have - (0.5 if direction in ("twist", "axial") else 0.0)
         return known.by_shape.get(f"{direction}{have + 1}", 0.0)
 
-    def _richer(self, choices: Choices) -> Choices:
+    def richer(self, choices: Choices) -> Choices:
         """The bodies of which most is expected, one choice up."""
         rising = {name for name in choices if choices[name] != self.bodies.richest[name]}
         known = {name: self.expected(name, choices[name]) for name in rising}

@@ -1,0 +1,65 @@
+"""Whether an advised model keeps what was asked, and what it costs beside the cheapest one.
+
+    python -m benchmarks.advice [--tuning] [--each N] [--seed N] [--rounds N] [--jobs N]
+
+Four scenes whose choices are published, and scenes drawn afresh (`--tuning`: with the seed on which
+the rules were set).  Processor time of whole warm calls, the least of alternating rounds, on the
+looped engine.
+"""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from ..common import measure
+from ..error_control.scenes import draw
+from . import scenes, trials
+from .report import table
+
+HERE = Path(__file__).resolve().parent
+
+#: Seeds of the scenes on which the rules were set, and of those on which they are judged.
+_TUNING, _JUDGED = 7, 2029
+
+
+def main() -> None:
+    """Run all; print, and write result.json and result.md, after every scene."""
+    parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--tuning", action="store_true", help="scenes on which rules were set")
+    parser.add_argument("--each", type=int, default=5, help="scenes of each family")
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--rounds", type=int, default=7, help="alternating rounds of times")
+    parser.add_argument("--jobs", type=int, default=1, help="scenes at a time")
+    parser.add_argument("--out", type=Path, default=HERE, help="folder of result.json, result.md")
+    options = parser.parse_args()
+    seed = options.seed
+    if seed is None:
+        seed = _TUNING if options.tuning else _JUDGED
+    drawn = draw(scenes.FAMILIES, options.each, seed)
+    tasks = [(name, one, options.rounds) for name, one in {**scenes.published(), **drawn}.items()]
+    outcomes: list[trials.Outcome] = []
+    without: dict[str, float] = {}
+    data: dict[str, Any] = {
+        "machine": measure.machine(), "set": "tuning" if options.tuning else "judged",
+        "each": options.each, "seed": seed, "rounds": options.rounds, "jobs": options.jobs,
+        "scenes_drawn": len(drawn),
+    }  # fmt: skip
+    with get_context("spawn").Pool(options.jobs) as pool:
+        for name, found, floor in pool.imap_unordered(trials.tried, tasks):
+            if not found:
+                without[name] = floor
+            outcomes += found
+            print(*(one.line() for one in found), sep="\n", flush=True)
+            data |= {"without_reference": without, "outcomes": [asdict(x) for x in outcomes]}
+            text = json.dumps(data, indent=1) + "\n"
+            (options.out / "result.json").write_text(text, encoding="utf-8")
+            (options.out / "result.md").write_text(table(outcomes, data), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""Scenes that are reduced: four with a published choice, and families that are drawn afresh.
+
+A family is a function of a random generator and gives a scene dictionary and the end of its run
+(s), as those of the wanted errors, of which the flexible ones are drawn here too.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..error_control.scenes import (
+    Drawn,
+    Family,
+    Scene,
+    beam_arms,
+    falling_beams,
+    flexible_trees,
+    spun_beams,
+)
+
+_Z = [0.0, 0.0, 1.0]
+
+#: Hub's inertia, bending stiffness, period and torque of four scenes.
+HUBS = {
+    "A": (5.0, 400.0, 1.5, 20.0),
+    "B": (5.0, 20.0, 1.2, 8.0),
+    "C": (0.2, 20.0, 1.2, 1.0),
+    "D": (0.5, 2.0, 3.0, 2.4),
+}
+
+
+def hub(inertia: float, bending: float, period: float, torque: float, shapes: int) -> Drawn:
+    """A hub with a clamped beam, pushed by one period of a torque, over two."""
+    beam = {
+        "name": "arm", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": bending,
+        "modes": {"y": shapes}, "frame": "tangent", "basis": "clamped-free",
+    }  # fmt: skip
+    effort = f"where(t < {period:.6g}, {torque:.6g}*sin(2*pi*t/{period:.6g}), 0)"
+    hinges = [
+        {"name": "axle", "type": "pin", "inboard": "ground", "outboard": "hub",
+         "law": {"effort": effort}},
+        {"name": "root", "type": "fixed", "inboard": "hub", "outboard": "arm"},
+    ]  # fmt: skip
+    body = {"name": "hub", "mass": 1.0, "inertia": [inertia] * 3}
+    scene = {"gravity": [0.0] * 3, "body": [body], "beam": [beam], "hinge": hinges}
+    return scene, 2 * period
+
+
+def _log(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(10 ** rng.uniform(low, high))
+
+
+def hub_arms(rng: np.random.Generator) -> Drawn:
+    """The four scenes and what lies between and around them."""
+    inertia, bending, period = _log(rng, -1, 1), _log(rng, 0.3, 3), float(rng.uniform(0.8, 3))
+    angle = float(rng.uniform(0.3, 3.0))
+    torque = angle * (inertia + 1 / 3) * 2 * math.pi / period**2
+    return hub(inertia, bending, period, torque, int(rng.integers(2, 5)))
+
+
+def panels(rng: np.random.Generator) -> Drawn:
+    """A body that turns by a torque, with two panels of different stiffness on it."""
+    beams: list[Scene] = []
+    hinges: list[Scene] = []
+    for name, turned in (("left", math.pi), ("right", 0.0)):
+        beams.append({
+            "name": name, "length": float(rng.uniform(1.0, 2.0)),
+            "mass_per_length": float(rng.uniform(0.3, 1.0)), "bending_stiffness": _log(rng, 0.7, 4),
+            "modes": {"y": int(rng.integers(1, 4)), "z": int(rng.integers(0, 2))},
+            "damping": float(rng.choice([0.0, 0.01])),
+        })  # fmt: skip
+        hinges.append({
+            "name": f"to_{name}", "type": "fixed", "inboard": "hub", "outboard": name,
+            "orientation": [0.0, 0.0, turned],
+        })  # fmt: skip
+    period = float(rng.uniform(0.8, 2.5))
+    torque = float(rng.uniform(1, 6))
+    effort = f"where(t < {period:.6g}, {torque:.6g}*sin(2*pi*t/{period:.6g}), 0)"
+    axle = {"name": "axle", "type": "pin", "axis": _Z, "inboard": "ground", "outboard": "hub",
+            "law": {"effort": effort}}  # fmt: skip
+    body = {"name": "hub", "mass": 2.0, "inertia": [float(rng.uniform(0.3, 3))] * 3}
+    scene = {"gravity": [0.0] * 3, "body": [body], "beam": beams, "hinge": [axle, *hinges]}
+    return scene, float(rng.uniform(1.5, 3)) * period
+
+
+def booms(rng: np.random.Generator) -> Drawn:
+    """A beam that bends both ways and twists on a driven column, with a load on its tip."""
+    beam = {
+        "name": "boom", "length": float(rng.uniform(0.8, 2)), "mass_per_length": 0.8,
+        "bending_stiffness": [_log(rng, 1.3, 4), _log(rng, 1.3, 4)],
+        "torsional_stiffness": _log(rng, 1, 3), "polar_inertia_per_length": 1e-3,
+        "modes": {"y": int(rng.integers(1, 3)), "z": int(rng.integers(1, 3)), "twist": 1},
+        "damping": 0.01,
+    }  # fmt: skip
+    load = {
+        "name": "load", "mass": float(rng.uniform(0.1, 1)), "inertia": [0.01, 0.02, 0.02],
+        "center_of_mass": [0.1, float(rng.choice([0.0, 0.05])), 0.0],
+    }  # fmt: skip
+    turned, w = float(rng.uniform(0.2, 1.0)), float(rng.uniform(1, 5))
+    hinges = [
+        {"name": "column", "type": "pin", "axis": _Z, "inboard": "ground", "outboard": "boom",
+         "drive": f"{turned:.6g}*(1 - cos({w:.6g}*t))"},
+        {"name": "grip", "type": "fixed", "inboard": "boom.tip", "outboard": "load"},
+    ]  # fmt: skip
+    gravity = [0.0, 0.0, -9.81 if rng.random() < 0.5 else 0.0]
+    scene = {"gravity": gravity, "body": [load], "beam": [beam], "hinge": hinges}
+    return scene, float(rng.uniform(1, 2))
+
+
+FAMILIES: dict[str, Family] = {
+    f.__name__: f
+    for f in (hub_arms, panels, booms, beam_arms, flexible_trees, falling_beams, spun_beams)
+}
+
+
+def published() -> dict[str, Drawn]:
+    """Scenes A to D."""
+    return {name: hub(*numbers, 5) for name, numbers in HUBS.items()}
