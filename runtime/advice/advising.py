@@ -23,8 +23,9 @@ from ..result.flexible.certify import SLOPE
 from ..result.measure import Measure
 from .choice import RIGID, Bodies, Choice, given
 from .evidence import Evidence, gathered
+from .hinges import Change, applied, needless, rigid
 from .record import Advice, BodyAdvice, TriedModel
-from .search import Choices, Search
+from .search import AS_CHEAP, Choices, Search
 from .settings import Chosen, cheapest, compared
 from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
 from .words import reason
@@ -46,6 +47,13 @@ _SEARCH, _SETTINGS = 0.6, 0.3
 #: Models whose settings are tried: the one found, and others that suffice and took no longer than
 #: so many times its time; than so many where they err by less than this part of what is asked.
 _FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
+
+#: Hinges may be made rigid up to this part of what is asked; springs left out up to one, or to so
+#: many times the error that there is; what is expected to err by so many times of it is not tried.
+_RIGID, _NEEDLESS, _HARDLY, _UNLIKELY = 0.5, 0.1, 1.1, 5.0
+
+#: What is simpler without being quicker may take so many times the time, which scatters.
+_AS_QUICK = 1.5
 
 #: A planar scene is the same motion: it may err by this part of what is asked.
 _SAME = 0.01
@@ -108,7 +116,7 @@ class _Advising:
         self.scene, self.asked, self.budget = model.scene, asked, budget
         self.compile, self.tell, self.state = compile, tell, state
         self.notes: list[str] = []
-        self.hinges: list[str] = []
+        self.told: dict[str, tuple[str, ...]] = {RICHEST: ()}  # name of a model -> its hinges
 
     def advice(self) -> Advice:
         asked = self.asked
@@ -116,24 +124,32 @@ class _Advising:
         model = self.compile(top.scene)
         start = model.simulate(0.0, method="dop853")
         self.measure = measure_of(model, start, asked.of, True)
-        rigid = self._least()
+        first = self._least()
         self.length = whole_length(model)
-        self.size = _size(self.measure, rigid)
-        evidence, why = gathered(rigid, self.length)
+        self.size = _size(self.measure, first)
+        evidence, why = gathered(first, self.length)
         if why:
             self.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
         self.bench, richest = self._bench(top, model)
         base = self._in_plane(top, model, richest)
+        still = rigid(base.scene, model, self.bench.reference.q, self.length)
+        base = self._changed(base, "rigid", still, _RIGID * asked.error, AS_CHEAP)
         self.whole = Bodies(top.scene).richest
         self.bodies = Bodies(base.scene)
+        self.base = base.name
         search = Search(
             self.bodies, self.bench, evidence, _ENOUGH * asked.error, self.in_measure,
             lambda: self.budget.left(_SEARCH) > 0,
         )  # fmt: skip
-        search.made |= {RICHEST: self.bodies.richest, "planar": self.bodies.richest}
+        for name in (RICHEST, base.name):
+            search.made[name] = self.bodies.richest
         choices, best = search.run() if self.bodies.richest else ({}, base)
         if search.out_of_time:
             self.notes.append("time ended before every smaller model was tried: give more --budget")
+        self.told.setdefault(best.name, self.told[base.name])
+        enough = max(_NEEDLESS * asked.error, _HARDLY * best.error)
+        best = self._changed(best, "without", needless(best.scene), enough, _AS_QUICK)
+        search.made.setdefault(best.name, choices)
         chosen = self._chosen(best, choices, search)
         choices = search.made.get(chosen.tried.name, choices)
         return self._told(choices, evidence, chosen, search)
@@ -191,13 +207,32 @@ class _Advising:
         found = self.bench.tried("planar", flat.scene)
         if found.error > max(_SAME * self.asked.error, 3 * self.bench.floor):
             return richest
-        for old, new in zip(top.scene.hinge, flat.scene.hinge, strict=True):
-            if old != new:
-                self.hinges.append(
-                    f'hinge "{old.name}": {new.type} instead of {old.type}, for the motion stays '
-                    "in a plane"
-                )
+        self.told[found.name] = tuple(
+            f'hinge "{old.name}": {new.type} instead of {old.type}, for the motion stays in a plane'
+            for old, new in zip(top.scene.hinge, flat.scene.hinge, strict=True)
+            if old != new
+        )
         return found
+
+    def _changed(
+        self, base: Tried, word: str, changes: list[Change], enough: float, times: float
+    ) -> Tried:
+        """The model with as many of these changes as it bears within an error that is enough and
+        so many times the time: all at once, or one after the other."""
+        likely = [one for one in changes if one.expected * self.in_measure <= _UNLIKELY * enough]
+        kept: list[Change] = []
+        best = base
+        tries = [likely, *([one] for one in likely if len(likely) > 1)] if likely else []
+        for more in tries:
+            if not self.budget.left(_SEARCH) or len(kept) == len(likely):
+                break
+            names = ", ".join(one.name for one in (*kept, *more))
+            scene = applied(base.scene, [*kept, *more])
+            found = self.bench.tried(f"{base.name}; {word}: {names}", scene)
+            if found.error <= enough and found.cpu_s <= times * best.cpu_s:
+                kept, best = [*kept, *more], found
+        self.told[best.name] = (*self.told[base.name], *map(str, kept))
+        return best
 
     # --- what was found -------------------------------------------------------------------------
 
@@ -235,14 +270,15 @@ class _Advising:
             self._body(name, choice, evidence.get(name), search) for name, choice in choices.items()
         )
         model_saving, setting_saving = self._savings(chosen)
-        if not bodies and not self.hinges:
+        hinges = self.told.get(chosen.tried.name, self.told[self.base])
+        if not bodies:
             self.notes.append("there is nothing to reduce in the bodies: none of them deforms")
         growth = bench.span.growth
         error = chosen.point.error
         assert error is not None and chosen.point.cpu_s is not None
         return Advice(
             asked.error, self.measure.name, self.measure.unit, self.measure.scaling, asked.t_end,
-            str(bench.span), bench.span.whole, bench.floor, bodies, tuple(self.hinges),
+            str(bench.span), bench.span.whole, bench.floor, bodies, hinges,
             chosen.point.setting, error * growth, chosen.point.cpu_s, model_saving,
             setting_saving, chosen.tried.scene, tuple(self.notes),
             tuple(

@@ -16,14 +16,14 @@ from .evidence import Evidence
 from .trials import Bench, Tried
 
 #: A choice is expected to suffice below this part of what is asked, and is not tried where more
-#: than so many times of it is expected.
-_ENOUGH, _HOPELESS = 0.5, 50.0
+#: than so many times of it is expected; a one-way response, which takes its time, than so many.
+_ENOUGH, _HOPELESS, _DOUBTFUL = 0.5, 50.0, 3.0
 
 #: Bodies get richer together where this part of the largest error is expected of them.
 _TOGETHER = 0.1
 
 #: A choice counts as cheaper up to this many times the time, for times scatter.
-_AS_CHEAP = 1.05
+AS_CHEAP = 1.05
 
 Choices = dict[str, Choice]
 
@@ -162,14 +162,14 @@ class Search:
             lowered = True
             while lowered:
                 lowered = False
-                for choice in self._less(choices[name]):
+                for choice in self._less(name, choices[name]):
                     if (name, choice) in self.failed or not self._worth_trying(name, choice):
                         continue
                     if not self._more_time():
                         return choices, best
                     other = {**choices, name: choice}
                     tried = self.tried(other)
-                    if tried.error <= self.enough and tried.cpu_s <= _AS_CHEAP * best.cpu_s:
+                    if tried.error <= self.enough and tried.cpu_s <= AS_CHEAP * best.cpu_s:
                         choices, best, lowered = other, tried, True
                         break
                     self.failed.add((name, choice))
@@ -177,16 +177,17 @@ class Search:
 
     def _worth_trying(self, name: str, choice: Choice) -> bool:
         known = self.expected(name, choice)
-        return known is None or known <= _HOPELESS * self.enough
+        most = _DOUBTFUL if choice.level == ONE_WAY else _HOPELESS
+        return known is None or known <= most * self.enough
 
-    def _less(self, choice: Choice) -> Iterator[Choice]:
+    def _less(self, name: str, choice: Choice) -> Iterator[Choice]:
         """What is less than a choice, the least first."""
         if choice.level == RIGID:
             return
         yield Choice(RIGID)
         if choice.level == ONE_WAY:
             return
-        yield Choice(ONE_WAY, choice.shapes)
+        yield Choice(ONE_WAY, self.bodies.richest[name].shapes)  # oscillators cost next to nothing
         for word, n in reversed(choice.shapes):
             fewer = sorted({0, n // 2, n - 1} - {n})
             for count in fewer:

@@ -68,3 +68,25 @@ def tip(scene: mstmm.Scene, t_end: float, name: str = TIP, **options: Any) -> ND
     result = model.simulate(t_end, output_times=np.linspace(0, t_end, 201), **given)
     assert result.success
     return result.quantity(name).values
+
+
+def sprung(stiffness: float, damping: float = 1e-9) -> mstmm.Scene:
+    """Four rods in a row: a pin with a damper, a sprung pin, a bushing and a slide."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.001, 0.084, 0.084],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    law = {"stiffness": [1e7] * 3 + [1e6] * 3, "damping": [1e2] * 6}
+    return mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        body=[rod | {"name": name} for name in ("a", "b", "c", "d")],
+        hinge=[
+            {"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "a",
+             "law": {"damping": damping}},
+            {"name": "spring", "type": "pin", "inboard": "a.tip", "outboard": "b",
+             "law": {"stiffness": stiffness, "rest": 0.4, "damping": 10.0},
+             "initial": {"q": [0.4]}},
+            {"name": "bushing", "type": "elastic", "inboard": "b.tip", "outboard": "c",
+             "law": law},
+            {"name": "slide", "type": "prismatic", "axis": [0, 0, 1], "inboard": "c.tip",
+             "outboard": "d", "law": {"stiffness": 1e3, "damping": 1.0}},
+        ],
+    )  # fmt: skip
