@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 
 import mstmm
+from mstmm.runtime.advice.renaming import Renaming
 
 from ..error_control.scenes import Drawn
 from .best import Single, Truth, cheapest, models, single, singles, timed, truth
@@ -87,7 +88,9 @@ def outcome(
     ours_model = mstmm.compile(advice.scene, engine="looped")
     found = timed(ours_model, t_end, **advice.options)
     assert found is not None
-    error = float(known.measure.apart(known.measure.read(found[0]), known.numbers).max())
+    measure = Renaming(known.measure)
+    measure.know(ours_model, advice.names)
+    error = float(measure.apart(measure.read(found[0]), known.numbers).max())
     rivals = [cheapest(made, asked, sure) for sure in (True, False)]
     scenes = dict(models(known.base))
     compiled = {
@@ -103,7 +106,7 @@ def outcome(
             if run is not None:
                 theirs[one].append(run[1])
     times = [None if one is None else min(theirs[one]) for one in rivals]
-    advised = "; ".join([*(f"{b.name}: {b.choice}" for b in advice.bodies), *advice.hinges])
+    advised = "; ".join([*(f"{b.name}: {b.choice}" for b in advice.bodies), *advice.changes])
     return Outcome(
         name, asked, error, advice.error, min(ours), None if rivals[0] is None else str(rivals[0]),
         times[0], times[1], f"{advised}; {advice.method}, {advice.setting}", advice.whole, spent,

@@ -94,7 +94,7 @@ def _say(made: Advice, files: list[str]) -> None:
     output.say()
     for body in made.bodies:
         output.say(f"{body.name}: {body.reason}")
-    for text in (*made.hinges, *made.notes):
+    for text in (*made.changes, *made.notes):
         output.say(text)
     if files:
         output.say(f"wrote {' and '.join(files)}")

@@ -24,7 +24,9 @@ from ..result.measure import Measure
 from .choice import RIGID, Bodies, Choice, given
 from .evidence import Evidence, gathered
 from .hinges import Change, applied, needless, rigid
+from .merging import merged
 from .record import Advice, BodyAdvice, TriedModel
+from .renaming import Renaming
 from .search import AS_CHEAP, Choices, Search
 from .settings import Chosen, cheapest, compared
 from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
@@ -51,9 +53,6 @@ _FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
 #: Hinges may be made rigid up to this part of what is asked; springs left out up to one, or to so
 #: many times the error that there is; what is expected to err by so many times of it is not tried.
 _RIGID, _NEEDLESS, _HARDLY, _UNLIKELY = 0.5, 0.1, 1.1, 5.0
-
-#: What is simpler without being quicker may take so many times the time, which scatters.
-_AS_QUICK = 1.5
 
 #: A planar scene is the same motion: it may err by this part of what is asked.
 _SAME = 0.01
@@ -123,7 +122,7 @@ class _Advising:
         top = ladder(self.scene)[-1]
         model = self.compile(top.scene)
         start = model.simulate(0.0, method="dop853")
-        self.measure = measure_of(model, start, asked.of, True)
+        self.measure = Renaming(measure_of(model, start, asked.of, True))
         first = self._least()
         self.length = whole_length(model)
         self.size = _size(self.measure, first)
@@ -148,7 +147,8 @@ class _Advising:
             self.notes.append("time ended before every smaller model was tried: give more --budget")
         self.told.setdefault(best.name, self.told[base.name])
         enough = max(_NEEDLESS * asked.error, _HARDLY * best.error)
-        best = self._changed(best, "without", needless(best.scene), enough, _AS_QUICK)
+        best = self._changed(best, "without", needless(best.scene), enough, math.inf)
+        best = self._lumped(best, enough)
         search.made.setdefault(best.name, choices)
         chosen = self._chosen(best, choices, search)
         choices = search.made.get(chosen.tried.name, choices)
@@ -174,7 +174,7 @@ class _Advising:
     @property
     def in_measure(self) -> float:
         """What turns a displacement in m into the unit of errors."""
-        if isinstance(self.measure, Places):
+        if isinstance(self.measure.inner, Places):
             return 1.0 / self.length
         return 1.0 if self.measure.unit == "m" else self.size / self.length
 
@@ -234,6 +234,18 @@ class _Advising:
         self.told[best.name] = (*self.told[base.name], *map(str, kept))
         return best
 
+    def _lumped(self, base: Tried, enough: float) -> Tried:
+        """The model with welded rigid bodies as one."""
+        found = merged(base.scene)
+        if found is None:
+            return base
+        name = f"{base.name}; welded bodies as one"
+        tried = self.bench.tried(name, found.scene, found.names)
+        if tried.error > enough:
+            return base
+        self.told[name] = (*self.told[base.name], *found.words)
+        return tried
+
     # --- what was found -------------------------------------------------------------------------
 
     def _chosen(self, best: Tried, choices: Choices, search: Search) -> Chosen:
@@ -243,7 +255,12 @@ class _Advising:
         if best.error > _ROOMY * asked and choices != self.bodies.richest:
             search.tried(search.richer(choices))
         others = sorted(
-            (one for one in self.bench.all if one is not best and self._may_be_cheapest(one, best)),
+            (
+                one
+                for one in self.bench.all
+                if search.made.get(one.name, choices) != choices
+                and self._may_be_cheapest(one, best)
+            ),
             key=lambda one: one.cpu_s,
         )
         finalists = [best, *others][:_FINALISTS]
@@ -280,7 +297,8 @@ class _Advising:
             asked.error, self.measure.name, self.measure.unit, self.measure.scaling, asked.t_end,
             str(bench.span), bench.span.whole, bench.floor, bodies, hinges,
             chosen.point.setting, error * growth, chosen.point.cpu_s, model_saving,
-            setting_saving, chosen.tried.scene, tuple(self.notes),
+            setting_saving, chosen.tried.scene,
+            dict(self.measure.names_in(chosen.tried.running)), tuple(self.notes),
             tuple(
                 TriedModel(
                     one.name, one.error if math.isfinite(one.error) else None, one.cpu_s, one.why

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from ..chart.point import Setting
 from ..host.files import replacing
 from .choice import Choice
 from .evidence import Evidence
+from .renaming import renamed
 
 #: Columns of comments in a scene that is written.
 _WIDTH = 96
@@ -74,7 +76,7 @@ class Advice:
         compared: over what models were compared, in words; `whole` where that was all of the run.
         reference_error: how far two runs of the richest model were apart.
         bodies: the choice for each flexible body.
-        hinges: what became of hinges, a sentence each.
+        changes: what became of hinges, springs and welded bodies, a sentence each.
         setting: method and tolerance.
         error: of the advised model at this setting, against the richest model.
         cpu_s: processor time of that run over what was compared, s.
@@ -82,6 +84,7 @@ class Advice:
             method and tolerance; setting_saving: time of the default method and tolerance over the
             advised ones, on the advised model.  None where one of the runs failed or took too long.
         scene: the reduced scene.
+        names: places that have other names in it, such as "arm.tip", and these names.
         notes: what else there is to know, a sentence each.
         tried: every model that was tried.
     """
@@ -95,13 +98,14 @@ class Advice:
     whole: bool
     reference_error: float
     bodies: tuple[BodyAdvice, ...]
-    hinges: tuple[str, ...]
+    changes: tuple[str, ...]
     setting: Setting
     error: float
     cpu_s: float
     model_saving: float | None
     setting_saving: float | None
     scene: Scene
+    names: Mapping[str, str]
     notes: tuple[str, ...]
     tried: tuple[TriedModel, ...]
 
@@ -118,7 +122,11 @@ class Advice:
     @property
     def reduced(self) -> bool:
         """Whether the advised scene is less than the given one."""
-        return bool(self.hinges) or any(one.choice != one.given for one in self.bodies)
+        return bool(self.changes) or any(one.choice != one.given for one in self.bodies)
+
+    def renamed(self, quantity: str) -> str:
+        """The name of a place or a quantity in the reduced scene."""
+        return renamed(quantity, self.names)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values."""
@@ -126,11 +134,12 @@ class Advice:
             "error_asked": self.asked, "of": self.measure, "unit": self.unit,
             "scaling": self.scaling, "t_end": self.t_end, "compared": self.compared,
             "whole": self.whole, "reference_error": self.reference_error,
-            "bodies": [body.to_dict() for body in self.bodies], "hinges": list(self.hinges),
+            "bodies": [body.to_dict() for body in self.bodies], "changes": list(self.changes),
             "method": self.method, "setting": self.setting.numbers, "error": self.error,
             "cpu_s": self.cpu_s, "model_saving": self.model_saving,
             "setting_saving": self.setting_saving, "reduced": self.reduced,
-            "scene": self.scene.to_toml(), "notes": list(self.notes),
+            "scene": self.scene.to_toml(), "names": dict(self.names),
+            "notes": list(self.notes),
             "tried": [asdict(one) for one in self.tried],
         }  # fmt: skip
 
@@ -148,7 +157,7 @@ class Advice:
             f"Run it by: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} "
             f"{options}",
             *(f"{one.name}: {one.choice} (was {one.given}). {one.reason}" for one in self.bodies),
-            *self.hinges, *self.notes,
+            *self.changes, *self.notes,
         ]  # fmt: skip
         head = [part for line in lines for part in textwrap.wrap(line, _WIDTH)]
         return "\n".join(f"# {line}" for line in head) + "\n\n" + self.scene.to_toml()

@@ -15,6 +15,7 @@ from ..chart.point import Point, Reference, Setting
 from ..chart.rounds import repeated
 from ..chart.survey import Curve, Survey, curve
 from ..chart.trial import Runs
+from .renaming import renamed
 from .trials import Bench, Tried
 
 #: What is left of the error asked beside the model's own: this part of it is wanted of the
@@ -52,7 +53,9 @@ def cheapest(
     curves = []
     for one in finalists:
         model, enough = one.running, _ENOUGH * asked
-        found = _wanted(one, runs, of, _WANTED * (asked - own[one.name]))
+        names = bench.measure.names_in(model)
+        theirs = tuple(renamed(name, names) for name in of)
+        found = _wanted(one, runs, theirs, _WANTED * (asked - own[one.name]))
         if found is not None:
             curves.append(Curve(found.method, one.name, model, enough, "", iter((found,))))
         curves += [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from ..chart.point import Setting
 from ..chart.trial import Runs, Trial, error_of
 from ..integrate.steppers import AUTO
 from ..result.measure import Measure
+from .renaming import Renaming
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -121,7 +122,7 @@ class Bench:
     """
 
     def __init__(
-        self, span: Span, samples: int, budget: Budget, measure: Measure, compile: Compile,
+        self, span: Span, samples: int, budget: Budget, measure: Renaming, compile: Compile,
         tell: Tell,
     ) -> None:  # fmt: skip
         self.span, self.measure, self.budget = span, measure, budget
@@ -158,11 +159,11 @@ class Bench:
         tried = self._kept(name, scene, model, run)
         return replace(tried, error=far)
 
-    def tried(self, name: str, scene: Scene) -> Tried:
-        """A model that was run."""
+    def tried(self, name: str, scene: Scene, names: Mapping[str, str] | None = None) -> Tried:
+        """A model that was run; `names` are other names that places have in it."""
         if name not in self._found:
             self.tell(name)
-            self._found[name] = self._try(name, scene)
+            self._found[name] = self._try(name, scene, names)
         return self._found[name]
 
     @property
@@ -170,9 +171,10 @@ class Bench:
         """Everything that was tried, in its order."""
         return tuple(self._found.values())
 
-    def _try(self, name: str, scene: Scene) -> Tried:
+    def _try(self, name: str, scene: Scene, names: Mapping[str, str] | None) -> Tried:
         try:
             model = self.compile(scene)
+            self.measure.know(model, names or {})
         except MstmmError as problem:
             return Tried(name, scene, None, math.inf, math.inf, str(problem))
         limit = self.budget.left() * _ONE

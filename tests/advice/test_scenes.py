@@ -21,7 +21,7 @@ def advised(name: str, error: float) -> mstmm.Advice:
 def test_keeps_what_was_asked(name: str, error: float) -> None:
     made = advised(name, error)
     truth = tip(hub_and_beam(name), period(name))
-    found = tip(made.scene, period(name), **made.options)
+    found = tip(made.scene, period(name), made.renamed(TIP), **made.options)
     assert np.linalg.norm(found - truth, axis=1).max() <= error
     assert made.error <= error
 
@@ -79,10 +79,10 @@ def test_each_body_by_itself_and_in_its_plane() -> None:
     assert boom.error is not None and boom.error < 1e-4
     assert lash.choice.coupled
     assert made.scene.hinge[1].type == "pin"
-    assert any("elbow" in text for text in made.hinges)
+    assert any("elbow" in text for text in made.changes)
     assert made.model_saving is not None and made.model_saving > 2
     truth = tip(scene, 1.0, "lash.tip.position", method="rodas5p", rtol=1e-8, atol=1e-10)
-    found = tip(made.scene, 1.0, "lash.tip.position", **made.options)
+    found = tip(made.scene, 1.0, made.renamed("lash.tip.position"), **made.options)
     assert np.linalg.norm(found - truth, axis=1).max() <= 1e-3
 
 

@@ -1,0 +1,68 @@
+"""Measures of models in which places have other names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, cast
+
+from mstmm.arrays import Array
+
+from ..result.measure import Measure
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..result.names import Quantity
+    from ..result.record import Record
+
+
+def renamed(name: str, names: Mapping[str, str]) -> str:
+    """A place, or a quantity of one ("arm.tip.position"), by its new name."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        place = ".".join(parts[:count])
+        if place in names:
+            return ".".join([names[place], *parts[count:]])
+    return name
+
+
+class Renaming(Measure):
+    """A measure that reads models with other names as if they had the former ones."""
+
+    def __init__(self, inner: Measure) -> None:
+        self.inner = inner
+        self.name, self.unit, self.scaling = inner.name, inner.unit, inner.scaling
+        self._known: dict[int, tuple[Compiled, Mapping[str, str]]] = {}
+
+    def know(self, model: Compiled, names: Mapping[str, str]) -> None:
+        """Former name of a place -> its name in a model."""
+        self._known[id(model)] = (model, names)
+
+    def names_in(self, model: Compiled) -> Mapping[str, str]:
+        """Former name -> its name in a model."""
+        return self._known[id(model)][1] if id(model) in self._known else {}
+
+    def read(self, result: Record) -> Array:
+        """(n, k) numbers of a run at its samples."""
+        names = self.names_in(result.model)
+        return self.inner.read(cast("Record", _ByFormerNames(result, names)) if names else result)
+
+    def apart(self, a: Array, b: Array) -> Array:
+        """(n,) distances of two of them."""
+        return self.inner.apart(a, b)
+
+    def scale_by(self, numbers: Array) -> None:
+        """Take the sizes of what is compared from the reference."""
+        self.inner.scale_by(numbers)
+
+
+class _ByFormerNames:
+    """What a measure asks of a result, by the former names."""
+
+    def __init__(self, result: Record, names: Mapping[str, str]) -> None:
+        self._result, self._names = result, names
+
+    def position(self, name: str) -> Array:
+        return self._result.position(renamed(name, self._names))
+
+    def quantity(self, name: str) -> Quantity:
+        return self._result.quantity(renamed(name, self._names))
