@@ -26,16 +26,19 @@ from .evidence import Evidence, gathered
 from .hinges import Change, applied, needless, rigid
 from .merging import merged
 from .record import Advice, BodyAdvice, TriedModel
-from .renaming import Renaming
+from .renaming import Renaming, composed
 from .search import AS_CHEAP, Choices, Search
 from .settings import Chosen, cheapest, compared
+from .splitting import Split, in_parts, unfit
 from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
 from .words import reason
 
 if TYPE_CHECKING:
+    from mstmm.scene import Scene
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
 
+    from ..chart.trial import Trial
     from ..model.model import Model
     from ..result.result import Result
 
@@ -53,6 +56,9 @@ _FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
 #: Hinges may be made rigid up to this part of what is asked; springs left out up to one, or to so
 #: many times the error that there is; what is expected to err by so many times of it is not tried.
 _RIGID, _NEEDLESS, _HARDLY, _UNLIKELY = 0.5, 0.1, 1.1, 5.0
+
+#: Beams are split until the next halving changes less than this part of what is asked.
+_PARTS = 0.5
 
 #: A planar scene is the same motion: it may err by this part of what is asked.
 _SAME = 0.01
@@ -115,6 +121,8 @@ class _Advising:
         self.scene, self.asked, self.budget = model.scene, asked, budget
         self.compile, self.tell, self.state = compile, tell, state
         self.notes: list[str] = []
+        self.parts: Mapping[str, str] = {}  # beam that is a part -> the beam of the scene
+        self.split_error: float | None = None  # seen of one frame where beams stay whole
         self.told: dict[str, tuple[str, ...]] = {RICHEST: ()}  # name of a model -> its hinges
 
     def advice(self) -> Advice:
@@ -123,7 +131,7 @@ class _Advising:
         model = self.compile(top.scene)
         start = model.simulate(0.0, method="dop853")
         self.measure = Renaming(measure_of(model, start, asked.of, True))
-        first = self._least()
+        first = self._least(self.scene)
         self.length = whole_length(model)
         self.size = _size(self.measure, first)
         evidence, why = gathered(first, self.length)
@@ -131,9 +139,11 @@ class _Advising:
             self.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
         self.bench, richest = self._bench(top, model)
         base = self._in_plane(top, model, richest)
-        still = rigid(base.scene, model, self.bench.reference.q, self.length)
-        base = self._changed(base, "rigid", still, _RIGID * asked.error, AS_CHEAP)
+        q = self.bench.reference.q
         self.whole = Bodies(top.scene).richest
+        base, evidence = self._in_parts(base, evidence)
+        still = rigid(base.scene, model, q, self.length)
+        base = self._changed(base, "rigid", still, _RIGID * asked.error, AS_CHEAP)
         self.bodies = Bodies(base.scene)
         self.base = base.name
         search = Search(
@@ -156,14 +166,14 @@ class _Advising:
 
     # --- what is known beforehand ---------------------------------------------------------------
 
-    def _least(self) -> Result | None:
+    def _least(self, scene: Scene) -> Result | None:
         """The run in which all bodies respond one way, or none deform; None where there is none."""
         self.tell("one-way, before anything else")
         limit = self.budget.alarm(_SEARCH * self.budget.left())
         times = np.linspace(0.0, self.asked.t_end, self.asked.samples)
         rtol = first_rtol(self.asked.error)
         try:
-            model = self.compile(at_level(self.scene, "one-way"))
+            model = self.compile(at_level(scene, "one-way"))
             return model.simulate(
                 self.asked.t_end, method=AUTO, rtol=rtol, atol=0.01 * rtol,
                 output_times=times, progress=limit,
@@ -214,6 +224,66 @@ class _Advising:
         )
         return found
 
+    def _in_parts(
+        self, base: Tried, evidence: dict[str, Evidence]
+    ) -> tuple[Tried, dict[str, Evidence]]:
+        """The richest scene with beams split that one frame cannot follow, and its evidence.
+
+        They are halved until the next halving changes little; the finest one is the reference.
+        """
+        steep = [beam.name for beam in base.scene.beam if self._steep(evidence.get(beam.name))]
+        names = [one.name for one in base.scene.beam if one.name in steep and not unfit(one)]
+        if not names:
+            return base, evidence
+        asked, found = self.asked.error, Split(base.scene, {}, {})
+        try:
+            run = self.bench.finer(base.scene, {}, base.name)
+            for count in (2, 4, 8):
+                parts = in_parts(base.scene, names, count)
+                finer = self.bench.finer(parts.scene, parts.names, f"beams in {count} parts")
+                apart = math.inf if finer.numbers is None else self.bench.apart(run, finer)
+                if apart <= _PARTS * asked or not math.isfinite(apart):
+                    break
+                found, run = parts, finer
+        except MstmmError as problem:
+            self.notes.append(f"beams could not be split: {problem}")
+            return base, evidence
+        if not math.isfinite(apart):
+            self.notes.append(f"beams could not be split into {count} parts: {finer.failure}")
+        if found.scene is base.scene:
+            self.split_error = apart if math.isfinite(apart) else None
+            return base, evidence
+        return self._of_parts(base, found, finer if apart <= _PARTS * asked else run)
+
+    def _of_parts(
+        self, base: Tried, found: Split, reference: Trial
+    ) -> tuple[Tried, dict[str, Evidence]]:
+        """The scene in parts as the richest one, beside a reference with as many parts or more."""
+        told = self.told[base.name]
+        self.parts = found.parts
+        self.whole = {**Bodies(found.scene).richest, **self.whole}
+        single = self.bench.apart(self.bench.reference, reference)
+        self.bench.refer_again(reference, found.names)
+        tried = self.bench.tried("beams in parts", found.scene)
+        wholes: dict[str, list[str]] = {}
+        for part, of in found.parts.items():
+            wholes.setdefault(of, []).append(part)
+        self.told[tried.name] = (*told, *(
+            f'beam "{of}": {len(parts)} welded beams ({", ".join(parts)}) with frames of their '
+            f"own, for with one frame it errs by {single:.1e}"
+            for of, parts in wholes.items()
+        ))  # fmt: skip
+        evidence, why = gathered(self._least(found.scene), self.length)
+        if why:
+            self.notes.append(f"nothing is known of the parts of beams beforehand: {why}")
+        return tried, evidence
+
+    def _steep(self, known: Evidence | None) -> bool:
+        """Whether one floating frame may be too little for a body."""
+        if known is None:
+            return False
+        return known.frame_error * self.in_measure > self.asked.error or known.slope > SLOPE
+
     def _changed(
         self, base: Tried, word: str, changes: list[Change], enough: float, times: float
     ) -> Tried:
@@ -240,7 +310,8 @@ class _Advising:
         if found is None:
             return base
         name = f"{base.name}; welded bodies as one"
-        tried = self.bench.tried(name, found.scene, found.names)
+        names = composed(self.bench.names, found.names)
+        tried = self.bench.tried(name, found.scene, names)
         if tried.error > enough:
             return base
         self.told[name] = (*self.told[base.name], *found.words)
@@ -298,7 +369,8 @@ class _Advising:
             str(bench.span), bench.span.whole, bench.floor, bodies, hinges,
             chosen.point.setting, error * growth, chosen.point.cpu_s, model_saving,
             setting_saving, chosen.tried.scene,
-            dict(self.measure.names_in(chosen.tried.running)), tuple(self.notes),
+            dict(self.measure.names_in(chosen.tried.running)), dict(self.parts),
+            tuple(self.notes),
             tuple(
                 TriedModel(
                     one.name, one.error if math.isfinite(one.error) else None, one.cpu_s, one.why
@@ -321,14 +393,16 @@ class _Advising:
                 whole_model = search.tried(most)
                 error, saving = alone.error, whole_model.cpu_s / alone.cpu_s
         split = None
-        if known is not None:
-            frame = known.frame_error * self.in_measure
-            split = frame if frame > self.asked.error or known.slope > SLOPE else None
-        why = reason(choice, self.whole[name], known, self.in_measure, self.asked.error)
+        if known is not None and self._steep(known) and name not in self.parts:
+            split = self.split_error or known.frame_error * self.in_measure
+        richest = most.get(name, choice) if name in self.parts else self.whole[name]
+        why = reason(choice, richest, known, self.in_measure, self.asked.error)
         if split is not None and known is not None:
+            why += f"; it bends by a slope of {known.slope:.2g}, so that one floating frame "
             why += (
-                f"; it bends by a slope of {known.slope:.2g}, so that any model of it with one "
-                f"floating frame may err by {split:.1e}: split it into welded beams"
+                f"was seen to err by {split:.1e}, which is little beside what is asked"
+                if self.split_error is not None
+                else f"may err by {split:.1e}: split it into welded beams"
             )
         return BodyAdvice(name, self._given(name), choice, error, saving, why, known, split)
 
@@ -338,8 +412,9 @@ class _Advising:
 
     def _given(self, name: str) -> Choice:
         bodies: tuple[Beam | Elastic, ...] = (*self.scene.beam, *self.scene.elastic)
-        written = next(body for body in bodies if body.name == name)
-        return given(written, self.whole[name])
+        of = self.parts.get(name, name)
+        written = next(body for body in bodies if body.name == of)
+        return given(written, self.whole[of])
 
     def _savings(self, chosen: Chosen) -> tuple[float | None, float | None]:
         """Time of the scene as given over that of the advised one, by the same tolerance; of the
@@ -347,7 +422,7 @@ class _Advising:
         setting, tried, rounds = chosen.point.setting, chosen.tried, self.asked.rounds
         rtol = RTOL if setting.fixed else setting.value
         alike = Setting(AUTO, tried.name, rtol)
-        as_given = self.bench.tried(AS_GIVEN, self.scene)
+        as_given = self.bench.tried(AS_GIVEN, self.scene, {})
         found: list[float | None] = [None, None]
         pairs = (
             (as_given, alike, alike), (tried, Setting(METHOD, tried.name, RTOL), setting),

@@ -23,7 +23,7 @@ from ..chart.models import with_tables
 from .choice import RIGID
 
 #: Keys of the tables that refer to a body or to one of its ends.
-_REFERENCES = {
+REFERENCES = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
     "spring": ("from_", "to"),
 }  # fmt: skip
@@ -154,8 +154,8 @@ def _without(found: Merged, weld: Hinge, bodies: Mapping[str, Body]) -> Merged:
         if body.name != part.name
     )
     tables: dict[str, Any] = {
-        table: tuple(_renamed(one, keys, renamed) for one in getattr(scene, table))
-        for table, keys in _REFERENCES.items()
+        table: tuple(with_names(one, keys, renamed) for one in getattr(scene, table))
+        for table, keys in REFERENCES.items()
     }
     tables["hinge"] = tuple(one for one in tables["hinge"] if one.name != weld.name)
     former = {old: renamed.get(new, new) for old, new in found.names.items()}
@@ -215,6 +215,7 @@ def _free_name(whole: Body, name: str) -> str:
     return name
 
 
-def _renamed(element: Any, keys: tuple[str, ...], names: Mapping[str, str]) -> Any:
+def with_names(element: Any, keys: tuple[str, ...], names: Mapping[str, str]) -> Any:
+    """An element of a table whose references have other names."""
     update = {key: names[at] for key in keys if (at := getattr(element, key)) in names}
     return element.model_copy(update=update) if update else element

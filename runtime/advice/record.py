@@ -33,7 +33,8 @@ class BodyAdvice:
         saving: processor time of the richest model over that with this choice alone.
         reason: in words, with figures.
         evidence: what a one-way run tells of it; None where there is none.
-        split: the body deforms more than one floating frame can follow; how far that may err.
+        split: how far one floating frame may err where that is more than is asked (or was feared to
+            be) and the beam stays whole; None elsewhere.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Advice:
             advised ones, on the advised model.  None where one of the runs failed or took too long.
         scene: the reduced scene.
         names: places that have other names in it, such as "arm.tip", and these names.
+        parts: beams of it that are parts of a beam of the given scene, and which.
         notes: what else there is to know, a sentence each.
         tried: every model that was tried.
     """
@@ -106,6 +108,7 @@ class Advice:
     setting_saving: float | None
     scene: Scene
     names: Mapping[str, str]
+    parts: Mapping[str, str]
     notes: tuple[str, ...]
     tried: tuple[TriedModel, ...]
 
@@ -138,7 +141,7 @@ class Advice:
             "method": self.method, "setting": self.setting.numbers, "error": self.error,
             "cpu_s": self.cpu_s, "model_saving": self.model_saving,
             "setting_saving": self.setting_saving, "reduced": self.reduced,
-            "scene": self.scene.to_toml(), "names": dict(self.names),
+            "scene": self.scene.to_toml(), "names": dict(self.names), "parts": dict(self.parts),
             "notes": list(self.notes),
             "tried": [asdict(one) for one in self.tried],
         }  # fmt: skip

@@ -25,6 +25,11 @@ def renamed(name: str, names: Mapping[str, str]) -> str:
     return name
 
 
+def composed(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, str]:
+    """Names after one change of them and then another."""
+    return {**second, **{old: renamed(new, second) for old, new in first.items()}}
+
+
 class Renaming(Measure):
     """A measure that reads models with other names as if they had the former ones."""
 

@@ -129,6 +129,7 @@ class Bench:
         self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
         self.compile, self.tell = compile, tell
         self.rtol = _LOOSEST
+        self.names: Mapping[str, str] = {}
         self.reference: Trial
         self.floor = 0.0
         self._found: dict[str, Tried] = {}
@@ -159,8 +160,31 @@ class Bench:
         tried = self._kept(name, scene, model, run)
         return replace(tried, error=far)
 
+    def finer(self, scene: Scene, names: Mapping[str, str], name: str) -> Trial:
+        """A run of a model that is richer than the richest one.
+
+        Raises MstmmError where it cannot be made; the trial says where it fails.
+        """
+        self.tell(name)
+        model = self.compile(scene)
+        self.measure.know(model, names)
+        limit = self.budget.left() * _ONE
+        return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
+
+    def apart(self, a: Trial, b: Trial) -> float:
+        """How far two runs are apart, over the whole run; inf where that is not known."""
+        found = error_of(a, b, self.measure)
+        return math.inf if isinstance(found, str) else found * self.span.growth
+
+    def refer_again(self, trial: Trial, names: Mapping[str, str]) -> None:
+        """Take another run as the reference, and other names that places have from now on."""
+        self.reference, self.names = trial, names
+        self.measure.scale_by(_numbers(trial))
+        self._found.clear()
+
     def tried(self, name: str, scene: Scene, names: Mapping[str, str] | None = None) -> Tried:
-        """A model that was run; `names` are other names that places have in it."""
+        """A model that was run; `names` are other names that places have in it, those of the
+        reference's scene unless given."""
         if name not in self._found:
             self.tell(name)
             self._found[name] = self._try(name, scene, names)
@@ -174,7 +198,7 @@ class Bench:
     def _try(self, name: str, scene: Scene, names: Mapping[str, str] | None) -> Tried:
         try:
             model = self.compile(scene)
-            self.measure.know(model, names or {})
+            self.measure.know(model, self.names if names is None else names)
         except MstmmError as problem:
             return Tried(name, scene, None, math.inf, math.inf, str(problem))
         limit = self.budget.left() * _ONE

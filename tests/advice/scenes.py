@@ -38,6 +38,20 @@ def hub_and_beam(name: str, shapes: int = 3, **beam: Any) -> mstmm.Scene:
     )  # fmt: skip
 
 
+def hub_and_pieces(name: str, count: int) -> mstmm.Scene:
+    """The same with the beam in welded pieces, which have frames of their own."""
+    whole = hub_and_beam(name).model_dump(by_alias=True, exclude_none=True)
+    beam = {"length": 1 / count, "mass_per_length": 1.0, "bending_stiffness": HUBS[name][1],
+            "modes": {"y": 2}}  # fmt: skip
+    names = [f"piece{k}" for k in range(count - 1)] + ["arm"]
+    welds = [
+        {"name": f"weld{k}", "type": "fixed", "inboard": f"{a}.tip" if k else "hub", "outboard": b}
+        for k, (a, b) in enumerate(zip(["", *names], names, strict=False))
+    ]
+    beams = [beam | {"name": one} for one in names]
+    return mstmm.Scene(**whole | {"beam": beams, "hinge": [whole["hinge"][0], *welds]})
+
+
 def period(name: str) -> float:
     """End of the run, s: two periods of the torque."""
     return 2 * HUBS[name][2]
