@@ -31,7 +31,7 @@ def main() -> None:
     """Run all; print, and write result.json and result.md, after every scene."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--tuning", action="store_true", help="scenes on which rules were set")
-    parser.add_argument("--each", type=int, default=5, help="scenes of each family")
+    parser.add_argument("--each", type=int, default=4, help="scenes of each family")
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--rounds", type=int, default=7, help="alternating rounds of times")
     parser.add_argument("--jobs", type=int, default=1, help="scenes at a time")

@@ -109,10 +109,37 @@ def booms(rng: np.random.Generator) -> Drawn:
     return scene, float(rng.uniform(1, 2))
 
 
+def sprung_arms(rng: np.random.Generator) -> Drawn:
+    """A rod on a free pin, a rod and a beam behind it on sprung and damped pins, stiff or soft."""
+    across = 1.0 / 12
+    rods = [
+        {"name": name, "mass": 1.0, "center_of_mass": [0.5, 0.0, 0.0],
+         "inertia": [0.01, across, across], "ends": {"tip": [1.0, 0.0, 0.0]}}
+        for name in ("upper", "lower")
+    ]  # fmt: skip
+    beam = {
+        "name": "beam", "length": 0.8, "mass_per_length": 0.5, "bending_stiffness": _log(rng, 1, 4),
+        "modes": {"y": int(rng.integers(1, 4))}, "damping": 0.01,
+    }  # fmt: skip
+    hinges = [
+        {"name": name, "type": "pin", "axis": _Z, "inboard": on, "outboard": body, "law": law}
+        for name, on, body, law in (
+            ("shoulder", "ground", "upper", {"damping": _log(rng, -4, 0)}),
+            ("elbow", "upper.tip", "lower", {"stiffness": _log(rng, 1.5, 6), "damping": 1.0}),
+            ("wrist", "lower.tip", "beam", {"stiffness": _log(rng, 1.5, 6), "damping": 0.1}),
+        )
+    ]
+    hinges[0]["initial"] = {"q": [float(rng.uniform(-1, 1))]}
+    scene = {"gravity": [0.0, -9.81, 0.0], "body": rods, "beam": [beam], "hinge": hinges}
+    return scene, float(rng.uniform(0.8, 1.5))
+
+
 FAMILIES: dict[str, Family] = {
     f.__name__: f
-    for f in (hub_arms, panels, booms, beam_arms, flexible_trees, falling_beams, spun_beams)
-}
+    for f in (
+        hub_arms, panels, booms, sprung_arms, beam_arms, flexible_trees, falling_beams, spun_beams,
+    )
+}  # fmt: skip
 
 
 def published() -> dict[str, Drawn]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..chart.measure import Places, measure_of, whole_length
 from ..chart.models import Variant, at_level, ladder
 from ..chart.planar import planar
 from ..chart.point import Point, Setting
+from ..chart.trial import Runs, Trial
 from ..integrate.steppers import AUTO
 from ..result.flexible.certify import SLOPE
 from ..result.measure import Measure
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
 
-    from ..chart.trial import Trial
     from ..model.model import Model
     from ..result.result import Result
 
@@ -46,8 +46,9 @@ if TYPE_CHECKING:
 #: for what lies between the samples.
 _ENOUGH, _WITH_SETTING = 0.9, 0.95
 
-#: The search ends when this part of the budget is spent; methods may take this part of it.
-_SEARCH, _SETTINGS = 0.6, 0.3
+#: A one-way run may take this part of the budget; the search ends when this part is spent; methods
+#: may take this part of it.
+_FIRST, _SEARCH, _SETTINGS = 0.3, 0.6, 0.3
 
 #: Models whose settings are tried: the one found, and others that suffice and took no longer than
 #: so many times its time; than so many where they err by less than this part of what is asked.
@@ -57,8 +58,13 @@ _FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
 #: many times the error that there is; what is expected to err by so many times of it is not tried.
 _RIGID, _NEEDLESS, _HARDLY, _UNLIKELY = 0.5, 0.1, 1.1, 5.0
 
-#: Beams are split until the next halving changes less than this part of what is asked.
-_PARTS = 0.5
+#: Beams are split until the next halving changes less than this part of what is asked; what the
+#: finer ones err by themselves is so many times less, and models are judged beside it where it
+#: leaves this part of what is asked.
+_PARTS, _FALLS, _LEFT = 0.5, 4.0, 0.3
+
+#: Most by which errors of a window are multiplied for what deflects more after it.
+_RISE = 100.0
 
 #: A planar scene is the same motion: it may err by this part of what is asked.
 _SAME = 0.01
@@ -122,6 +128,7 @@ class _Advising:
         self.compile, self.tell, self.state = compile, tell, state
         self.notes: list[str] = []
         self.parts: Mapping[str, str] = {}  # beam that is a part -> the beam of the scene
+        self.unseen = 0.0  # error of the reference's own parts
         self.split_error: float | None = None  # seen of one frame where beams stay whole
         self.told: dict[str, tuple[str, ...]] = {RICHEST: ()}  # name of a model -> its hinges
 
@@ -137,7 +144,7 @@ class _Advising:
         evidence, why = gathered(first, self.length)
         if why:
             self.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
-        self.bench, richest = self._bench(top, model)
+        self.bench, richest = self._bench(top, model, evidence)
         base = self._in_plane(top, model, richest)
         q = self.bench.reference.q
         self.whole = Bodies(top.scene).richest
@@ -147,7 +154,7 @@ class _Advising:
         self.bodies = Bodies(base.scene)
         self.base = base.name
         search = Search(
-            self.bodies, self.bench, evidence, _ENOUGH * asked.error, self.in_measure,
+            self.bodies, self.bench, evidence, self.enough, self.in_measure,
             lambda: self.budget.left(_SEARCH) > 0,
         )  # fmt: skip
         for name in (RICHEST, base.name):
@@ -169,15 +176,12 @@ class _Advising:
     def _least(self, scene: Scene) -> Result | None:
         """The run in which all bodies respond one way, or none deform; None where there is none."""
         self.tell("one-way, before anything else")
-        limit = self.budget.alarm(_SEARCH * self.budget.left())
         times = np.linspace(0.0, self.asked.t_end, self.asked.samples)
-        rtol = first_rtol(self.asked.error)
+        runs = Runs(self.asked.t_end, times, self.budget)
+        setting = Setting(AUTO, "one-way", first_rtol(self.asked.error))
         try:
             model = self.compile(at_level(scene, "one-way"))
-            return model.simulate(
-                self.asked.t_end, method=AUTO, rtol=rtol, atol=0.01 * rtol,
-                output_times=times, progress=limit,
-            )  # fmt: skip
+            return runs.simulate(model, setting, _FIRST * self.budget.left())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
@@ -187,6 +191,17 @@ class _Advising:
         if isinstance(self.measure.inner, Places):
             return 1.0 / self.length
         return 1.0 if self.measure.unit == "m" else self.size / self.length
+
+    @property
+    def enough(self) -> float:
+        """The error against the reference that suffices for a model."""
+        return _ENOUGH * self._beside_unseen
+
+    @property
+    def _beside_unseen(self) -> float:
+        """What is left of the error asked beside the reference's own, where that leaves any."""
+        rest = self.asked.error - self.unseen
+        return rest if rest > _LEFT * self.asked.error else self.asked.error
 
     @property
     def part(self) -> float:
@@ -199,10 +214,16 @@ class _Advising:
 
     # --- reference ------------------------------------------------------------------------------
 
-    def _bench(self, top: Variant, model: Model) -> tuple[Bench, Tried]:
+    def _bench(
+        self, top: Variant, model: Model, evidence: Mapping[str, Evidence]
+    ) -> tuple[Bench, Tried]:
+        """The bench with its reference, over the whole run or a window."""
         asked = self.asked
         rtol = first_rtol(self.part)
         span = probe(model, asked.t_end, asked.samples, self.budget, self.measure, rtol)
+        if not span.whole:
+            rise = max((one.rise(span.t_end) for one in evidence.values()), default=1.0)
+            span = replace(span, rise=min(rise, _RISE))
         bench = Bench(span, asked.samples, self.budget, self.measure, self.compile, self.tell)
         richest = bench.refer_to(top.scene, model, RICHEST, asked.error, self.part)
         self.state(f"models are compared over {span}; the reference itself errs by about "
@@ -253,6 +274,12 @@ class _Advising:
         if found.scene is base.scene:
             self.split_error = apart if math.isfinite(apart) else None
             return base, evidence
+        self.unseen = apart / _FALLS
+        if apart > _PARTS * asked:
+            self.notes.append(
+                f"beams in {count} parts still differ by {apart:.1e} from those in {count // 2}: "
+                f"what is left of that, about {self.unseen:.1e}, counts with the error"
+            )
         return self._of_parts(base, found, finer if apart <= _PARTS * asked else run)
 
     def _of_parts(
@@ -322,7 +349,7 @@ class _Advising:
     def _chosen(self, best: Tried, choices: Choices, search: Search) -> Chosen:
         """The cheapest setting of the model found, or of another one that nearly is as cheap; a
         model that leaves more of the error to the integration may be cheaper in the end."""
-        asked = self.asked.error
+        asked = self._beside_unseen
         if best.error > _ROOMY * asked and choices != self.bodies.richest:
             search.tried(search.richer(choices))
         others = sorted(
@@ -347,7 +374,7 @@ class _Advising:
 
     def _may_be_cheapest(self, one: Tried, best: Tried) -> bool:
         times = _NEARLY if one.error > _ROOMY * self.asked.error else _ROOMIER
-        return one.error <= _ENOUGH * self.asked.error and one.cpu_s <= times * best.cpu_s
+        return one.error <= self.enough and one.cpu_s <= times * best.cpu_s
 
     def _told(
         self, choices: Mapping[str, Choice], evidence: Mapping[str, Evidence], chosen: Chosen,
@@ -366,8 +393,8 @@ class _Advising:
         assert error is not None and chosen.point.cpu_s is not None
         return Advice(
             asked.error, self.measure.name, self.measure.unit, self.measure.scaling, asked.t_end,
-            str(bench.span), bench.span.whole, bench.floor, bodies, hinges,
-            chosen.point.setting, error * growth, chosen.point.cpu_s, model_saving,
+            str(bench.span), bench.span.whole, max(bench.floor, self.unseen), bodies, hinges,
+            chosen.point.setting, error * growth + self.unseen, chosen.point.cpu_s, model_saving,
             setting_saving, chosen.tried.scene,
             dict(self.measure.names_in(chosen.tried.running)), dict(self.parts),
             tuple(self.notes),

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 from mstmm.scene import split
 
@@ -48,6 +49,7 @@ class Evidence:
         frequency: rad/s, of its first shape.
         spin_ratio: spin across the body over its first frequency.
         missed: part of the bending energy that all its shapes miss; None where it is not known.
+        course: (t, deflection) over the samples, s and m.
     """
 
     deflection: float
@@ -58,6 +60,7 @@ class Evidence:
     frequency: float
     spin_ratio: float
     missed: float | None = None
+    course: tuple[tuple[float, float], ...] = ()
 
     def error(self, choice: Choice) -> float:
         """Expected of a choice, m."""
@@ -71,6 +74,11 @@ class Evidence:
         left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps(name))
         return left_out + (shortening if choice.level == LINEAR else 0.0)
 
+    def rise(self, until: float) -> float:
+        """How many times more it deflects at any time than up to one, s."""
+        before = max((size for t, size in self.course if t <= until), default=0.0)
+        return self.deflection / before if before > 0 else 1.0
+
     @property
     def frame_error(self) -> float:
         """Of one floating frame, d kappa^2 / 2, m."""
@@ -81,14 +89,11 @@ class Evidence:
         """Whether linear kinematics may diverge."""
         return self.load_ratio > GAMMA or self.spin_ratio > 1.0
 
-    @property
-    def text(self) -> str:
-        """In words."""
-        return (
-            f"deflection {self.deflection:.1e} m, coupling chi {self.coupling:.2g}, load ratio "
-            f"gamma {self.load_ratio:.1e}, slope {self.slope:.1e}, first frequency "
-            f"{self.frequency:.3g} rad/s"
-        )
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, without the course."""
+        keys = ("deflection", "coupling", "load_ratio", "slope", "frequency", "spin_ratio",
+                "missed")  # fmt: skip
+        return {key: getattr(self, key) for key in keys} | {"by_shape": dict(self.by_shape)}
 
 
 def evidence_of(result: Result, reach: float) -> dict[str, Evidence]:
@@ -104,7 +109,8 @@ def evidence_of(result: Result, reach: float) -> dict[str, Evidence]:
     for name, body in rigidity(result.model).one_way.items():
         if name in known:
             eta = result.response(name).eta
-            found[name] = _one(body, np.abs(eta), known[name], _loaded(result.model, name), reach)
+            loaded = _loaded(result.model, name)
+            found[name] = _one(body, result.t, np.abs(eta), known[name], loaded, reach)
     return found
 
 
@@ -118,20 +124,21 @@ def _loaded(model: Compiled, name: str) -> set[str]:
 
 
 def _one(
-    body: ModalBody, eta: np.ndarray, seen: Flexibility, loaded: set[str], reach: float
+    body: ModalBody, t: Array, eta: Array, seen: Flexibility, loaded: set[str], reach: float
 ) -> Evidence:
-    by_shape, deflection = np.zeros(body.n), 0.0
+    by_shape, course = np.zeros(body.n), np.zeros(len(eta))
     for end, port in body.ports.items():
         each = np.linalg.norm(port.phi, axis=0)
         if end in loaded:
             each = each + reach * np.linalg.norm(port.theta, axis=0)
         moved = each * eta
         by_shape = np.maximum(by_shape, moved.max(axis=0, initial=0.0))
-        deflection = max(deflection, float(moved.sum(axis=1).max(initial=0.0)))
+        course = np.maximum(course, moved.sum(axis=1))
     return Evidence(
-        deflection, dict(zip(body.modes, by_shape.tolist(), strict=True)),
+        float(course.max(initial=0.0)), dict(zip(body.modes, by_shape.tolist(), strict=True)),
         0.0 if seen.coupling is None else seen.coupling[0], seen.load_ratio, seen.slope,
         seen.first_frequency, seen.spin_ratio, seen.tail,
+        tuple(zip(t.tolist(), course.tolist(), strict=True)),
     )  # fmt: skip
 
 

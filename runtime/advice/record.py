@@ -51,7 +51,7 @@ class BodyAdvice:
         return {
             "name": self.name, "given": _plain(self.given), "advised": _plain(self.choice),
             "error": self.error, "saving": self.saving, "reason": self.reason,
-            "evidence": None if self.evidence is None else asdict(self.evidence),
+            "evidence": None if self.evidence is None else self.evidence.to_dict(),
             "split": self.split,
         }  # fmt: skip
 

@@ -83,11 +83,9 @@ def cheapest(
 
 def _wanted(one: Tried, runs: Runs, of: tuple[str, ...], error: float) -> Setting | None:
     """The setting to which an error of the integration alone leads; None where it leads to none."""
-    alarm = runs.budget.alarm(runs.budget.share(ALL))
     try:
-        result = one.running.simulate(
-            runs.t_end, output_times=runs.times, error=error, error_of=of, progress=alarm
-        )
+        options = {"error": error, "error_of": of}
+        result, _ = runs.called(one.running, options, runs.budget.share(ALL))
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None
     known = result.error_estimate

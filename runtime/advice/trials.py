@@ -44,10 +44,12 @@ class Span:
     Attributes:
         t_end: s, of a window from the start, or of the whole run.
         wanted: s, end of the run that the advice is for.
+        rise: how many times more bodies deflect after a window than in it.
     """
 
     t_end: float
     wanted: float
+    rise: float = 1.0
 
     @property
     def whole(self) -> bool:
@@ -56,8 +58,9 @@ class Span:
 
     @property
     def growth(self) -> float:
-        """What errors of a window are multiplied by: they grow with the time at least."""
-        return self.wanted / self.t_end
+        """What errors of a window are multiplied by: they grow with the time at least, and with
+        what deflects later."""
+        return self.wanted / self.t_end * self.rise
 
     def __str__(self) -> str:
         if self.whole:

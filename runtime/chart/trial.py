@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -87,13 +88,17 @@ class Runs:
 
         OutOfTime after `limit` s of the clock, KeyboardInterrupt after an interrupt.
         """
+        return self.called(model, setting.options, limit, own_steps)
+
+    def called(
+        self, model: Model, options: Mapping[str, Any], limit: float, own_steps: bool = False
+    ) -> tuple[Result, float]:
+        """The same with any arguments of `simulate`."""
         times = None if own_steps else self.times
         alarm = self.budget.alarm(limit)
         with interruptible() as interrupted:  # short runs end before they look at it
             begin = time.process_time()
-            result = model.simulate(
-                self.t_end, output_times=times, progress=alarm, **setting.options
-            )
+            result = model.simulate(self.t_end, output_times=times, progress=alarm, **options)
             if isinstance(result, OneWayResult) and result.success:
                 _ = result.cost  # makes the elastic response, which is part of what it is for
             spent = time.process_time() - begin

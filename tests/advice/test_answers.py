@@ -13,12 +13,13 @@ from chart.scenes import Clock, hub, pendulum
 
 import mstmm
 from mstmm.runtime.advice.advising import advised, request
+from mstmm.runtime.advice.evidence import evidence_of
 from mstmm.runtime.advice.trials import Span
 from mstmm.runtime.chart.budget import Budget
 
 
 def test_nothing_to_reduce_is_an_answer() -> None:
-    made = mstmm.advise(pendulum(), 1.0, error=1e-4, of="bob.tip.position", rounds=0)
+    made = mstmm.advise(pendulum(), 1.0, error=1e-4, of="bob.tip.position", rounds=0, budget=600)
     assert made.bodies == ()
     assert not made.reduced
     assert any("nothing to reduce" in note for note in made.notes)
@@ -28,7 +29,9 @@ def test_nothing_to_reduce_is_an_answer() -> None:
 
 def test_bodies_that_respond_no_way_but_coupled() -> None:
     """A viscous drag is refused below the coupled level: nothing is known beforehand."""
-    made = mstmm.advise(hub(drag=0.5), 1.2, error=1e-2, of="blade.tip.position", rounds=0)
+    made = mstmm.advise(
+        hub(drag=0.5), 1.2, error=1e-2, of="blade.tip.position", rounds=0, budget=600
+    )
     (body,) = made.bodies
     assert body.evidence is None
     assert body.choice.coupled
@@ -70,11 +73,11 @@ def test_a_scene_that_fails_says_why() -> None:
                 "law": {"effort": "1/(0.5 - t)^3"}}],
     )  # fmt: skip
     with pytest.raises(mstmm.NumericalFailure, match="t = "):
-        mstmm.advise(scene, 1.0, rounds=0)
+        mstmm.advise(scene, 1.0, rounds=0, budget=600)
 
 
 def test_the_scene_that_is_written(tmp_path: Path) -> None:
-    made = mstmm.advise(hub_and_beam("B", 2), period("B"), error=1e-3, of=TIP, rounds=0)
+    made = mstmm.advise(hub_and_beam("B", 2), period("B"), error=1e-3, of=TIP, rounds=0, budget=600)
     path = made.write(tmp_path / "small.toml")
     text = path.read_text()
     assert text.startswith("# Reduced for an error of 0.001 m of arm.tip.position")
@@ -86,7 +89,7 @@ def test_the_scene_that_is_written(tmp_path: Path) -> None:
 
 
 def test_as_plain_values() -> None:
-    made = mstmm.advise(hub_and_beam("B", 2), period("B"), error=1e-3, of=TIP, rounds=0)
+    made = mstmm.advise(hub_and_beam("B", 2), period("B"), error=1e-3, of=TIP, rounds=0, budget=600)
     data = json.loads(made.to_json())
     assert data["method"] == made.method
     assert data["bodies"][0]["advised"]["shapes"] == {"y": 1}
@@ -114,3 +117,18 @@ def test_errors_of_a_window_grow_with_time() -> None:
     assert span.growth == 4.0
     assert Span(2.0, 2.0).whole
     assert np.isclose(Span(2.0, 2.0).growth, 1.0)
+
+
+def test_what_deflects_after_a_window() -> None:
+    """A push that is ten times stronger from 1 s on."""
+    scene = hub_and_beam("B", 1).model_dump(by_alias=True, exclude_none=True)
+    push = {"effort": "where(t < 1, 0.5, 5)*sin(2*pi*t/0.5)"}
+    axle = scene["hinge"][0] | {"law": push}
+    model = mstmm.compile(
+        mstmm.Scene(**scene | {"hinge": [axle, scene["hinge"][1]]}), "looped",
+        flexibility="one-way",
+    )  # fmt: skip
+    result = model.simulate(2.0, output_times=np.linspace(0, 2, 101))
+    known = evidence_of(result, 1.0)["arm"]
+    assert 5 < known.rise(0.9) < 15
+    assert known.rise(2.0) == 1.0

@@ -21,7 +21,7 @@ def error(made: mstmm.Advice, scene: mstmm.Scene) -> float:
 def test_stiff_hinges_become_rigid() -> None:
     """Where they stand, not where they were drawn: the sprung pin rests at 0.4 rad."""
     scene = sprung(3e5)
-    made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=1)
+    made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=1, budget=600)
     told = " ".join(made.changes)
     assert all(f'hinge "{name}": rigid' in told for name in ("spring", "bushing", "slide"))
     assert 'hinge "pivot": without its damper' in told
@@ -34,7 +34,7 @@ def test_stiff_hinges_become_rigid() -> None:
 def test_soft_ones_stay() -> None:
     """50 N m/rad under rods of 1 kg: it swings by more than a rad; a damper of 5 N m s brakes."""
     scene = sprung(50.0, damping=5.0)
-    made = mstmm.advise(scene, 1.0, error=1e-3, of=OF, rounds=0)
+    made = mstmm.advise(scene, 1.0, error=1e-3, of=OF, rounds=0, budget=600)
     told = " ".join(made.changes)
     assert "pivot" not in told
     assert '"spring"' not in told
@@ -51,7 +51,7 @@ def test_springs_between_bodies_that_do_nothing() -> None:
          "law": {"stiffness": 100.0}},
     ]  # fmt: skip
     scene = mstmm.Scene(**{**sprung(1e5).model_dump(by_alias=True), "spring": springs})
-    made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0)
+    made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
     assert [one.name for one in made.scene.spring] == ["taut"]
     assert any('spring "slack": left out' in text for text in made.changes)
 
@@ -66,6 +66,6 @@ def test_what_is_released_stays(by_event: bool) -> None:
     else:
         slide |= {"release": "t >= 0.3"}
     scene = mstmm.Scene(**data | {"hinge": [*others, slide]})
-    made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0)
+    made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
     assert '"slide"' not in " ".join(made.changes)
     assert made.scene.hinge[-1].type == "prismatic"

@@ -10,7 +10,7 @@ from advice.scenes import TIP, hub_and_beam, period
 
 from cli.commands import Command
 
-QUICK = ("--t-end", "1", "--times", "51", "--rounds", "0")
+QUICK = ("--t-end", "1", "--times", "51", "--rounds", "0", "--budget", "600")
 
 
 @pytest.fixture
