@@ -52,7 +52,8 @@ def advise(
     Raises SceneError for arguments that make no sense, NumericalFailure for a scene that does not
     run, or whose motion cannot be told to within what is asked.
     """
-    from ..runtime.advice.advising import advised, request
+    from ..runtime.advice.advising import advised
+    from ..runtime.advice.request import request
 
     asked = request(t_end, error, of, budget, samples, rounds)
 

@@ -12,8 +12,9 @@ from advice.scenes import TIP, hub_and_beam, period
 from chart.scenes import Clock, hub, pendulum
 
 import mstmm
-from mstmm.runtime.advice.advising import advised, request
+from mstmm.runtime.advice.advising import advised
 from mstmm.runtime.advice.evidence import evidence_of
+from mstmm.runtime.advice.request import request
 from mstmm.runtime.advice.trials import Span
 from mstmm.runtime.chart.budget import Budget
 

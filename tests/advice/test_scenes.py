@@ -110,3 +110,14 @@ def test_a_given_model_that_is_too_little() -> None:
     assert body.choice.level == "stiffened"
     tried = {one.name: one.error for one in made.tried}
     assert tried["as given"] == pytest.approx(4.2e-2, rel=0.05)
+
+
+def test_a_beam_that_cannot_bend_in_the_plane_of_the_motion() -> None:
+    scene = hub_and_beam("B").model_dump(by_alias=True, exclude_none=True)
+    (beam,) = scene["beam"]
+    across = mstmm.Scene(**scene | {"beam": [beam | {"modes": {"z": 2}, "basis": "auto"}]})
+    made = mstmm.advise(across, period("B"), error=1e-3, of=TIP, rounds=0, budget=600)
+    (body,) = made.bodies
+    assert dict(body.given.shapes) == {"z": 2}
+    assert body.choice.level == "rigid"
+    assert made.reduced

@@ -1,0 +1,122 @@
+"""What an advice says of what was found: every choice alone, with its reason; what was saved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from mstmm.defaults import METHOD, RTOL
+
+from ..chart.point import Setting
+from ..integrate.steppers import AUTO
+from .choice import RIGID, Choice, given
+from .evidence import Evidence
+from .record import Advice, BodyAdvice, TriedModel
+from .search import Choices, Search
+from .settings import Chosen, compared
+from .words import reason
+from .work import Work
+
+if TYPE_CHECKING:
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.elastic import Elastic
+
+#: Name of the scene as it was given, among the models tried.
+AS_GIVEN = "as given"
+
+
+def told(
+    work: Work, choices: Mapping[str, Choice], evidence: Mapping[str, Evidence], chosen: Chosen,
+    search: Search, base: str,
+) -> Advice:  # fmt: skip
+    """The advice.  `base` is the model that has what was changed before bodies were looked at."""
+    asked, bench = work.asked, work.bench
+    bodies = tuple(
+        _body(work, name, choice, evidence.get(name), search)
+        for name, choice in {**_straightened(work), **choices}.items()
+    )
+    model_saving, setting_saving = _savings(work, chosen)
+    changes = work.told.get(chosen.tried.name, work.told[base])
+    if not bodies:
+        work.notes.append("there is nothing to reduce in the bodies: none of them deforms")
+    growth = bench.span.growth
+    error = chosen.point.error
+    assert error is not None and chosen.point.cpu_s is not None
+    return Advice(
+        asked.error, work.measure.name, work.measure.unit, work.measure.scaling, asked.t_end,
+        str(bench.span), bench.span.whole, max(bench.floor, work.unseen), bodies, changes,
+        chosen.point.setting, error * growth + work.unseen, chosen.point.cpu_s, model_saving,
+        setting_saving, chosen.tried.scene,
+        dict(work.measure.names_in(chosen.tried.running)), dict(work.parts),
+        tuple(work.notes),
+        tuple(
+            TriedModel(
+                one.name, one.error if math.isfinite(one.error) else None, one.cpu_s, one.why
+            )
+            for one in bench.all
+            if math.isfinite(one.cpu_s)
+        ),
+    )  # fmt: skip
+
+
+def _body(
+    work: Work, name: str, choice: Choice, known: Evidence | None, search: Search
+) -> BodyAdvice:
+    """What is said of one body; its choice is tried alone beside the richest of all others."""
+    most = work.bodies.richest
+    as_in_most = choice == most.get(name, choice)
+    error, saving = (work.bench.floor, 1.0) if as_in_most else (None, None)
+    if not as_in_most and work.budget.left():
+        alone = search.tried({**most, name: choice})
+        if math.isfinite(alone.error):
+            whole_model = search.tried(most)
+            error, saving = alone.error, whole_model.cpu_s / alone.cpu_s
+    split = None
+    if known is not None and work.steep(known) and name not in work.parts:
+        split = work.split_error or known.frame_error * work.in_measure
+    richest = most.get(name, choice) if name in work.parts else work.whole[name]
+    why = reason(choice, richest, known, work.in_measure, work.asked.error)
+    if split is not None and known is not None:
+        why += f"; it bends by a slope of {known.slope:.2g}, so that one floating frame "
+        why += (
+            f"was seen to err by {split:.1e}, which is little beside what is asked"
+            if work.split_error is not None
+            else f"may err by {split:.1e}: split it into welded beams"
+        )
+    return BodyAdvice(name, _given(work, name), choice, error, saving, why, known, split)
+
+
+def _straightened(work: Work) -> Choices:
+    """Bodies that do not bend at all in the plane of the motion."""
+    return {
+        name: Choice(RIGID)
+        for name in work.whole
+        if name not in work.bodies.richest and name not in work.parts.values()
+    }
+
+
+def _given(work: Work, name: str) -> Choice:
+    """What a body, or the whole that it is a part of, is in the scene as it was written."""
+    bodies: tuple[Beam | Elastic, ...] = (*work.scene.beam, *work.scene.elastic)
+    of = work.parts.get(name, name)
+    written = next(body for body in bodies if body.name == of)
+    return given(written, work.whole[of])
+
+
+def _savings(work: Work, chosen: Chosen) -> tuple[float | None, float | None]:
+    """Time of the scene as given over that of the advised one, by the same tolerance; of the
+    default method and tolerance over the advised ones."""
+    setting, tried, rounds = chosen.point.setting, chosen.tried, work.asked.rounds
+    rtol = RTOL if setting.fixed else setting.value
+    alike = Setting(AUTO, tried.name, rtol)
+    as_given = work.bench.tried(AS_GIVEN, work.scene, {})
+    found: list[float | None] = [None, None]
+    pairs = (
+        (as_given, alike, alike), (tried, Setting(METHOD, tried.name, RTOL), setting),
+    )  # fmt: skip
+    for k, (other, theirs, ours) in enumerate(pairs):
+        if other.model is not None:
+            times = compared(other, theirs, tried, ours, work.bench, rounds)
+            found[k] = None if times is None else times[0] / times[1]
+    return found[0], found[1]
