@@ -122,10 +122,11 @@ def _part(beam: Beam, name: str, start: float, end: float, own: Collection[str])
     kept = beam.model_dump(by_alias=True, exclude_none=True)
     for key in ("section", "ends", "shapes", "frame", "basis", "name", "length", "modes"):
         kept.pop(key, None)
-    return Beam(
-        name=name, length=end - start, section=pieces, ends=ends, frame=AUTO, basis=AUTO,
-        modes=_modes(beam), **kept,
-    )  # fmt: skip
+    made = {
+        "name": name, "length": end - start, "section": pieces, "ends": ends, "frame": AUTO,
+        "basis": AUTO, "modes": _modes(beam),
+    }  # fmt: skip
+    return Beam.model_validate(kept | made)
 
 
 def _modes(beam: Beam) -> Modes:
