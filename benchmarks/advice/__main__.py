@@ -2,7 +2,7 @@
 
     python -m benchmarks.advice [--tuning] [--each N] [--seed N] [--rounds N] [--jobs N]
 
-Four scenes whose choices are published, and scenes drawn afresh (`--tuning`: with the seed on which
+Four scenes of a hub with a beam, and scenes drawn afresh (`--tuning`: with the seed on which
 the rules were set).  Processor time of whole warm calls, the least of alternating rounds, on the
 looped engine.
 """
@@ -41,7 +41,7 @@ def main() -> None:
     if seed is None:
         seed = _TUNING if options.tuning else _JUDGED
     drawn = draw(scenes.FAMILIES, options.each, seed)
-    tasks = [(name, one, options.rounds) for name, one in {**scenes.published(), **drawn}.items()]
+    tasks = [(name, one, options.rounds) for name, one in {**scenes.four(), **drawn}.items()]
     outcomes: list[trials.Outcome] = []
     without: dict[str, float] = {}
     data: dict[str, Any] = {

@@ -25,7 +25,7 @@ def share(outcomes: Sequence[Outcome], holds: Callable[[Outcome], bool | None]) 
 
 
 def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
-    """The page: counts by error asked for, by family, the four scenes A to D, what has failed."""
+    """The page: counts by error asked for, by family, scenes A to D, what has failed."""
     four = [one for one in outcomes if len(one.scene) == 1]
     drawn = [one for one in outcomes if len(one.scene) > 1]
     asked = sorted({one.asked for one in outcomes}, reverse=True)

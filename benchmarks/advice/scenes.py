@@ -1,4 +1,4 @@
-"""Scenes that are reduced: four with a published choice, and families that are drawn afresh.
+"""Scenes that are reduced: four of a hub with a beam, and families that are drawn afresh.
 
 A family is a function of a random generator and gives a scene dictionary and the end of its run
 (s), as those of the wanted errors, of which the flexible ones are drawn here too.
@@ -142,6 +142,6 @@ FAMILIES: dict[str, Family] = {
 }  # fmt: skip
 
 
-def published() -> dict[str, Drawn]:
+def four() -> dict[str, Drawn]:
     """Scenes A to D."""
     return {name: hub(*numbers, 5) for name, numbers in HUBS.items()}
