@@ -61,8 +61,14 @@ class Choice:
     def __str__(self) -> str:
         if self.level == RIGID:
             return RIGID
-        parts = [f"{n} {word}" for word, n in self.shapes]
+        parts = [_counted(word, n) for word, n in self.shapes]
         return f"{self.level}, shapes {' + '.join(parts)}" if parts else self.level
+
+
+def _counted(direction: str, n: int) -> str:
+    if direction != VIBRATION:
+        return f"{n} {direction}"
+    return f"static + {n} of vibration" if n else "static alone"
 
 
 def _place(direction: str) -> int:

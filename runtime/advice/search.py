@@ -189,8 +189,7 @@ class Search:
             return
         yield Choice(ONE_WAY, self.bodies.richest[name].shapes)  # oscillators cost next to nothing
         for word, n in reversed(choice.shapes):
-            fewer = sorted({0, n // 2, n - 1} - {n})
-            for count in fewer:
+            for count in sorted({0, n // 2, max(n - 1, 0)} - {n}):
                 less = choice.with_count(word, count)
                 if less.total or word == VIBRATION:
                     yield less

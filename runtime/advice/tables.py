@@ -16,7 +16,9 @@ def summary(advice: Advice) -> list[str]:
         f"{advice.error:.1e}{met}, {time_of(advice.cpu_s)} CPU over {advice.compared}",
     ]
     savings = [
-        f"the model saves a factor of {advice.model_saving:.2g}" if advice.model_saving else "",
+        f"the model saves a factor of {advice.model_saving:.2g}"
+        if advice.model_saving and advice.reduced
+        else "",
         f"method and tolerance one of {advice.setting_saving:.2g} beside the default ones"
         if advice.setting_saving
         else "",

@@ -121,3 +121,29 @@ def test_a_beam_that_cannot_bend_in_the_plane_of_the_motion() -> None:
     assert dict(body.given.shapes) == {"z": 2}
     assert body.choice.level == "rigid"
     assert made.reduced
+
+
+def test_a_body_of_finite_elements_keeps_its_static_shapes() -> None:
+    """A rod with a load on its tip: the static shapes carry it, its own vibration is too fast."""
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        elastic=[{
+            "name": "rod", "box": {"size": [0.5, 0.02, 0.02], "divisions": [4, 1, 1]}, "order": 2,
+            "young": 1e9, "poisson": 0.3, "density": 1000.0, "modes": 2, "frame": "tangent",
+            "ends": {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 0.5]}},
+        }],
+        body=[{"name": "load", "mass": 0.1, "inertia": [1e-4] * 3}],
+        hinge=[
+            {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "rod.root",
+             "drive": "0.3*sin(4*t)"},
+            {"name": "grip", "type": "fixed", "inboard": "rod.tip", "outboard": "load"},
+        ],
+    )  # fmt: skip
+    made = mstmm.advise(scene, 0.3, error=1e-3, of="rod.tip.position", rounds=0, budget=600)
+    (body,) = made.bodies
+    assert dict(body.given.shapes) == {"vibration": 2}
+    assert body.choice.coupled
+    assert dict(body.choice.shapes) == {"vibration": 0}
+    assert "static alone" in str(body.choice)
+    assert made.scene.elastic[0].modes == 0
+    assert made.error <= 1e-3
