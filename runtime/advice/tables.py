@@ -19,7 +19,7 @@ def summary(advice: Advice) -> list[str]:
         f"the model saves a factor of {advice.model_saving:.2g}"
         if advice.model_saving and advice.reduced
         else "",
-        f"method and tolerance one of {advice.setting_saving:.2g} beside the default ones"
+        f"method and tolerance save a factor of {advice.setting_saving:.2g} beside the default ones"
         if advice.setting_saving
         else "",
     ]
