@@ -24,6 +24,7 @@ from .errors import (
     ExpressionError,
     MstmmError,
     NumericalFailure,
+    RiskRefused,
     SceneError,
 )
 from .version import __version__ as __version__
@@ -62,7 +63,8 @@ _LAZY = {
 
 __all__ = [
     "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
-    "MstmmError", "NumericalFailure", "Result", "Scene", "SceneError", "advise", "chart",
+    "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
+    "chart",
     "compile", "generate_file", "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 

@@ -6,6 +6,9 @@ found, and one way out.  The command line prints the message alone and exits wit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 
 class MstmmError(Exception):
     """Base of every error raised on purpose; `exit_code` is what the command line returns."""
@@ -46,6 +49,18 @@ class UndeterminedMotion(NumericalFailure):
     def __init__(self, message: str = "", place: int = -1) -> None:
         super().__init__(message)
         self.place = place
+
+
+class RiskRefused(NumericalFailure):
+    """A run whose risks were not to be taken (`on_risk="refuse"`).
+
+    `risks` are the rows that speak against it (`mstmm.risk.Risk`); `result` is what was computed,
+    None where they were seen before the run.
+    """
+
+    def __init__(self, message: str = "", risks: Sequence[Any] = (), result: Any = None) -> None:
+        super().__init__(message)
+        self.risks, self.result = tuple(risks), result
 
 
 class Interrupted(MstmmError):

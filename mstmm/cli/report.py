@@ -6,6 +6,8 @@ import textwrap
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any
 
+from mstmm.risk import to_rows
+
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
     from mstmm.runtime.result.verdict import Verdict
@@ -121,6 +123,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "seconds": seconds,
         "statistics": None if counted is None else asdict(counted),
         "error_estimate": None if reached is None else reached.to_dict(),
+        "risks": to_rows(result.risks),
         "warnings": list(result.warnings),
         "certificate": _certificate(result),
     }
@@ -131,7 +134,8 @@ def _certificate(result: Result) -> dict[str, Any]:
     certificate = result.certificate
     data = {key: value for key, value in vars(certificate).items() if key != "error"}
     plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
-    plain.pop("reached")
+    for told in ("reached", "models", "known"):  # the error, and the risks, stand by themselves
+        plain.pop(told)
     plain["momentum"] = [vars(drift) for drift in certificate.momentum]
     plain["flexible"] = [vars(body) for body in certificate.flexible]
     error = certificate.error
@@ -154,7 +158,8 @@ def verdict_lines(verdict: Verdict, width: int) -> list[str]:
 def certificate_lines(result: Result, width: int) -> list[str]:
     """What vouches for a result, and every warning, folded to the width of the terminal."""
     certificate = result.certificate
-    lines = certificate.text(verdict=False).replace("certify=True", "--certify").splitlines()
+    told = certificate.text(verdict=False, warnings=result.trajectory.told)
+    lines = told.replace("certify=True", "--certify").splitlines()
     found = [w for w in result.warnings if w not in certificate.warnings]
     lines += [f"note: {warning}" for warning in found]
     return [part for line in lines for part in _folded(line, width)]

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mstmm.defaults import ATOL, METHOD, RTOL
-from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError, NumericalFailure, SceneError
+from mstmm.errors import (
+    EnvironmentFailure,
+    Interrupted,
+    MstmmError,
+    NumericalFailure,
+    RiskRefused,
+    SceneError,
+)
 
 from .extras import need_for, result_ending
 from .options import Json, Times, not_negative, output_file, positive, python_file, times
@@ -69,6 +76,7 @@ class Plan:
     tangent: str = "auto"
     error: float | None = None
     of: tuple[str, ...] = ()
+    on_risk: str = "warn"
 
     @property
     def resumable(self) -> bool:
@@ -199,6 +207,12 @@ def simulate(
         typer.Option("--accuracy", metavar="X", parser=positive, help="Error up to which the "
                      "result counts as trusted: rad, or part of the motion (0.01)."),
     ] = None,
+    on_risk: Annotated[
+        str,
+        typer.Option("--on-risk", metavar="WORD", help="Where something speaks against the "
+                     "numbers: warn; refuse, before the run where it is seen there, else with "
+                     "exit code 4 once the result is saved; ignore, which tells nothing."),
+    ] = "warn",
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -208,6 +222,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
+        on_risk,
     )  # fmt: skip
     _refuse_endless(plan)
     _refuse_beside_error(plan)
@@ -221,7 +236,7 @@ def simulate(
     load_method(plan.method or METHOD)
     with bar() as progress, _kept_if_interrupted(plan.checkpoint):
         begin = time.perf_counter()
-        result = _run(plan, model, progress)
+        result, refused = _run(plan, model, progress)
         seconds = time.perf_counter() - begin
         with _kept_if_it_fails(plan.checkpoint):
             result = _saved(plan, result, seconds, progress)
@@ -233,6 +248,16 @@ def simulate(
         raise typer.Exit(130)
     if not result.success:
         raise typer.Exit(NumericalFailure.exit_code)
+    if refused is not None:
+        raise typer.Exit(_said(plan, refused))
+
+
+def _said(plan: Plan, refused: RiskRefused) -> int:
+    """The exit code of a result whose risks are refused, once they are told."""
+    from . import output
+
+    output.complain(f"{plan.scene}: {refused}\nwhat was computed is in {plan.output}")
+    return refused.exit_code
 
 
 def _refuse_endless(plan: Plan) -> None:
@@ -324,20 +349,27 @@ def compiled(
     return model
 
 
-def _run(plan: Plan, model: Model, progress: Bar) -> Result:
+def _run(plan: Plan, model: Model, progress: Bar) -> tuple[Result, RiskRefused | None]:
+    """The result; and what --on-risk refuse says of it, if it does."""
     if plan.resume and not plan.checkpoint.is_file():
         raise MstmmError(
             f"--resume: there is no checkpoint {plan.checkpoint}; it is written when a run is "
             "interrupted, beside its --output"
         )
-    return model.simulate(
-        plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
-        None if plan.times is None else plan.times.until(plan.t_end),
-        max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
-        iterations=plan.iterations, tangent=plan.tangent, error=plan.error, error_of=plan.of,
-        progress=progress, resume=plan.resume,
-        checkpoint=str(plan.checkpoint) if plan.resumable else None,
-    )  # fmt: skip
+    try:
+        result = model.simulate(
+            plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
+            None if plan.times is None else plan.times.until(plan.t_end),
+            max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
+            iterations=plan.iterations, tangent=plan.tangent, error=plan.error, error_of=plan.of,
+            on_risk=plan.on_risk, progress=progress, resume=plan.resume,
+            checkpoint=str(plan.checkpoint) if plan.resumable else None,
+        )  # fmt: skip
+    except RiskRefused as refused:
+        if refused.result is None:
+            raise
+        return refused.result, refused
+    return result, None
 
 
 def _saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:

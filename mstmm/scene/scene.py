@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..ir.spec import ElementSpec
+from ..risk import Risk, sentences
 from .checks import flexible, types
 from .checks import scene as checks
 from .files.write import to_toml
@@ -53,9 +54,14 @@ class Scene(SceneTables):
             _source.reset(token)
 
     @property
+    def risks(self) -> tuple[Risk, ...]:
+        """What is accepted but worth knowing."""
+        return checks.risks(self)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
-        """What is accepted but worth knowing, one sentence each."""
-        return checks.warnings(self)
+        """The same, one sentence each."""
+        return sentences(self.risks)
 
     def to_toml(self) -> str:
         """The scene as TOML with every default filled in; it loads back to an equal scene."""

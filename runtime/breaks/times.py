@@ -17,6 +17,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.drive import jump
 from mstmm.expression.parser import Term
+from mstmm.risk import Risk
 
 from .acting import Acting
 from .enclosures import Enclosure, enclose, of_time
@@ -45,25 +46,27 @@ class TimeMap:
         breaks: (n,) s, ascending, from the start to before the end: steps end there.
         starts, longest: (m,) s: from `starts[i]` on, up to the next, no step is longer.
         narrowest: what asks for the shortest steps.
-        notes: what could not be mapped, a sentence each.
+        notes: what could not be mapped.
     """
 
     breaks: Array
     starts: Array
     longest: Array
     narrowest: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[Risk, ...] = field(default=())
 
-    def too_long(self, step: float) -> str:
-        """Warning for a fixed step that could pass over what a load does; "" if it could not."""
+    def too_long(self, step: float) -> Risk | None:
+        """A fixed step that could pass over what a load does; None if it could not."""
         shortest = float(self.longest.min(initial=np.inf))
         if step <= shortest:
-            return ""
+            return None
         at = float(self.starts[np.argmin(self.longest)])
-        return (
+        return Risk(
+            "narrow-load", self.narrowest,
             f"the fixed step of {step:g} s is too long for {self.narrowest}, which near "
-            f"t = {at:.6g} s asks for steps of {shortest:.2g} s: what it does may be missed"
-        )
+            f"t = {at:.6g} s asks for steps of {shortest:.2g} s: what it does may be missed",
+            f"take a step below {shortest:.2g} s, or leave step out", step, shortest, before=True,
+        )  # fmt: skip
 
 
 def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap:
@@ -79,7 +82,7 @@ def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap
 
 
 def _mapped(expressions: list[Acting], start: float, end: float) -> TimeMap:
-    breaks, paces, notes = set[float](), list[tuple[Pace, str]](), list[str]()
+    breaks, paces, notes = set[float](), list[tuple[Pace, str]](), list[Risk]()
     for one in expressions:
         view = _View(one)
         breaks.update(one.expression.time_breaks())
@@ -110,18 +113,22 @@ def _inside(times: set[float], start: float, end: float) -> Array:
     return np.array(sorted(found))
 
 
-def _many_switches(one: Acting, since: float) -> str:
-    return (
+def _many_switches(one: Acting, since: float) -> Risk:
+    return Risk(
+        "switches", one.what,
         f"{one.what} ({_shown(one)}) switches too often for every switching to end a step: from "
-        f"t = {since:.6g} s on some are passed over; give max_step, or a shorter run"
-    )
+        f"t = {since:.6g} s on some are passed over", "give max_step, or a shorter run",
+        before=True,
+    )  # fmt: skip
 
 
-def _too_fast(one: Acting, longest: float) -> str:
-    return (
+def _too_fast(one: Acting, longest: float) -> Risk:
+    return Risk(
+        "narrow-load", one.what,
         f"{one.what} ({_shown(one)}) changes too often for all of it to be looked at before the "
-        f"run; steps are kept below {longest:.2g} s where it is not known, or give max_step"
-    )
+        f"run; steps are kept below {longest:.2g} s where it is not known", "give max_step",
+        before=True,
+    )  # fmt: skip
 
 
 def _shown(one: Acting) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from mstmm.risk import Risk
+
 
 @dataclass(frozen=True)
 class Attempt:
@@ -67,15 +69,21 @@ class ReachedError:
         return sum(run.cpu_s for run in self.runs)
 
     @property
-    def warning(self) -> str:
-        """That what was asked is not met, and why; "" where it is."""
+    def risk(self) -> Risk | None:
+        """That what was asked is not met, and why; None where it is."""
         if self.met:
-            return ""
+            return None
         reached = "not known" if self.estimate is None else f"{_with(self.estimate, self.unit)}"
-        return (
+        return Risk(
+            "wanted-error", self.of,
             f"the error of {self.of} asked for, {_with(self.asked, self.unit)}, is not reached: "
-            f"the estimate is {reached}, because {self.why}"
-        )
+            f"the estimate is {reached}, because {self.why}", "", self.estimate, self.asked,
+        )  # fmt: skip
+
+    @property
+    def warning(self) -> str:
+        """The same as a sentence; "" where it is met."""
+        return "" if self.risk is None else str(self.risk)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, for files."""

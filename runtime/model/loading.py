@@ -9,19 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mstmm.errors import MstmmError, SceneError
 from mstmm.extras import missing
 from mstmm.scene import Scene
 
 from ..engine.identity import kernels_hash
 from ..host.files import refuse_special, seal_is_broken
-from ..integrate.steppers import get
 from ..kernels import store
 from ..result.output import provenance
 from ..result.result import Result
-from ..run import classical
 from ..run.stability import check_step
 from ..run.trajectory import Trajectory
 from .model import Model
@@ -114,9 +110,6 @@ def _rebuilt(data: Any, path: Path) -> Result:
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
     step = None
-    explicit = run.settings.step is not None and run.settings.method not in classical.METHODS
-    if explicit and (run.start is not None or len(run.t)):
-        start = np.concatenate(run.first[1:])
-        engine, tableau = model.looped, get(run.settings.method)
-        step = check_step(engine, tableau, run.settings, start, engine.start_memory())
+    if run.start is not None or len(run.t):
+        step = check_step(model.looped, run.settings, *run.first[1:])
     return result_of(model, run, provenance.error(data), step)

@@ -207,6 +207,7 @@ class Model(Compiled):
         iterations: int = 1,
         tangent: str = "auto",
         certify: bool = False,
+        on_risk: str = "warn",
         progress: Callable[[float, float], None] | None = None,
         checkpoint: str | Path | None = None,
         resume: bool = False,
@@ -243,14 +244,18 @@ class Model(Compiled):
                 with laws.
             initial: (q, u) instead of the scene's own start.
             certify: estimate the error by a second, more accurate run.
+            on_risk: where something speaks against the numbers (`Result.risks`): warn, in the
+                result; refuse, which raises RiskRefused, before the run where it is seen there,
+                else behind it with the result; ignore, which tells nothing in `warnings`.
             progress: called with (t, t_end) about every 0.1 s.
             checkpoint: file that keeps the run every 30 s, when it is interrupted, and when it has
                 ended, until the result is saved.
             resume: continue from that file, if it is there, bit for bit.
 
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
-        Raises SceneError for settings that make no sense.
+        Raises SceneError for settings that make no sense, RiskRefused where `on_risk` asks for it.
         """
+        from ..guard.on_risk import ended, started
         from .results import simulate
         from .wanted.asked import Control, asked
 
@@ -267,14 +272,19 @@ class Model(Compiled):
         q, u = self.initial_state() if initial is None else pair("initial", initial)
         instead = "simulate_batch takes many"
         q, u = one("initial q", q, self.nq, instead), one("initial u", u, self.nu, instead)
+        seen = started(self, settings, q, u, on_risk)
         if wanted is not None:
             from .wanted import search
 
-            return search.simulate(self, settings, wanted, q, u, certify=certify, progress=progress)
-        return simulate(
-            self, settings, q, u,
-            certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
-        )  # fmt: skip
+            result = search.simulate(
+                self, settings, wanted, q, u, seen=seen, certify=certify, progress=progress
+            )
+        else:
+            result = simulate(
+                self, settings, q, u, seen=seen,
+                certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
+            )  # fmt: skip
+        return ended(result, on_risk)
 
     def simulate_batch(
         self,

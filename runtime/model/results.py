@@ -9,6 +9,7 @@ from pathlib import Path
 from mstmm.arrays import Array
 
 from ..engine.compiled import Compiled
+from ..guard.before import Start
 from ..integrate.settings import Settings
 from ..result.result import Result
 from ..run.checkpoint import Checkpoint
@@ -40,21 +41,23 @@ def simulate(
     q: Array,
     u: Array,
     *,
+    seen: Start,
     certify: bool,
     progress: Callable[[float, float], None] | None,
     checkpoint: str | Path | None,
     resume: bool,
 ) -> Result:
-    """One run, and a second one where its error is asked for; see `Model.simulate`."""
+    """One run, and a second one where its error is asked for; see `Model.simulate`.  `seen` is what
+    a look at it has found."""
     watch = Watch(progress, settings, runs=2 if certify else 1)
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
-    run, step = first_run(model, settings, q, u, watch, resume)
-    run = replace(run, start=(q, u))
+    run = first_run(model, settings, q, u, watch, resume, seen.step)
+    run = seen.given(replace(run, start=(q, u)))
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))
-    result = result_of(model, run, error, step)
+    result = result_of(model, run, error, seen.step)
     result.checkpoint = watch.checkpoint
     return result
 

@@ -31,10 +31,9 @@ def pack(
     system, frames = system_of(scene, known, align=align, flexible=flexible)
     ffi, lib = prebuilt.module()
     written = write(system, frames.elements)
-    warnings = [w for body in frames.flexible.values() for w in body.warnings]
     packed = Packed(
         **vars(frames), system=system, ffi=ffi, lib=lib, model=written.model, written=written,
-        scratch=written.scratch, warnings=warnings,
+        scratch=written.scratch,
     )  # fmt: skip
     if product_accuracy is not None:
         attach(packed, product_accuracy)

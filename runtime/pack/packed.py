@@ -35,7 +35,6 @@ class Packed(Frames):
     tape_slots: int = 0
     workspace: int = 0
     product: Any = None
-    warnings: list[str] = field(default_factory=list)
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+
+from mstmm.risk import Risk, sentences
 
 from ..integrate.reached import ReachedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate
@@ -10,11 +13,10 @@ from ..run.stability import StepCheck
 from .conditioning import LARGEST, PivotLoss, SingularDistance
 from .evidence import Drift, Give
 from .flexible import certify
+from .flexible import risks as flexible_risks
 from .flexible.certify import Flexibility
+from .risks import of_balances, of_numbers, of_speed, ordered
 from .verdict import ACCURACY, DRIFT, Verdict
-
-#: Pivot loss and singular measure that bring a warning; of drifts see `verdict`.
-LOSS, SINGULAR = 1e8, 1e-3
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Certificate:
         give: of the stiffest spring, which the estimated error does not count; None without one.
         failures: why the run, or some of its samples, cannot be used at all.
         models: where models of the scene are outside their range whatever the run.
-        unseen: of expressions of the scene, what the steps may have passed over.
+        known: of the scene and its start before the run, and what the run itself has seen.
         reached: of the error that was asked for (error=...); None where none was.
     """
 
@@ -61,8 +63,8 @@ class Certificate:
     flexible: tuple[Flexibility, ...] = ()
     give: Give | None = None
     failures: tuple[str, ...] = ()
-    models: tuple[str, ...] = ()
-    unseen: tuple[str, ...] = ()
+    models: tuple[Risk, ...] = ()
+    known: tuple[Risk, ...] = ()
     reached: ReachedError | None = None
 
     def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
@@ -83,15 +85,26 @@ class Certificate:
             return DRIFT
         return max(DRIFT, self.reached.asked)
 
+    @cached_property
+    def risks(self) -> tuple[Risk, ...]:
+        """What asks for attention, doubts first; empty for a clean run."""
+        looked_at = (self.pivot, self.singular, self.step)
+        return ordered((
+            *of_numbers(self.finite, self.reached), *self.known,
+            *of_balances((self.energy, *self.momentum), self.drift),
+            *(x.risk for x in looked_at if x is not None and x.risk is not None),
+            *flexible_risks.risks(self.flexible), *self.models, *of_speed(self.stability_limited),
+        ))  # fmt: skip
+
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the numbers, one sentence each."""
-        return tuple(_doubts(self))
+        return sentences(risk for risk in self.risks if risk.doubt)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What asks for attention: doubts, and advice; empty for a clean run."""
-        return (*self.doubts, *_advice(self))
+        """The risks, one sentence each."""
+        return sentences(self.risks)
 
     @property
     def predictable_until(self) -> float | None:
@@ -101,7 +114,7 @@ class Certificate:
     def __str__(self) -> str:
         return self.text()
 
-    def text(self, verdict: bool = True) -> str:
+    def text(self, verdict: bool = True, warnings: bool = True) -> str:
         """All of it as lines, a name and what is to be said of it; the verdict first."""
         few = "not determined: one sample tells of no change; ask for more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
@@ -125,7 +138,7 @@ class Certificate:
             rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
         rows += certify.rows(self.flexible)
         rows += _error_rows(self)
-        rows += [("warning", text) for text in self.warnings]
+        rows += [("warning", text) for text in self.warnings] if warnings else []
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
 
@@ -175,47 +188,7 @@ def _until(error: ErrorEstimate) -> str:
     return "" if error.horizon is None else f" (predictable until {error.horizon:.4g} s)"
 
 
-# --- words ----------------------------------------------------------------------------------------
-
-
-def _doubts(c: Certificate) -> list[str]:
-    found = [] if c.finite else ["the states hold numbers that are not finite"]
-    if c.reached is not None and not c.reached.met:
-        found.append(c.reached.warning)
-    found += c.unseen
-    found += [
-        f"{d.name} cannot be balanced: it is beyond what numbers hold, or no sample gives it"
-        for d in (c.energy, *c.momentum)
-        if not d.known
-    ]
-    found += [
-        f"{d.name} is not kept: it changes by {d}; the tolerance or the step is too coarse"
-        for d in (c.energy, *c.momentum)
-        if d.relative > c.drift
-    ]
-    if c.pivot is not None and c.pivot.ratio > LOSS:
-        found.append(
-            f'hinge "{c.pivot.hinge}" carries {c.pivot.ratio:.0e} times what its motion feels (a '
-            f"heavy body behind light ones): accelerations may err by {1e-16 * c.pivot.ratio:.0e} "
-            "of their size; where the root is free, make the heavy body the first one"
-        )
-    if c.singular is not None and c.singular.measure < SINGULAR:
-        found.append(
-            f'hinge "{c.singular.hinge}" comes within {c.singular.measure:.0e} of the angle '
-            f"at which its coordinates fail, at t = {c.singular.time:.6g} s; use a ball hinge"
-        )
-    if c.step is not None and c.step.warning:
-        found.append(c.step.warning)
-    return [*found, *certify.warnings(c.flexible), *c.models]
-
-
-def _advice(c: Certificate) -> list[str]:
-    if not c.stability_limited:
-        return []
-    return [
-        "many steps were as long as the stability of the explicit method allows: the scene is "
-        'stiff for it (method = "auto" or "rodas4p2" may be faster), or the fixed step is too long'
-    ]
+# --- rows -----------------------------------------------------------------------------------------
 
 
 def _error_rows(c: Certificate) -> list[tuple[str, str]]:

@@ -37,6 +37,6 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
-        unseen=result.trajectory.unseen,
+        known=run.risks,
         reached=run.reached,
     )

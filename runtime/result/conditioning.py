@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
+from mstmm.risk import Risk
 
 from .flexible.pivots import ModalPivots
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from ..run.trajectory import Trajectory
 
+
+#: Pivot loss and singular measure from which on they are risks.
+LOSS, SINGULAR = 1e8, 1e-3
 
 #: Samples of a run at which the pivots are looked at.
 SAMPLES = 12
@@ -45,6 +49,18 @@ class PivotLoss:
     hinge: str
     time: float
 
+    @property
+    def risk(self) -> Risk | None:
+        """That digits are lost; None up to LOSS."""
+        if not self.ratio > LOSS:
+            return None
+        return Risk(
+            "pivot-loss", f'hinge "{self.hinge}"',
+            f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
+            f"body behind light ones): accelerations may err by {1e-16 * self.ratio:.0e} of their "
+            "size", "where the root is free, make the heavy body the first one", self.ratio, LOSS,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class SingularDistance:
@@ -53,6 +69,18 @@ class SingularDistance:
     measure: float
     hinge: str
     time: float
+
+    @property
+    def risk(self) -> Risk | None:
+        """That the coordinates come to where they fail; None from SINGULAR on."""
+        if not self.measure < SINGULAR:
+            return None
+        return Risk(
+            "gimbal", f'hinge "{self.hinge}"',
+            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
+            f"coordinates fail, at t = {self.time:.6g} s", "use a ball hinge", self.measure,
+            SINGULAR,
+        )  # fmt: skip
 
 
 # --- pivots ---------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.risk import Risk
 from mstmm.scene.checks.flexible import short_beams
 
 from ..engine.compiled import Compiled
@@ -103,13 +104,22 @@ class Record(FlexibleResults, ABC):
         """What vouches for the numbers."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is worth knowing before the numbers are used, one sentence each."""
-        scene, found = self.model.scene.warnings, self.certificate.warnings
-        notes, failures = self.trajectory.notes, self._observed.failures
-        return tuple(dict.fromkeys((*scene, *notes, *found, *failures)))
+    def risks(self) -> tuple[Risk, ...]:
+        """Everything that was seen to ask for attention, in the scene, before the run and in what
+        it gave: doubts first, then what is only worth knowing; empty for a clean run."""
+        found = self.certificate.risks
+        said = {str(risk) for risk in found}
+        return (*found, *(risk for risk in self.model.scene.risks if str(risk) not in said))
 
-    def _outside(self) -> tuple[str, ...]:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is worth knowing before the numbers are used, one sentence each: the risks, unless
+        the run was to ignore them, and notes of what went wrong beside it."""
+        risks = self.risks if self.trajectory.told else ()
+        notes, failures = self.trajectory.notes, self._observed.failures
+        return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
+
+    def _outside(self) -> tuple[Risk, ...]:
         """Models of the scene that are outside their range whatever the run."""
         return tuple(short_beams(self.model.scene))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -28,7 +28,6 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..pack.flexible.expansion import HELD
-from .notes import unseen
 from .simulate import LARGEST, SLICE, split
 from .system import SceneSystem
 from .trajectory import Trajectory
@@ -251,10 +250,9 @@ class _Run:
         statistics = Statistics(
             self.steps, 0, self._solutions(), 0, step, step, None, None, 0.0, 0.0, False, 0
         )
-        found = split(
+        return split(
             self.system, samples, self.settings, status, message, statistics, (self.t, self.last)
         )
-        return replace(found, unseen=unseen(self.system, self.settings, None))
 
     def _solutions(self) -> int:
         return int(self.stepper.run.solutions) if hasattr(self, "stepper") else 0

@@ -15,19 +15,18 @@ from mstmm.errors import MstmmError, SceneError
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
-from ..integrate.steppers import get
 from . import classical, second_opinion
 from . import engine_choice as compiled_run
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .method_choice import Choice
 from .simulate import advance, choice_of, make_run, said, trajectory
-from .stability import StepCheck, check_step
 from .system import SceneSystem
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+    from .stability import StepCheck
 
 Progress = Callable[[float, float], None]
 
@@ -91,21 +90,21 @@ def _joined(earlier: Samples | None, samples: Samples) -> Samples:
 
 
 def first_run(
-    model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False
-) -> tuple[Trajectory, StepCheck | None]:
-    """The run from (q, u), or from the checkpoint; and its fixed step judged at the start."""
+    model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False,
+    step: StepCheck | None = None,
+) -> Trajectory:  # fmt: skip
+    """The run from (q, u), or from the checkpoint.  Its failures are put down to the fixed step
+    where `step` has found that too long."""
     if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f'method "{settings.method}" keeps no checkpoints; use dop853')
         others = classical if settings.method in classical.METHODS else second_opinion
-        return others.integrate(model, settings, q, u, watch.tell), None
+        return others.integrate(model, settings, q, u, watch.tell)
     classical.refuse_options(settings)
     state, earlier = _continued(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
     engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
     system = SceneSystem(engine, compiled)
-    start = system.start(settings.t_start, q, u)
-    step = check_step(engine, get(settings.first_method), settings, start, system.memory)
     run = make_run(system, settings, q, u)
     watch.choice = choice_of(system, settings, run)
     message = "" if run.status is Status.RUNNING else said(system, run, run.status)
@@ -132,7 +131,7 @@ def first_run(
         found = replace(found, methods=tuple(watch.choice.stretches))
     if step is not None and status is not None and not found.success:
         found = replace(found, message=step.blamed(found.message))
-    return found, step
+    return found
 
 
 def _advanced(
@@ -177,7 +176,7 @@ def second_run(
     known = model.packed.time_map(first.settings.t_start, first.settings.t_end)
     settings, reference = tighter(first, known.breaks.tolist())
     watch.run = 1
-    second, _ = first_run(model, settings, q, u, watch)
+    second = first_run(model, settings, q, u, watch)
     if not second.success:
         why = "it was interrupted" if second.status is None else second.message
         watch.notes.append(f"the second run, for the error, did not reach the end: {why}")

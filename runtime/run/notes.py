@@ -1,4 +1,4 @@
-"""What a run could not see, locate or resolve, one sentence each."""
+"""What a run could not see, locate or resolve."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.risk import Risk
+
 from ..integrate.steppers import get
 from ..pack.switches import MOST
 
 if TYPE_CHECKING:
     from ..integrate.settings import Settings
+    from ..pack.packed import Packed
     from .system import SceneSystem
     from .trajectory import Trajectory
 
@@ -21,26 +24,25 @@ _PART = 0.02
 _SURE = 0.5
 
 
-def unseen(
-    system: SceneSystem, settings: Settings, chatter: tuple[int, float] | None
-) -> tuple[str, ...]:
-    """Of a run's expressions: those that could not be mapped, are passed over by a fixed step, or
-    switch without end (`chatter`: which one, and since when)."""
-    known = system.engine.packed.time_map(settings.t_start, settings.t_end)
+def foreseen(packed: Packed, settings: Settings) -> tuple[Risk, ...]:
+    """Of the expressions of a scene: those that could not be mapped, or that a fixed step may pass
+    over."""
+    known = packed.time_map(settings.t_start, settings.t_end)
     found = list(known.notes)
     if settings.step is not None:
-        found += [text] if (text := known.too_long(settings.step)) else []
-    if len(system.switches) > MOST:
-        found.append(
+        found += [risk] if (risk := known.too_long(settings.step)) else []
+    count = len(packed.watched.switches)
+    if count > MOST:
+        found.append(Risk(
+            "switches", "",
             f"more than {MOST} conditions depend on the motion; those behind the first {MOST} do "
-            "not end a step where they switch: give max_step so that none is passed over"
-        )
-    if chatter is not None:
-        found.append(endless(system, chatter))
+            "not end a step where they switch", "give max_step so that none is passed over",
+            count, MOST, before=True,
+        ))  # fmt: skip
     return tuple(found)
 
 
-def unresolved(run: Trajectory) -> tuple[str, ...]:
+def unresolved(run: Trajectory) -> tuple[Risk, ...]:
     """That the fixed step of an implicit method is far too long for the motion, by the estimates
     that adaptive steps go by.  Nothing else bounds such a step, and what it damps away leaves no
     energy that could tell."""
@@ -51,10 +53,12 @@ def unresolved(run: Trajectory) -> tuple[str, ...]:
     if not tableau.implicit:
         return ()
     if settings.step > settings.t_end - settings.t_start:
-        return (
-            f"step = {settings.step:.4g} s is longer than the run, which is one step then; "
-            f"take one below {settings.t_end - settings.t_start:.4g} s",
-        )
+        span = settings.t_end - settings.t_start
+        return (Risk(
+            "step-accuracy", "",
+            f"step = {settings.step:.4g} s is longer than the run, which is one step then",
+            f"take one below {span:.4g} s", settings.step, span, before=True,
+        ),)  # fmt: skip
     if error is None or len(run.t) < 3:
         return ()
     speed = float(np.sqrt(np.mean(run.u**2, axis=1)).mean()) if run.u.size else 0.0
@@ -62,18 +66,20 @@ def unresolved(run: Trajectory) -> tuple[str, ...]:
     if not (way > 0.0 and error > _PART * way + settings.atol * statistics.steps):
         return ()
     shorter = settings.step * (_SURE * _PART * way / error) ** (1 / tableau.error_order)
-    return (
+    return (Risk(
+        "step-accuracy", "",
         f"step = {settings.step:.4g} s is too long for the motion: by their own estimate its steps "
-        f"err by {error / way:.0%} of the way that is covered; take a step below {shorter:.2g} s, "
-        "or leave step out",
-    )
+        f"err by {error / way:.0%} of the way that is covered",
+        f"take a step below {shorter:.2g} s, or leave step out", error / way, _PART,
+    ),)  # fmt: skip
 
 
-def endless(system: SceneSystem, chatter: tuple[int, float]) -> str:
-    """A switch that holds the motion where it is."""
-    switch, since = chatter
-    return (
-        f"{system.switches[switch].what} switches without end from t = {since:.9g} s on, because "
-        "the forces on both sides drive the motion back to it, and no step ends there any more; "
-        "make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the hinge's law"
-    )
+def endless(system: SceneSystem, chatter: tuple[int, float]) -> Risk:
+    """A switch that holds the motion where it is: which one, and since when."""
+    what, since = system.switches[chatter[0]].what, chatter[1]
+    return Risk(
+        "chatter", what,
+        f"{what} switches without end from t = {since:.9g} s on, because the forces on both sides "
+        "drive the motion back to it, and no step ends there any more",
+        "make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the hinge's law",
+    )  # fmt: skip

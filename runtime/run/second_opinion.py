@@ -26,7 +26,7 @@ from ..integrate.settings import Settings
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
-from .notes import endless, unseen
+from .notes import endless
 from .simulate import split, tolerances
 from .system import SceneSystem
 from .trajectory import Trajectory
@@ -189,7 +189,8 @@ class _Loop:
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
         )  # fmt: skip
-        return replace(found, unseen=unseen(scene, settings, self.crossings.chatter))
+        chatter = self.crossings.chatter
+        return replace(found, risks=() if chatter is None else (endless(scene, chatter),))
 
     def piece(self, y: Array, stop: float) -> Array:
         """From self.t to the next break, with a new integrator after every event.

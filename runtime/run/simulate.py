@@ -17,7 +17,7 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, check_steps, get
 from .endings import message_of
 from .method_choice import Choice
-from .notes import unresolved, unseen
+from .notes import endless, unresolved
 from .system import SceneSystem
 from .trajectory import Trajectory
 
@@ -126,8 +126,8 @@ def trajectory(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
-    seen = unseen(system, settings, run.chatter)
-    return replace(found, unseen=(*seen, *unresolved(found)))
+    held = () if run.chatter is None else (endless(system, run.chatter),)
+    return replace(found, risks=(*held, *unresolved(found)))
 
 
 def said(system: SceneSystem, run: Run, status: Status | None) -> str:

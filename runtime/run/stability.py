@@ -15,12 +15,16 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
+from mstmm.risk import Risk
 
 from ..engine.engine import Engine
-from ..integrate.steppers import Tableau
+from ..integrate.steppers import get
+from . import classical, second_opinion
+from .system import SceneSystem
 
 if TYPE_CHECKING:
     from ..integrate.settings import Settings
+    from ..integrate.steppers import Tableau
 
 
 #: h |lambda| above which a fixed step of an explicit method is not trusted.
@@ -56,38 +60,44 @@ class StepCheck:
     kind: str = "hinge"
 
     @property
-    def warning(self) -> str | None:
-        """A sentence if the step is too long."""
+    def risk(self) -> Risk | None:
+        """That the step is too long; None where it is not."""
         if self.product <= LIMIT and self.amplification <= _GROWTH:
             return None
-        return (
+        return Risk(
+            "step-stability", f'{self.kind} "{self.hinge}"',
             f"step = {self.step:.4g} s is too long for the fastest motion at the start "
             f'({self.kind} "{self.hinge}", {self.rate:.4g} 1/s): h |lambda| = {self.product:.3g}, '
-            "one step "
-            f"multiplies it by {self.amplification:.3g}; take a step below {self.stable_step:.3g} "
-            "s or leave step out for a method that chooses it"
-        )
+            f"one step multiplies it by {self.amplification:.3g}",
+            f"take a step below {self.stable_step:.3g} s or leave step out for a method that "
+            "chooses it",
+            self.product, LIMIT, before=True,
+        )  # fmt: skip
 
     def blamed(self, message: str) -> str:
         """Why a run failed, with the step named first where it is too long: what such a run runs
         into says nothing of the scene."""
-        if self.warning is None:
+        risk = self.risk
+        if risk is None:
             return message
         cause, *rest = message.split("; ")
         after = "".join(f"; {part}" for part in rest if part.startswith("last good state"))
-        return f"{self.warning}; the run with it ended: {cause}{after}"
+        return f"{risk}; the run with it ended: {cause}{after}"
 
 
-def check_step(
-    engine: Engine, tableau: Tableau, settings: Settings, y: Array, memory: Array
-) -> StepCheck | None:
-    """Check of a fixed step at the start; None for adaptive runs, for implicit methods, and where
-    nothing moves."""
-    if settings.step is None or tableau.implicit or engine.nu == 0:
+def check_step(engine: Engine, settings: Settings, q: Array, u: Array) -> StepCheck | None:
+    """Check of a fixed step at the start (nq,), (nu,); None for adaptive runs, for implicit
+    methods and the classical one, and where nothing moves."""
+    others = (*classical.METHODS, *second_opinion.METHODS)
+    if settings.step is None or settings.method in others or engine.nu == 0:
         return None
-    n = engine.nq + engine.nu
+    tableau = get(settings.method)
+    if tableau.implicit:
+        return None
+    system = SceneSystem(engine)
+    y, memory = system.start(settings.t_start, q, u)[: engine.nq + engine.nu], system.memory
     try:
-        value, vector = fastest(engine, settings.t_start, y[:n].copy(), memory)
+        value, vector = fastest(engine, settings.t_start, y, memory)
         shares = _shares(engine, settings.t_start, y, memory, vector[engine.nq :])
     except (NumericalFailure, np.linalg.LinAlgError):  # the run itself will say what is wrong
         return None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.risk import Risk
 
 from ..integrate.loop import Statistics, Status
 from ..integrate.reached import ReachedError
@@ -40,9 +41,10 @@ class Trajectory:
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
-    unseen: tuple[str, ...] = ()  # of expressions: what the steps may have passed over
+    risks: tuple[Risk, ...] = ()  # seen before the run and by it, which samples do not tell
     methods: tuple[Stretch, ...] = ()  # of a run that chose among them
     reached: ReachedError | None = None  # of a run that was asked for an error
+    told: bool = True  # whether its risks are wanted among its warnings
     before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
 
     @property

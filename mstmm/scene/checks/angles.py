@@ -6,12 +6,14 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from ...risk import Risk
+
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
     from ..tables.hinge import HingeTable
 
 
-def notes(scene: SceneTables) -> Iterator[str]:
+def notes(scene: SceneTables) -> Iterator[Risk]:
     """Angles of more than a turn, which are degrees more often than not."""
     for hinge in scene.hinge:
         yield from _of_hinge(f'hinge "{hinge.name}"', hinge)
@@ -27,12 +29,12 @@ def notes(scene: SceneTables) -> Iterator[str]:
         yield from _of_ends(elastic.name, elastic.ends)
 
 
-def _of_ends(owner: str, ends: Mapping[str, Any]) -> Iterator[str]:
+def _of_ends(owner: str, ends: Mapping[str, Any]) -> Iterator[Risk]:
     for name, end in ends.items():
         yield from _of_angles(f'"{owner}.{name}": orientation', end.orientation)
 
 
-def _of_hinge(name: str, hinge: HingeTable) -> Iterator[str]:
+def _of_hinge(name: str, hinge: HingeTable) -> Iterator[Risk]:
     yield from _of_angles(f"{name}: orientation", hinge.orientation)
     kind = hinge.facts
     if kind is None or kind.quaternion is not None:
@@ -48,11 +50,13 @@ def _of_hinge(name: str, hinge: HingeTable) -> Iterator[str]:
             yield from _of_angles(f"{name}: upper limit", (limits.upper or 0.0,))
 
 
-def _of_angles(what: str, values: tuple[float, ...], at: int | None = None) -> Iterator[str]:
+def _of_angles(what: str, values: tuple[float, ...], at: int | None = None) -> Iterator[Risk]:
     chosen = values if at is None else values[at : at + 1]
     for value in chosen:
         if abs(value) > 2 * math.pi * (1 + 1e-9):
-            yield (
-                f"{what}: {value:.6g} rad is {abs(value) / (2 * math.pi):.3g} turns; "
-                f"if degrees were meant, write {math.radians(value):.6g}"
-            )
+            yield Risk(
+                "degrees", what.partition(": ")[0],
+                f"{what}: {value:.6g} rad is {abs(value) / (2 * math.pi):.3g} turns",
+                f"if degrees were meant, write {math.radians(value):.6g}", abs(value), 2 * math.pi,
+                doubt=False, before=True,
+            )  # fmt: skip

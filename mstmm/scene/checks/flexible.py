@@ -7,6 +7,7 @@ from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
 from ...numbers.rotations import Vector, apply, dot, norm, unit
+from ...risk import Risk
 from ..rules.values import Location, split
 from ..tables.hinge_frames import start_motion
 from .welded import lines as lines_of
@@ -134,18 +135,19 @@ def _within(direction: Vector, axes: list[Vector]) -> float:
     return hypot(*(dot(direction, known) for known in basis))
 
 
-# --- warnings -------------------------------------------------------------------------------------
+# --- risks ----------------------------------------------------------------------------------------
 
 
-def warnings(scene: SceneTables) -> Iterator[str]:
+def risks(scene: SceneTables) -> Iterator[Risk]:
     """What is accepted but worth knowing of flexible bodies."""
     yield from short_beams(scene)
     for body in (*scene.beam, *scene.elastic):
         if max(body.damping.ratio) >= 1:
-            yield (
-                f"{_called(scene, body.name)}: damping: a ratio of {max(body.damping.ratio):g} is "
-                "critical or more; 0.01 is 1 percent"
-            )
+            ratio, name = max(body.damping.ratio), _called(scene, body.name)
+            yield Risk(
+                "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or more",
+                "0.01 is 1 percent", ratio, 1.0, doubt=False, before=True,
+            )  # fmt: skip
     for _, beam, hinge in _held(scene):
         if beam.model != "rigid":
             yield from _loose_frame(beam, hinge)
@@ -163,7 +165,7 @@ def _called(scene: SceneTables, name: str) -> str:
     return f'{word} "{name}"'
 
 
-def short_beams(scene: SceneTables) -> Iterator[str]:
+def short_beams(scene: SceneTables) -> Iterator[Risk]:
     """Beams that are short for their height; those welded in line are one, and named once."""
     if not scene.beam:
         return
@@ -175,12 +177,13 @@ def short_beams(scene: SceneTables) -> Iterator[str]:
             continue
         said.add(line.first)
         whole = "its length is" if line.length == beam.length else "the line it is welded into is"
-        yield (
+        yield Risk(
+            "short-beam", f'beam "{beam.name}"',
             f'beam "{beam.name}": {whole} {line.length / height:.2g} times the height of the '
             f"section along {direction} ({height:.3g} m from {source}), less than {SLENDER:g}: "
-            "shear, which Euler-Bernoulli beams leave out, is not small; use an elastic body from "
-            "a mesh"
-        )
+            "shear, which Euler-Bernoulli beams leave out, is not small",
+            "use an elastic body from a mesh", line.length / height, SLENDER, before=True,
+        )  # fmt: skip
 
 
 def _heights(beam: Beam) -> Iterator[tuple[float, str, str]]:
@@ -203,7 +206,7 @@ def _bends(beam: Beam, direction: str) -> bool:
     return beam.modes is None or bool(getattr(beam.modes, direction))
 
 
-def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[str]:
+def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[Risk]:
     """A tangent frame at an end that its hinge leaves free to turn."""
     at = hinge.outboard_end
     if beam.frame_kind != "tangent" or beam.frame_end not in ("", at) or beam.quadrature:
@@ -214,15 +217,16 @@ def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[str]:
             return
 
 
-def _loose(body: str, hinge: Hinge) -> str:
-    return (
+def _loose(body: str, hinge: Hinge) -> Risk:
+    return Risk(
+        "frame", body,
         f'{body}: frame: a tangent frame at "{hinge.outboard_end}", which hinge "{hinge.name}" '
-        "leaves free to turn, keeps little inertia there: the more shapes, the smaller the steps; "
-        'write frame = "auto"'
-    )
+        "leaves free to turn, keeps little inertia there: the more shapes, the smaller the steps",
+        'write frame = "auto"', doubt=False, before=True,
+    )  # fmt: skip
 
 
-def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[str]:
+def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[Risk]:
     """A basis asked for by name whose shapes have no bending moment where a hinge carries one."""
     if beam.basis not in (_CF, _FF, _SS):
         return
@@ -235,11 +239,13 @@ def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[str]:
             x = beam.end_x(at)
             moment_free = x >= beam.length - slack or (x <= slack and beam.basis != _CF)
             if moment_free and _carries_moment(beam, hinge, at, reference == hinge.outboard):
-                yield (
+                yield Risk(
+                    "basis", f'beam "{beam.name}"',
                     f'beam "{beam.name}": basis: {beam.basis} shapes have no bending moment at '
                     f'"{at}", but hinge "{hinge.name}" carries one there, so that they converge '
-                    'slowly; write basis = "static+fixed-interface" or "auto"'
-                )
+                    "slowly", 'write basis = "static+fixed-interface" or "auto"', doubt=False,
+                    before=True,
+                )  # fmt: skip
                 return
 
 

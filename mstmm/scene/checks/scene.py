@@ -9,6 +9,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from ...expression.expression import Expression
+from ...risk import Risk
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
 from ..tables.inertia import negative_moment, triangle_excess
@@ -137,7 +138,7 @@ def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
 
 
 def _tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
-    """(place, name for a warning, table) of every body table, those of chains among them."""
+    """(place, name for a message, table) of every body table, those of chains among them."""
     for i, body in enumerate(scene.body):
         yield ("body", i), f'body "{body.name}"', body
     for i, chain in enumerate(scene.chain):
@@ -163,21 +164,23 @@ def _inertias(scene: SceneTables) -> Iterator[Problem]:
 _ACCEPTED = "allow_unphysical_inertia = true"
 
 
-def warnings(scene: SceneTables) -> tuple[str, ...]:
+def risks(scene: SceneTables) -> tuple[Risk, ...]:
     """What is accepted but worth knowing: inertias that no body can have, angles that look like
     degrees, beams that are asked for what they cannot do well."""
     found, dusty = [], []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
-            found.append(f"{name}: inertia: {excess}; accepted as asked")
+            means = f"{name}: inertia: {excess}; accepted as asked"
+            found.append(Risk("inertia", name, means, doubt=False, before=True))
         dusty += [(name, x) for k, x in enumerate(body.inertia[:3])
                   if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
     if dusty:
         name, entry = dusty[0]
         more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
-        found.append(f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}")
-    return (*found, *notes(scene), *flexible_bodies.warnings(scene))
+        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}"
+        found.append(Risk("inertia", name, means, figure=entry, doubt=False, before=True))
+    return (*found, *notes(scene), *flexible_bodies.risks(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------

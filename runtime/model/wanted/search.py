@@ -24,7 +24,6 @@ from ...integrate.steppers import AUTO
 from ...result.measure import Coordinates, Measure, Quantities
 from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
-from ...run.stability import StepCheck
 from ..results import certified, result_of
 from .asked import Asked
 from .family import Family, explicit, is_explicit
@@ -32,6 +31,7 @@ from .looks import Look, estimate, first_rtol, fresh_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
+    from ...guard.before import Start
     from ...result.result import Result
     from ...run.trajectory import Trajectory
 
@@ -52,7 +52,6 @@ class _Made:
     run: Trajectory
     numbers: Array
     cpu_s: float
-    step: StepCheck | None
 
     @property
     def order(self) -> tuple[bool, float]:
@@ -61,13 +60,14 @@ class _Made:
 
 
 class Search:
-    """The runs for one wanted error.  `settings` say all but the tolerances."""
+    """The runs for one wanted error.  `settings` say all but the tolerances; `seen` is what a look
+    at the first one has found."""
 
     def __init__(
         self, model: Compiled, settings: Settings, wanted: Asked, q: Array, u: Array,
-        progress: Progress | None,
+        seen: Start, progress: Progress | None,
     ) -> None:  # fmt: skip
-        self._model, self._q, self._u = model, q, u
+        self._model, self._q, self._u, self._seen = model, q, u, seen
         self._wanted, self._progress = wanted, progress
         self._times = settings.output_times
         self._settings = replace(settings, output_times=_looked_at(settings))
@@ -102,17 +102,17 @@ class Search:
         settings = replace(self._settings, rtol=rtol, atol=atol, method=method)
         watch = Watch(self._told(), settings)
         begin = time.process_time()
-        run, step = first_run(self._model, settings, self._q, self._u, watch)
+        run = first_run(self._model, settings, self._q, self._u, watch)
         spent = time.process_time() - begin
         self._notes += [note for note in watch.notes if note not in self._notes]
-        run = replace(run, start=(self._q, self._u))
+        run = self._seen.given(replace(run, start=(self._q, self._u)))
         if not run.success:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
-        result = result_of(self._model, run, None, step)
+        result = result_of(self._model, run)
         if self._measure is None:
             self._measure = Quantities(result, self._wanted.of)
-        self._made.append(_Made(run, self._measure.read(result), spent, step))
+        self._made.append(_Made(run, self._measure.read(result), spent))
         self._made.sort(key=lambda one: one.order)
         self._measure.scale_by(self._made[-1].numbers)
         self._looks = [self._look(one) for one in self._made]
@@ -198,7 +198,7 @@ class Search:
         finite = None if known is None or known == math.inf else known * self._size
         reached = self._reached(made.run, finite, why, self._found())
         run = replace(made.run, reached=reached, notes=(*made.run.notes, *self._notes))
-        return result_of(self._model, self._as_asked(run), error, made.step)
+        return result_of(self._model, self._as_asked(run), error)
 
     def _found(self) -> str:
         """How the estimate was made, in words."""
@@ -238,11 +238,11 @@ class Search:
 
 
 def simulate(
-    model: Compiled, settings: Settings, wanted: Asked, q: Array, u: Array, *, certify: bool,
-    progress: Progress | None,
+    model: Compiled, settings: Settings, wanted: Asked, q: Array, u: Array, *, seen: Start,
+    certify: bool, progress: Progress | None,
 ) -> Result:  # fmt: skip
     """The result of a search, and with `certify` of a second run beside it."""
-    result = Search(model, settings, wanted, q, u, progress).result()
+    result = Search(model, settings, wanted, q, u, seen, progress).result()
     return certified(result, progress) if certify and result.trajectory.success else result
 
 

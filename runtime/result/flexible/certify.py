@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from .motion import Motion
 
 
-#: What brings a warning: slope, load ratio of a linear beam and spin in first frequencies, bending
-#: energy that the shapes miss, shear, rotation of a section (rad), buckling, strain.
-SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
-
 #: Samples that are looked at, and flexible bodies of a scene.
 SAMPLES, LARGEST = 160, 400
 
@@ -198,7 +194,7 @@ def missed(motion: Motion, places: Array, weights: Array, moment: Array) -> floa
     return float(lost[k] / true[k]) if true[k] > 0 else None
 
 
-# --- words ----------------------------------------------------------------------------------------
+# --- rows -----------------------------------------------------------------------------------------
 
 #: Bodies that get rows of their own in the certificate; of more only the extremes are shown.
 _ROWS = 4
@@ -250,103 +246,3 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
     if one.shear is not None:
         kept.append(f"shear {one.shear:.0e}")
     return [(f"{one.name}", "; ".join(went)), (f"{one.name} shapes", "; ".join(kept))]
-
-
-def warnings(found: Sequence[Flexibility]) -> list[str]:
-    """What speaks against the model, one sentence per kind, for the worst body of each."""
-    kinds = (_linear, _steep, _turned, _strained, _missed, _buckled, _aside, _sheared)
-    sentences = []
-    for kind in kinds:
-        said = [text for text in map(kind, _worst_first(found)) if text]
-        if said:
-            more = f" (and {len(said) - 1} more bodies likewise)" if len(said) > 1 else ""
-            sentences.append(said[0] + more)
-    own = [text for one in found for text in one.said]
-    return [*dict.fromkeys(own), *sentences]
-
-
-def _worst_first(found: Sequence[Flexibility]) -> list[Flexibility]:
-    return sorted(found, key=lambda one: -max(one.slope, one.spin_ratio, one.load_ratio))
-
-
-def _linear(one: Flexibility) -> str:
-    if one.stiffening:
-        return ""
-    if one.spin_ratio > SPIN:
-        way_out = "leave stiffening on" if one.gamma else "model it by beams, or from a mesh"
-        return (
-            f'"{one.name}" has no geometric stiffening and spins at {one.spin_ratio:.2g} times its '
-            "first frequency: its deflection grows without bound where a real body stiffens; "
-            f"{way_out}"
-        )
-    if one.load_ratio > GAMMA:
-        return (
-            f'"{one.name}" has no geometric stiffening, but its loads change its stiffness by '
-            f"{one.load_ratio:.0%} (gamma): deflections err by about as much; leave stiffening on"
-        )
-    return ""
-
-
-def _steep(one: Flexibility) -> str:
-    if one.slope <= SLOPE:
-        return ""
-    return (
-        f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the deflection, "
-        f"{min(one.shortening_error, 9.99):.0%} of the shortening): split the body into welded "
-        "parts"
-    )
-
-
-def _strained(one: Flexibility) -> str:
-    if one.strain is None or one.strain <= STRAIN:
-        return ""
-    return (
-        f'"{one.name}" is strained by {one.strain:.2g}; beyond {STRAIN:g} the model, which is '
-        "linear in the strain, has no meaning: check stiffness and loads"
-    )
-
-
-def _turned(one: Flexibility) -> str:
-    if one.turn <= TURN:
-        return ""
-    return (
-        f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
-        "model has no meaning beyond 1.5 rad: split the body into welded parts"
-    )
-
-
-def _missed(one: Flexibility) -> str:
-    if one.tail is None or one.tail <= TAIL:
-        return ""
-    return (
-        f'the shapes of "{one.name}" miss {one.tail:.0%} of its bending energy: take more modes, '
-        'or basis = "static+fixed-interface", which carries the loads of its hinges'
-    )
-
-
-def _buckled(one: Flexibility) -> str:
-    if one.gamma is None or one.gamma[0] >= BUCKLING:
-        return ""
-    return (
-        f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
-        "its buckling load, by compression, or sideways by bending moments at work on its twist"
-    )
-
-
-def _aside(one: Flexibility) -> str:
-    if one.sideways is None or one.sideways < -BUCKLING:
-        return ""
-    return (
-        f'the loads of "{one.name}" reach {one.sideways:.0%} of those that buckle it out of the '
-        "plane of its shapes, which does not show: give it shapes of y, z and twist"
-    )
-
-
-def _sheared(one: Flexibility) -> str:
-    if one.shear is None or one.shear <= SHEAR:
-        return ""
-    return (
-        f'the highest bending shape of "{one.name}" is too short for a beam without shear: its '
-        f"frequency errs by about {min(one.shear, 1.0):.0%}; take fewer modes or an elastic body"
-    )

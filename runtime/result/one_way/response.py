@@ -18,6 +18,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
+from mstmm.risk import Risk
 from mstmm.scene import split
 
 from ...flexible.kernel_inputs import moments_of
@@ -82,14 +83,16 @@ class OneWay:
     cost: Cost
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """A sentence where the loads were too rough for their polynomials."""
+    def risks(self) -> tuple[Risk, ...]:
+        """That the loads were too rough for their polynomials."""
         if self.cost.error <= 10 * TOLERANCE:
             return ()
-        return (
+        return (Risk(
+            "one-way-loads", "",
             f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
-            f"cells (steps of {self.cost.error:.1g} of the largest); simulate a shorter time",
-        )
+            f"cells (steps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
+            self.cost.error, 10 * TOLERANCE,
+        ),)  # fmt: skip
 
 
 def respond(model: Compiled, run: Trajectory) -> OneWay:
@@ -147,7 +150,7 @@ def _sampled(model: Compiled, run: Trajectory, grid: Cells) -> Trajectory:
     s, (t, q, u) = run.settings, run.first
     times = tuple(grid.samples.tolist())
     settings = replace(s, t_start=t, t_end=times[-1], output_times=times, first_step=0.0)
-    repeated, _ = first_run(model, settings, q, u, Watch(None, settings))
+    repeated = first_run(model, settings, q, u, Watch(None, settings))
     if not repeated.success:
         raise NumericalFailure(
             f"one-way response: the run could not be repeated: {repeated.message}"

@@ -9,6 +9,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.risk import Risk
 from mstmm.scene import split
 
 from ...engine.compiled import Compiled
@@ -35,25 +36,30 @@ if TYPE_CHECKING:
 COUPLED = 0.09
 
 
-def _too_coupled(share: tuple[str, float]) -> str:
+def _too_coupled(share: tuple[str, float]) -> Risk:
     name, chi = share
-    return (
+    return Risk(
+        "one-way-coupling", f'"{name}"',
         f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
         "the inertia there (chi), so that the one-way response may err by "
-        f'{3 * chi / (1 - chi):.1f} of its deflection; take flexibility = "coupled"'
-    )
+        f"{3 * chi / (1 - chi):.1f} of its deflection", 'take flexibility = "coupled"', chi,
+        COUPLED, before=True,
+    )  # fmt: skip
 
 
-def _let_go(model: Compiled) -> tuple[str, ...]:
-    """A sentence for each one-way body whose hinge releases it."""
+def _let_go(model: Compiled) -> tuple[Risk, ...]:
+    """Each one-way body whose hinge releases it."""
     letting = set(releasable(model.scene))
     holders = {split(h.outboard)[0]: h.name for h in model.scene.hinge if h.name in letting}
     return tuple(
-        f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held body; '
-        'take flexibility = "coupled"'
+        Risk(
+            "one-way-release", f'"{name}"',
+            f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
+            "body", 'take flexibility = "coupled"', before=True,
+        )
         for name in rigidity(model).one_way
         if name in holders
-    )
+    )  # fmt: skip
 
 
 class OneWayResult(Result):
@@ -96,9 +102,9 @@ class OneWayResult(Result):
             raise SceneError(f'"{body}": expected a body that responds one way: {", ".join(found)}')
         return found[body]
 
-    def _outside(self) -> tuple[str, ...]:
+    def _outside(self) -> tuple[Risk, ...]:
         """As of any result, and where the response is not to be trusted."""
-        found = (*super()._outside(), *self._one_way.warnings, *_let_go(self.model))
+        found = (*super()._outside(), *self._one_way.risks, *_let_go(self.model))
         return (*found, *map(_too_coupled, self.couplings.items()))
 
     @cached_property

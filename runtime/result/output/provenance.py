@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm import version
+from mstmm import risk, version
 from mstmm.arrays import Array
 
 from ...classical.schemes import scheme_of
@@ -69,7 +69,9 @@ def attributes(result: Record) -> dict[str, Any]:
         "statistics": json.dumps(None if run.statistics is None else asdict(run.statistics)),
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
         "notes": json.dumps(list(run.notes)),
-        "unseen": json.dumps(list(run.unseen)),
+        "risks": json.dumps(risk.to_rows(result.risks)),
+        "known_risks": json.dumps(risk.to_rows(run.risks)),
+        "told": int(run.told),
         "methods": json.dumps([asdict(stretch) for stretch in run.methods]),
         "error_estimate": json.dumps(None if run.reached is None else run.reached.to_dict()),
         "norm_residual": run.norm_residual,
@@ -193,7 +195,7 @@ def trajectory(data: Any) -> Trajectory:
     return Trajectory(
         t, q, u, memory, work, event.astype(np.int64), status, str(a["message"]), settings,
         statistics, fail_time, tuple(json.loads(a["notes"])), float(a["norm_residual"]), last,
-        start, tuple(json.loads(a.get("unseen", "[]"))),
+        start, risk.from_rows(json.loads(a.get("known_risks", "[]"))),
         from_rows(json.loads(a.get("methods", "[]"))),
-        from_dict(json.loads(a.get("error_estimate", "null"))),
+        from_dict(json.loads(a.get("error_estimate", "null"))), bool(a.get("told", 1)),
     )  # fmt: skip

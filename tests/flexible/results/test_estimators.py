@@ -14,6 +14,7 @@ from mstmm.runtime.result.flexible import certify, estimators
 from mstmm.runtime.result.flexible.certify import Flexibility, missed
 from mstmm.runtime.result.flexible.coupling import coupling
 from mstmm.runtime.result.flexible.energy import frequencies, modal_energy, strain_energy
+from mstmm.runtime.result.flexible.risks import risks
 
 #: First root of the clamped-free beam, and its moments with unit mass and length: int phi,
 #: int phi x, shortening integrals G0, G1 and G(L) of the first shape.
@@ -159,21 +160,21 @@ def test_shear_error_grows_with_the_square_of_the_wave_number() -> None:
     ],
 )
 def test_each_limit_has_its_warning(changes: dict[str, Any], words: str) -> None:
-    found = certify.warnings([replace(PLAIN, **changes)])
-    assert len(found) == 1
-    assert re.search(words, found[0])
+    (risk,) = risks([replace(PLAIN, **changes)])
+    assert re.search(words, str(risk))
+    assert risk.doubt and risk.element == '"blade"'
 
 
 def test_a_body_within_its_range_is_not_warned_about() -> None:
-    assert certify.warnings([PLAIN]) == []
+    assert risks([PLAIN]) == []
     fast = replace(PLAIN, spin_ratio=2.0, gamma=(0.0, 5.0))
-    assert certify.warnings([fast]) == []
+    assert risks([fast]) == []
 
 
 def test_many_bodies_give_one_sentence_of_a_kind_and_a_few_rows() -> None:
     many = [replace(PLAIN, name=f"b{k}", slope=0.01 * k) for k in range(100)]
-    (sentence,) = certify.warnings(many)
-    assert '"b99"' in sentence and "68 more bodies" in sentence
+    (risk,) = risks(many)
+    assert risk.element == '"b99"' and "68 more bodies" in str(risk)
     rows = dict(certify.rows(many))
     assert rows["largest slope"] == '0.99 at "b99"' and len(rows) < 6
     own = dict(certify.rows([PLAIN]))

@@ -1,0 +1,46 @@
+"""Risks that are seen before a run: in its scene, its settings, and its start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from mstmm.arrays import Array
+from mstmm.risk import Risk
+
+from ..run.notes import foreseen
+from ..run.stability import StepCheck, check_step
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..integrate.settings import Settings
+    from ..run.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is known of a run at its start: the fixed step against the fastest motion, and risks;
+    whether its user wants to be told of those."""
+
+    step: StepCheck | None
+    risks: tuple[Risk, ...]
+    told: bool = True
+
+    def given(self, run: Trajectory) -> Trajectory:
+        """The run with what was known of it."""
+        return replace(run, risks=(*self.risks, *run.risks), told=self.told)
+
+
+def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
+    """Look at a run from (nq,), (nu,) before it is made.
+
+    Raises SceneError for settings that no run can have.
+    """
+    step = check_step(model.looped, settings, q, u)
+    return Start(step, (*foreseen(model.packed, settings), *_of_step(step)))
+
+
+def _of_step(step: StepCheck | None) -> Iterator[Risk]:
+    if step is not None and step.risk is not None:
+        yield step.risk

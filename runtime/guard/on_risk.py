@@ -1,0 +1,53 @@
+"""`on_risk`: what a run does about its risks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mstmm.arrays import Array
+from mstmm.errors import RiskRefused, SceneError
+from mstmm.risk import ON_RISK, Risk
+
+from .before import Start, look
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..integrate.settings import Settings
+    from ..result.result import Result
+
+
+def started(model: Compiled, settings: Settings, q: Array, u: Array, on_risk: str) -> Start:
+    """What is seen before a run from (nq,), (nu,).
+
+    Raises SceneError for a word that `on_risk` does not know, RiskRefused where that is "refuse"
+    and something speaks against the run.
+    """
+    if on_risk not in ON_RISK:
+        raise SceneError(f"on_risk = {on_risk!r}: expected one of {', '.join(ON_RISK)}")
+    seen = look(model, settings, q, u)
+    if on_risk == "refuse":
+        _refuse((*model.scene.risks, *seen.risks), "before the run")
+    return replace(seen, told=on_risk != "ignore")
+
+
+def ended(result: Result, on_risk: str) -> Result:
+    """The result of a run.
+
+    Raises RiskRefused, which carries it, where `on_risk` is "refuse" and something speaks against
+    the numbers of a run that reached its end.
+    """
+    if on_risk == "refuse" and result.success:
+        _refuse(result.risks, "in what it gave", result)
+    return result
+
+
+def _refuse(risks: Iterable[Risk], where: str, result: Result | None = None) -> None:
+    against = [risk for risk in risks if risk.doubt]
+    if against:
+        said = "\n".join(f"  {risk.name}: {risk}" for risk in against)
+        raise RiskRefused(
+            f'the run is refused (on_risk = "refuse") for what was seen {where}:\n{said}', against,
+            result,
+        )  # fmt: skip
