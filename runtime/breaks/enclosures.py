@@ -15,6 +15,9 @@ from .intervals import EVERYTHING, Interval, point
 
 _ONE, _NONE = point(1.0), point(0.0)
 
+#: The name of time.
+TIME = "t"
+
 
 @dataclass(frozen=True)
 class Enclosure:
@@ -29,13 +32,20 @@ class Enclosure:
 
 def of_time(expression: Expression, constants: Mapping[str, float]) -> tuple[list[int], list[int]]:
     """(terms that depend on t and constants alone, those of them in which t occurs)."""
+    return of_one(expression, constants, TIME)
+
+
+def of_one(
+    expression: Expression, constants: Mapping[str, float], variable: str
+) -> tuple[list[int], list[int]]:
+    """The same of another name in the place of t."""
     alone, moving = set[int](), set[int]()
     for number in sorted(expression.needed):
         term = expression.terms[number]
         if term.constant is not None or _is_known(term, constants):
             alone.add(number)
         elif term.name is not None:
-            if _is_time(term):
+            if _is(term, variable):
                 alone.add(number)
                 moving.add(number)
         elif all(i in alone for i in term.args):
@@ -46,9 +56,14 @@ def of_time(expression: Expression, constants: Mapping[str, float]) -> tuple[lis
 
 
 def enclose(
-    terms: Sequence[Term], wanted: Sequence[int], constants: Mapping[str, float], t: Interval
+    terms: Sequence[Term],
+    wanted: Sequence[int],
+    constants: Mapping[str, float],
+    t: Interval,
+    variable: str = TIME,
 ) -> dict[int, Enclosure]:
-    """Enclosures of `wanted` (arguments before their operations) over cells of time."""
+    """Enclosures of `wanted` (arguments before their operations) over cells of time, or of another
+    name in its place."""
     known: dict[int, Enclosure] = {}
     with np.errstate(all="ignore"):
         for number in wanted:
@@ -61,7 +76,7 @@ def enclose(
                 known[number] = Enclosure(value, _NONE)
             elif term.name is not None:
                 known[number] = (
-                    Enclosure(t, _ONE) if _is_time(term)
+                    Enclosure(t, _ONE) if _is(term, variable)
                     else Enclosure(point(constants[term.name.text]), _NONE)
                 )  # fmt: skip
             else:
@@ -70,8 +85,8 @@ def enclose(
     return known
 
 
-def _is_time(term: Term) -> bool:
-    return term.name is not None and term.name.text == "t"
+def _is(term: Term, variable: str) -> bool:
+    return term.name is not None and term.name.text == variable
 
 
 def _is_known(term: Term, constants: Mapping[str, float]) -> bool:

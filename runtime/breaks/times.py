@@ -8,7 +8,7 @@ looked for over the whole run: every time at which an expression switches (a com
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,26 +16,15 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.drive import jump
-from mstmm.expression.parser import Term
 from mstmm.risk import Risk
 
 from .acting import Acting
-from .enclosures import Enclosure, enclose, of_time
-from .intervals import EVERYTHING, Interval, cos
-from .pace import Pace, Watched, pace
-from .roots import Margin, roots
+from .pace import Pace, pace
+from .roots import roots
+from .view import View
 
 #: Part of the run within which two times are one at its ends.
 _ROUNDING = 1e-15
-
-#: Cells of an expression at most, and terms in all of them together.
-_CELLS, _WORK = 2**16, 2**18
-
-_DIFFERENCES = frozenset({"lt", "le", "gt", "ge", "min", "max"})
-_FUNCTIONS = frozenset({
-    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log",
-    "sqrt", "pow", "div",
-})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -84,7 +73,7 @@ def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap
 def _mapped(expressions: list[Acting], start: float, end: float) -> TimeMap:
     breaks, paces, notes = set[float](), list[tuple[Pace, str]](), list[Risk]()
     for one in expressions:
-        view = _View(one)
+        view = View(one.expression, dict(one.constants), one.drive)
         breaks.update(one.expression.time_breaks())
         for margin in view.margins():
             found = roots(margin, start, end, view.most)
@@ -145,89 +134,6 @@ def _shortest(paces: list[tuple[Pace, str]]) -> tuple[Array, Array, str]:
     each = [p.longest[np.searchsorted(p.starts, starts, side="right") - 1] for p, _ in finite]
     narrowest = min(finite, key=lambda pair: float(pair[0].longest.min()))[1]
     return starts, np.minimum.reduce(each), narrowest
-
-
-class _View:
-    """One expression as functions over cells of time."""
-
-    def __init__(self, one: Acting) -> None:
-        self.expression = one.expression
-        self.constants: Mapping[str, float] = dict(one.constants)
-        self.drive = one.drive
-        self.order, moving = of_time(one.expression, self.constants)
-        self.moving = frozenset(moving)
-        self.most = min(_CELLS, _WORK // max(1, len(self.order)))
-
-    def terms(self, t: Interval) -> dict[int, Enclosure]:
-        """Enclosures of all terms that depend on t alone."""
-        return enclose(self.expression.terms, self.order, self.constants, t)
-
-    def watched(self) -> list[Watched]:
-        """The functions that could be narrow: all but sums, products and switches; of a drive,
-        whose second derivative acts, their slopes too."""
-        found = []
-        for number in sorted(self.moving):
-            term = self.expression.terms[number]
-            if term.op == "div" and term.args[1] not in self.moving:
-                continue
-            if term.op in _FUNCTIONS:
-                turning = term.op in ("sin", "cos")
-                argument = term.args[0] if turning else None
-                found.append(Watched(number, argument))
-                if self.drive:
-                    found.append(Watched(number, argument, slope=True))
-        return found
-
-    def margins(self) -> list[Margin]:
-        """What changes its sign where the expression switches; straight lines are known exactly."""
-        lines, terms = self.expression.linear_switches(), self.expression.terms
-        once: dict[tuple[bool, str], Margin] = {}
-        for number in sorted(self.moving - set(lines)):
-            term = terms[number]
-            margin = self._margin(term)
-            if margin is not None:
-                text = [self.expression.text[terms[i].start : terms[i].end] for i in term.args]
-                key = " - ".join(text if term.op in _DIFFERENCES else text[term.op == "div" :][:1])
-                once.setdefault((term.op == "tan", key), margin)
-        return list(once.values())
-
-    def _margin(self, term: Term) -> Margin | None:
-        op, args = term.op, term.args
-        if op in _DIFFERENCES:
-            return self._of(args, lambda a, b: a - b)
-        if op in ("sign", "abs", "log", "sqrt", "atan2"):
-            return self._of(args[:1], lambda a: a)
-        if op == "div" and args[1] in self.moving:
-            return self._of(args[1:], lambda a: a)
-        if op == "tan":
-            return self._of(args, lambda a: Enclosure(cos(a.value), EVERYTHING))
-        if op == "pow" and args[0] in self.moving and not self._is_whole(args[1]):
-            return self._of(args[:1], lambda a: a)
-        return None
-
-    def _is_whole(self, exponent: int) -> bool:
-        value = self.expression.terms[exponent].constant
-        return value is not None and value >= 0 and value == int(value)
-
-    def _of(self, args: tuple[int, ...], difference: Callable[..., Enclosure]) -> Margin:
-        needed = self._below(args)
-        terms, constants = self.expression.terms, self.constants
-
-        def margin(t: Interval) -> Enclosure:
-            known = enclose(terms, needed, constants, t)
-            with np.errstate(all="ignore"):
-                return difference(*(known[i] for i in args))
-
-        return margin
-
-    def _below(self, args: tuple[int, ...]) -> list[int]:
-        found, waiting = set[int](), list(args)
-        while waiting:
-            number = waiting.pop()
-            if number not in found:
-                found.add(number)
-                waiting += self.expression.terms[number].args
-        return sorted(found)
 
 
 __all__ = ["TimeMap", "time_map"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from mstmm.risk import Risk
 
 from ..run.notes import foreseen
 from ..run.stability import StepCheck, check_step
+from . import fast, heavy, shapes, spun
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -38,9 +38,7 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
     Raises SceneError for settings that no run can have.
     """
     step = check_step(model.looped, settings, q, u)
-    return Start(step, (*foreseen(model.packed, settings), *_of_step(step)))
-
-
-def _of_step(step: StepCheck | None) -> Iterator[Risk]:
-    if step is not None and step.risk is not None:
-        yield step.risk
+    own = () if step is None or step.risk is None else (step.risk,)
+    guards = (heavy.lost_digits, spun.linear_bodies, shapes.too_few, fast.many_steps)
+    found = (risk for guard in guards for risk in guard(model, settings, q, u))
+    return Start(step, (*own, *foreseen(model.packed, settings), *found))

@@ -15,7 +15,7 @@ from .evidence import Drift, Give
 from .flexible import certify
 from .flexible import risks as flexible_risks
 from .flexible.certify import Flexibility
-from .risks import of_balances, of_numbers, of_speed, ordered
+from .risks import of_balances, of_numbers, of_quaternions, of_speed, ordered
 from .verdict import ACCURACY, DRIFT, Verdict
 
 
@@ -92,6 +92,7 @@ class Certificate:
         return ordered((
             *of_numbers(self.finite, self.reached), *self.known,
             *of_balances((self.energy, *self.momentum), self.drift),
+            *of_quaternions(self.quaternion_residual),
             *(x.risk for x in looked_at if x is not None and x.risk is not None),
             *flexible_risks.risks(self.flexible), *self.models, *of_speed(self.stability_limited),
         ))  # fmt: skip

@@ -11,6 +11,7 @@ from .balances import energy, momentum
 from .certificate import Certificate
 from .conditioning import LARGEST, pivot_loss, singular_distance
 from .flexible import certify
+from .narrow import passed_over
 from .record import Record
 
 
@@ -37,6 +38,6 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
-        known=run.risks,
+        known=(*run.risks, *passed_over(result.model, run)),
         reached=run.reached,
     )

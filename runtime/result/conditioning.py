@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 
 #: Pivot loss and singular measure from which on they are risks.
-LOSS, SINGULAR = 1e8, 1e-3
+LOSS, SINGULAR = 1e8, 1e-4
+
+#: Change of angles within a fixed step (rad) that is one where the measure is below the first.
+NEAR, TURNED = 0.1, 0.2
 
 #: Samples of a run at which the pivots are looked at.
 SAMPLES = 12
@@ -64,23 +67,30 @@ class PivotLoss:
 
 @dataclass(frozen=True)
 class SingularDistance:
-    """The smallest measure of a hinge whose coordinates fail where it vanishes (gimbal: |cos|)."""
+    """The smallest measure of a hinge whose coordinates fail where it vanishes (gimbal: |cos|), and
+    how far its speeds turn it within a fixed step (rad), 0 for steps that are chosen."""
 
     measure: float
     hinge: str
     time: float
+    turned: float = 0.0
 
     @property
     def risk(self) -> Risk | None:
-        """That the coordinates come to where they fail; None from SINGULAR on."""
-        if not self.measure < SINGULAR:
-            return None
-        return Risk(
-            "gimbal", f'hinge "{self.hinge}"',
-            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
-            f"coordinates fail, at t = {self.time:.6g} s", "use a ball hinge", self.measure,
-            SINGULAR,
-        )  # fmt: skip
+        """That the coordinates come to where they fail, or that fixed steps are too long for how
+        fast they are near it; None else."""
+        near = f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
+        near += f"coordinates fail, at t = {self.time:.6g} s"
+        if self.measure < SINGULAR:
+            return Risk("gimbal", f'hinge "{self.hinge}"', near, "use a ball hinge", self.measure,
+                        SINGULAR)  # fmt: skip
+        if self.measure < NEAR and self.turned > TURNED:
+            return Risk(
+                "gimbal", f'hinge "{self.hinge}"',
+                f"{near}, and its angles change there by {self.turned:.2g} rad within a step",
+                "use a ball hinge, or a method that chooses its steps", self.turned, TURNED,
+            )  # fmt: skip
+        return None
 
 
 # --- pivots ---------------------------------------------------------------------------------------
@@ -205,7 +215,10 @@ def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) ->
     k = int(np.abs(measures).argmin())
     changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
     k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
-    return SingularDistance(value, model.packed.scene.hinges.name(number), float(run.t[k]))
+    speeds = np.abs(run.u[:, model.layout.slots(number).u_slice])
+    turned = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
+    name = model.packed.scene.hinges.name(number)
+    return SingularDistance(value, name, float(run.t[k]), turned)
 
 
 def _measure(model: Compiled, number: int) -> Any:

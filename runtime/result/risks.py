@@ -9,6 +9,9 @@ from mstmm.risk import Risk
 from ..integrate.reached import ReachedError
 from .evidence import Drift
 
+#: Distance of a quaternion's length from 1 that is a risk.
+LENGTH = 1e-3
+
 
 def ordered(found: Iterable[Risk]) -> tuple[Risk, ...]:
     """Doubts first, each once; of what was seen before the run and in it the later row."""
@@ -41,6 +44,17 @@ def of_balances(drifts: Sequence[Drift], limit: float) -> Iterator[Risk]:
                 _kind(drift), drift.name, f"{drift.name} is not kept: it changes by {drift}",
                 "the tolerance or the step is too coarse", drift.relative, limit,
             )  # fmt: skip
+
+
+def of_quaternions(residual: float) -> Iterator[Risk]:
+    """Quaternions that were far from length 1 before they were settled."""
+    if residual > LENGTH:
+        yield Risk(
+            "quaternion-length", "",
+            f"quaternions were {residual:.1e} off their length 1 between the steps: attitudes err "
+            "by about as much", "take smaller tolerances, or a method of the package", residual,
+            LENGTH,
+        )  # fmt: skip
 
 
 def _kind(drift: Drift) -> str:

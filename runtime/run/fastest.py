@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.scene import Scene
 
 from ..engine.engine import Engine
 from ..engine.tangent import Tangent
@@ -25,6 +26,17 @@ _ITERATIONS = 4
 _CANDIDATES = 64
 
 Operator = Callable[[Array], Array]
+
+
+def may_be_fast(scene: Scene, rate: float) -> bool:
+    """Whether springs and dampers are stiff enough, beside the smallest inertia, for a motion of
+    that |lambda| (1/s); only if they are is it worth while to compute it."""
+    laws = [table.law for table in (*scene.hinge, *(x for c in scene.chain for x in c.hinge))]
+    stiff = [k for law in laws for k in law.stiffness] + [s.law.stiffness for s in scene.spring]
+    damped = [c for law in laws for c in law.damping] + [s.law.damping for s in scene.spring]
+    tables = (*scene.body, *(table for chain in scene.chain for table in chain.body))
+    least = min((min(body.mass, max(body.inertia)) for body in tables), default=0.0)
+    return max(stiff, default=0.0) > rate * rate * least or max(damped, default=0.0) > rate * least
 
 
 class Fastest:

@@ -16,7 +16,7 @@ from mstmm.errors import MstmmError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
 from ...run import second_opinion
-from ...run.fastest import Fastest
+from ...run.fastest import Fastest, may_be_fast
 from ...run.method_choice import implicit_method
 
 if TYPE_CHECKING:
@@ -30,9 +30,6 @@ _VIBRATING, _LEFT_OUT, _LOOSE = 1000.0, 200.0, 1e-4
 #: h |lambda| of explicit steps that follow a vibration at a tolerance, and the order at which it
 #: falls.
 _FOLLOWED, _AT, _SLOWLY = 4.0, 1e-3, 16.0
-
-#: Hinges from which a look at all of them costs more than the fastest motion itself.
-_MANY = 1000
 
 #: An implicit step in explicit ones, and the order at which their number grows.
 _STEP, _ORDER = 2.5, 4.0
@@ -64,20 +61,6 @@ def _held_back(run: Trajectory) -> bool:
     return not run.methods and counted is not None and counted.stability_limited
 
 
-def _may_vibrate(model: Compiled, span: float) -> bool:
-    """Whether a look at the fastest motion may pay: flexible bodies, or laws that are stiff beside
-    the smallest inertia."""
-    if model.flexible:
-        return True
-    scene = model.scene
-    if len(scene.hinges) > _MANY:
-        return True
-    given = [one for hinge in scene.hinges for one in hinge.law.stiffness]
-    stiffest = max(given + [spring.law.stiffness for spring in scene.spring], default=0.0)
-    least = min((min(body.mass, max(body.inertia)) for body in scene.bodies), default=0.0)
-    return stiffest * span**2 > _LEFT_OUT**2 * least
-
-
 class Family:
     """The method of each of several runs from one start."""
 
@@ -88,7 +71,8 @@ class Family:
         self._many = _VIBRATING if error < _LOOSE else _LEFT_OUT
         self._span = settings.t_end - settings.t_start
         self._rate, self._rescued = 0.0, False
-        if settings.method == AUTO and _may_vibrate(model, self._span):
+        pays = bool(model.flexible) or may_be_fast(model.scene, _LEFT_OUT / (self._span or 1e-300))
+        if settings.method == AUTO and pays:
             try:
                 fastest = Fastest(model.looped, model.looped.start_memory())
                 self._rate = fastest.rate(settings.t_start, q, u)

@@ -122,7 +122,7 @@ def _one(
     tail, aside = _from_sections(flexible, name, some, line) if shapes is not None else (None, None)
     return Flexibility(
         name, len(body.modes), body.frame,
-        bool(np.any(body.G)) if shapes is None else bool(shapes.stiffening),
+        e.is_stiffened(body),
         slope, e.largest_turn(bent_all), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         tail if slope > _STRAIGHT else None, _leading(motion, coupling),

@@ -49,6 +49,11 @@ def _all_turns(motion: Motion) -> list[Array]:
     return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
 
 
+def is_stiffened(body: ModalBody) -> bool:
+    """Whether second-order displacements are in a body's kinematics."""
+    return bool(np.any(body.G)) if body.shapes is None else bool(body.shapes.stiffening)
+
+
 def cross_spin(motion: Motion) -> float:
     """Largest spin in rad/s of the frame about what lies across a beam; about any axis else.
 

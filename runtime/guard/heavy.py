@@ -1,0 +1,47 @@
+"""Digits that the sweep loses at the start: heavy bodies behind light ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mstmm.arrays import Array
+from mstmm.risk import Risk
+
+from ..result.conditioning import LOSS, pivot_loss
+from .path import states
+
+if TYPE_CHECKING:
+    from mstmm.scene import Scene
+
+    from ..engine.compiled import Compiled
+    from ..integrate.settings import Settings
+
+#: The loss is at most so many times the ratio of masses, or of moments of inertia.
+_WORST = 1e3
+
+#: Bodies up to which it is looked at: more take longer than many a run.
+_MOST = 2000
+
+
+def lost_digits(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
+    """The worst loss of the start's sweep; not computed where masses are alike."""
+    if len(model.scene.bodies) > _MOST or _WORST * _unlike(model.scene) < LOSS:
+        return
+    found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
+    if found is not None and found.risk is not None:
+        yield replace(found.risk, before=True)
+
+
+def _unlike(scene: Scene) -> float:
+    """The largest ratio of two masses, and of two moments of inertia."""
+    tables = [*scene.body, *(table for chain in scene.chain for table in chain.body)]
+    masses = [table.mass for table in tables]
+    masses += [beam.mass for beam in scene.beam]
+    return max(_ratio(masses), _ratio(x for table in tables for x in table.inertia[:3]))
+
+
+def _ratio(values: Iterable[float]) -> float:
+    there = [value for value in values if value > 0]
+    return max(there) / min(there) if there else 1.0
