@@ -88,7 +88,10 @@ class Certificate:
     @cached_property
     def risks(self) -> tuple[Risk, ...]:
         """What asks for attention, doubts first; empty for a clean run."""
-        looked_at = (self.pivot, self.singular, self.step)
+        pivot, locked = self.pivot, self.singular
+        if pivot and locked and locked.risk and pivot.hinge == locked.hinge:
+            pivot = None  # it vanishes where the coordinates fail
+        looked_at = (pivot, locked, self.step)
         return ordered((
             *of_numbers(self.finite, self.reached), *self.known,
             *of_balances((self.energy, *self.momentum), self.drift),

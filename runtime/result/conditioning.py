@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LOSS, SINGULAR = 1e8, 1e-4
 
 #: Change of angles within a fixed step (rad) that is one where the measure is below the first.
-NEAR, TURNED = 0.1, 0.2
+NEAR, TURNED = 0.1, 0.3
 
 #: Samples of a run at which the pivots are looked at.
 SAMPLES = 12

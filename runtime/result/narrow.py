@@ -4,12 +4,14 @@ A force that is narrow in a coordinate is seen at the stages of steps alone: whe
 it is passed over, and every estimated error is zero.  Behind a run its path is known, and so is
 how narrow a function of a coordinate is along it (`breaks.pace`, with the coordinate in the place
 of time): a step that moved on by more than that, across a peak of the function that neither of its
-ends shows, has not seen it.
+ends shows, has not seen it.  Where samples are output times the steps are not known; if one may
+have passed over something, the run is made once more to see them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -23,7 +25,7 @@ from ..breaks.acting import acting, owners
 from ..breaks.intervals import Interval
 from ..breaks.pace import CELLS, Pace, Watched, pace
 from ..breaks.view import View
-from ..run import second_opinion
+from ..run.execution import Watch, first_run
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
@@ -37,22 +39,57 @@ _PEAK = 0.1
 #: Places of a function that are looked at in a narrow part of it, and its peaks.
 _PLACES, _PEAKS = 512, 200
 
-#: Steps made again that a run may have without having met a peak between its samples.
-_SOME = 2
+#: Steps up to which a run is made again to see all of them.
+_STEPS = 20_000
 
 #: Names of coordinates that are looked at.
 _NAMES = 100
 
 
+@dataclass(frozen=True)
+class _Path:
+    """A coordinate along a run: its values (n,) at the start, the samples and the end; between two
+    of them the smallest and the largest, and how far a step went at most, (n - 1,)."""
+
+    ends: Array
+    least: Array
+    most: Array
+    moved: Array
+
+
 def passed_over(model: Compiled, run: Trajectory) -> tuple[Risk, ...]:
     """One row for each expression of which steps have passed over something."""
+    found = _seen(model, run)
+    if not found or run.settings.output_times is None or run.settings.step is not None:
+        return found
+    every = _every_step(model, run)
+    return () if every is None else _seen(model, every)
+
+
+def _seen(model: Compiled, run: Trajectory) -> tuple[Risk, ...]:
+    """The same of steps that are known; between output times of the longest that there was."""
     found = dict[str, Risk]()
     for what, view, path in islice(_of_motion(model, run), _NAMES):
-        moved = _moved(run, np.diff(path))
-        place = None if moved is None else _first(view, path, moved, run.settings.step is not None)
+        place = _first(view, path, _ends_are_steps(run))
         if place is not None:
             found.setdefault(what, _risk(what, view.variable, *place))
     return tuple(found.values())
+
+
+def _ends_are_steps(run: Trajectory) -> bool:
+    """Whether samples are where steps ended that were chosen, short where something is seen."""
+    return run.settings.output_times is None and run.settings.step is None
+
+
+def _every_step(model: Compiled, run: Trajectory) -> Trajectory | None:
+    """The run once more with all its steps as samples: the same steps; None if that takes long, or
+    does not lead there again."""
+    if run.statistics.steps > _STEPS:
+        return None
+    _, q, u = run.first
+    settings = replace(run.settings, output_times=None)
+    again = first_run(model, settings, q, u, Watch(None, settings))
+    return replace(again, start=(q, u)) if again.success else None
 
 
 def _risk(what: str, name: str, place: float, way: float, longest: float) -> Risk:
@@ -68,73 +105,97 @@ def _risk(what: str, name: str, place: float, way: float, longest: float) -> Ris
 # --- names and paths ------------------------------------------------------------------------------
 
 
-def _of_motion(model: Compiled, run: Trajectory) -> Iterator[tuple[str, View, Array]]:
+def _of_motion(model: Compiled, run: Trajectory) -> Iterator[tuple[str, View, _Path]]:
     """Whatever acts and reads coordinates: what it is, as a function of one of them, and the path
     of that."""
+    parts = _parts(run)
+    if parts is None:
+        return
     for one in acting(model.scene):
         if one.condition or one.spring is not None or one.expression.depends_on_time_only:
             continue
         constants = dict(one.constants)
         for own in owners(one, model.scene.hinges):
             for name in one.expression.names:
-                path = _path(model, run, name, own)
+                path = _path(model, run, parts, name, own)
                 if path is not None:
                     yield one.what, View(one.expression, constants, variable=name.text), path
 
 
-def _path(model: Compiled, run: Trajectory, name: Name, own: Hinge | None) -> Array | None:
-    """Values of a coordinate at the start, the samples and the end; None for other names.  What is
-    narrow in a speed does nothing while the speed passes it."""
+def _states(run: Trajectory) -> tuple[Array, Array, Array]:
+    """(t, q, u) at the start, the samples and the end."""
+    t, q, u = run.t, run.q, run.u
+    if run.start is not None and run.last is not None:
+        (end, *last), first = run.last, (run.settings.t_start, *run.start)
+        rows = zip(first, (t, q, u), (end, *last), strict=True)
+        t, q, u = (np.concatenate([np.asarray(a)[None], x, np.asarray(b)[None]])
+                   for a, x, b in rows)  # fmt: skip
+    return t, q, u
+
+
+def _parts(run: Trajectory) -> Array | None:
+    """Part of the way between two of these states that one step went, at most; None where there is
+    no way."""
+    settings, (t, q, _) = run.settings, _states(run)
+    if len(t) < 2 or not np.isfinite(q).all():
+        return None
+    spent = np.diff(t)
+    longest = settings.step if settings.step is not None else run.statistics.largest_step
+    if settings.output_times is None or longest is None:
+        return np.ones(len(spent))
+    return np.divide(longest, spent, out=np.ones(len(spent)), where=spent > longest)
+
+
+def _path(
+    model: Compiled, run: Trajectory, parts: Array, name: Name, own: Hinge | None
+) -> _Path | None:
+    """Of a coordinate; None for other names.  What is narrow in a speed does nothing while the
+    speed passes it."""
     hinge = name.hinge or ("" if own is None else own.name)
     if name.quantity != "q" or not hinge:
         return None
-    first, last = run.q[0], run.q[-1]
-    if run.settings.output_times is not None and run.start is not None and run.last is not None:
-        first, last = run.start[0], run.last[1]
-    place = model.layout.hinges[hinge].q + (name.index or 0)
-    return np.concatenate([first[None], run.q, last[None]])[:, place]
+    slots, index = model.layout.hinges[hinge], name.index or 0
+    t, q, u = _states(run)
+    ends = q[:, slots.q + index]
+    between = np.stack([ends[:-1], ends[1:]])
+    if slots.straight:
+        between = _cubic(np.diff(t), ends, u[:, slots.u + index])
+    way = np.abs(np.diff(between, axis=0)).sum(axis=0)
+    return _Path(ends, between.min(axis=0), between.max(axis=0), parts * way)
 
 
-def _moved(run: Trajectory, ways: Array) -> Array | None:
-    """How far a step went on each of these ways, at most; None where that is not known."""
-    settings, counted = run.settings, run.statistics
-    if settings.output_times is None:
-        return np.abs(ways)
-    longest = settings.step if settings.step is not None else counted.largest_step
-    others = settings.method in second_opinion.METHODS
-    if longest is None or (settings.step is None and (counted.rejected > _SOME or others)):
-        return None  # steps that met something were made again, shorter, nobody knows where
-    ends = (settings.t_start, settings.t_end if run.last is None else run.last[0])
-    spent = np.diff(np.concatenate([ends[:1], run.t, ends[1:]]))
-    parts = np.divide(longest, spent, out=np.ones(len(spent)), where=spent > longest)
-    return np.asarray(np.abs(ways) * parts)
+def _cubic(h: Array, ends: Array, rates: Array) -> Array:
+    """(7, n - 1) values between ends (n,) that are h (n - 1,) apart, those among them; of cubics
+    with these rates."""
+    x = np.linspace(0.0, 1.0, 7)[:, None]
+    a, b, va, vb = ends[:-1], ends[1:], h * rates[:-1], h * rates[1:]
+    return np.asarray(a + x * (b - a) + x * (1 - x) * ((1 - x) * (va - b + a) + x * (b - a - vb)))
 
 
 # --- peaks ----------------------------------------------------------------------------------------
 
 
-def _first(view: View, path: Array, moved: Array, fixed: bool) -> tuple[float, float, float] | None:
+def _first(view: View, path: _Path, ends_are_steps: bool) -> tuple[float, float, float] | None:
     """(where, how far steps went there, how far they should) of the first peak passed over."""
-    low, high = float(path.min()), float(path.max())
+    low, high = float(path.least.min()), float(path.most.max())
     watched = view.watched()
-    if not np.isfinite(path).all() or not high > low or not watched:
+    if not high > low or not watched:
         return None
     known = pace(view.terms, watched, low, high, view.most)
-    narrow = known.longest < moved.max(initial=0.0)
+    narrow = known.longest < path.moved.max(initial=0.0)
     if not narrow.any():
         return None
     for one in watched:
         places, values, longest = _peaks(view, one, known, narrow, high)
-        ends = _values(view, one, path)
+        ends = _values(view, one, path.ends)
         for place, value, limit in zip(places, values, longest, strict=True):
-            least, most = np.minimum(path[1:], path[:-1]), np.maximum(path[1:], path[:-1])
-            steps = (least <= place) & (place <= most) & (moved > limit)
-            if not fixed:  # steps that are chosen grow short where their ends show it
+            steps = (path.least <= place) & (place <= path.most) & (path.moved > limit)
+            if ends_are_steps:
                 hidden = np.abs(value - ends)
                 all_of_it = np.ptp(np.append(values, ends))
                 steps &= np.minimum(hidden[1:], hidden[:-1]) > _PEAK * all_of_it
             if steps.any():
-                return place, float(moved[steps].max()), limit
+                return place, float(path.moved[steps].max()), limit
     return None
 
 
@@ -149,7 +210,8 @@ def _peaks(
         count = int(min(np.ceil(2 * CELLS * (b - a) / longest), _PLACES)) + 2
         places.append(np.linspace(a, b, count))
         limits.append(np.full(count, longest))
-    at, limit = np.concatenate(places), np.concatenate(limits)
+    at, once = np.unique(np.concatenate(places), return_index=True)  # where parts meet
+    limit = np.concatenate(limits)[once]
     values = _values(view, one, at)
     before, after = np.diff(values)[:-1], np.diff(values)[1:]
     inside = np.flatnonzero(before * after < 0)[:_PEAKS] + 1

@@ -18,9 +18,7 @@ SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.
 
 def risks(found: Sequence[Flexibility]) -> list[Risk]:
     """What speaks against the model, one row per kind, of the worst body of each."""
-    rows = [
-        Risk("body-model", f'"{one.name}"', text, before=True) for one in found for text in one.said
-    ]
+    rows = [Risk("body-model", f'"{one.name}"', text) for one in found for text in one.said]
     worst_first = sorted(found, key=lambda one: -max(one.slope, one.spin_ratio, one.load_ratio))
     for kind in (_linear, _steep, _turned, _strained, _missed, _buckled, _aside, _sheared):
         seen = [risk for one in worst_first if (risk := kind(one)) is not None]
@@ -123,5 +121,5 @@ def _sheared(one: Flexibility) -> Risk | None:
         "shear", f'"{one.name}"',
         f'the highest bending shape of "{one.name}" is too short for a beam without shear: its '
         f"frequency errs by about {min(one.shear, 1.0):.0%}",
-        "take fewer modes or an elastic body", one.shear, SHEAR, before=True,
+        "take fewer modes or an elastic body", one.shear, SHEAR,
     )  # fmt: skip

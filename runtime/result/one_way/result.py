@@ -43,7 +43,7 @@ def _too_coupled(share: tuple[str, float]) -> Risk:
         f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
         "the inertia there (chi), so that the one-way response may err by "
         f"{3 * chi / (1 - chi):.1f} of its deflection", 'take flexibility = "coupled"', chi,
-        COUPLED, before=True,
+        COUPLED,
     )  # fmt: skip
 
 
@@ -55,7 +55,7 @@ def _let_go(model: Compiled) -> tuple[Risk, ...]:
         Risk(
             "one-way-release", f'"{name}"',
             f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
-            "body", 'take flexibility = "coupled"', before=True,
+            "body", 'take flexibility = "coupled"',
         )
         for name in rigidity(model).one_way
         if name in holders

@@ -1,0 +1,128 @@
+"""Trials of guards of flexible bodies, on scenes drawn afresh."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .motions import Rng, drawn
+from .trials import Scene, Trial, judged, model, tried
+
+#: First frequency of a clamped beam of 1 m, 1 kg and 1 N m2, rad/s, and those of the next shapes.
+FIRST = 3.51602
+FREQUENCIES = (3.51602, 22.0345, 61.6972, 120.902)
+
+
+def beam(name: str = "beam", **more: Any) -> Scene:
+    """Of 1 m, 1 kg and 1 N m2."""
+    return {"name": name, "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0, **more}
+
+
+def _tip(run: Any) -> np.ndarray:
+    return np.asarray(run.deflection("beam", "tip"))
+
+
+def _apart(run: Any, exact: Any) -> float:
+    """Of the tip, as a part of its largest deflection."""
+    if not run.success:
+        return math.inf
+    a, b = _tip(run), _tip(exact)
+    error = float(np.abs(a - b).max() / np.abs(b).max())
+    return error if math.isfinite(error) else math.inf
+
+
+def spun_linear(rng: Rng) -> Trial:
+    """A linear beam at a hub of some radius that is spun up within some time, and nods a little."""
+    ratio, ramp = drawn(rng, 0.03, 2.0), float(rng.uniform(4.0, 12.0))
+    spin, radius = ratio * FIRST, float(rng.uniform(0, 1))
+    turn = f"{spin / ramp!r}*(t^2/2 + ({ramp!r}/(2*pi))^2*(cos(2*pi*t/{ramp!r}) - 1))"
+    drive = f"where(t < {ramp!r}, {turn}, {spin!r}*(t - {ramp / 2!r}))"
+    hub = {"name": "hub", "mass": 1.0, "inertia": [1, 1, 1],
+           "ends": {"rim": {"position": [radius, 0, 0]}}}  # fmt: skip
+    hinges = [
+        {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "hub", "drive": drive},
+        {"name": "weld", "type": "fixed", "inboard": "hub.rim", "outboard": "beam"},
+    ]
+    times = np.linspace(0, 1.5 * ramp, 201)
+
+    def made(stiffening: bool) -> Any:
+        bent = beam(modes={"y": 3}, stiffening=stiffening)
+        return model({"body": [hub], "beam": [bent], "hinge": hinges})
+
+    how: dict[str, Any] = {"method": "rodas4p2", "rtol": 1e-6, "atol": 1e-8, "output_times": times}
+    run, before = tried(made(False), 1.5 * ramp, **how)
+    exact = made(True).simulate(1.5 * ramp, **how)
+    return judged(ratio, run, before, _apart(run, exact) / 0.1)
+
+
+def light_hub(rng: Rng) -> Trial:
+    """A one-way beam on a hub that is turned to and fro."""
+    hub, time = drawn(rng, 0.03, 300.0), float(rng.uniform(2.0, 6.0))
+    center = {"name": "hub", "mass": 1.0, "inertia": [hub / 3] * 3}
+    effort = f"where(t < {time!r}, {0.02 * (hub + 1) / 3!r}*sin(2*pi*t/{time!r}), 0)"
+    hinges = [
+        {"name": "motor", "type": "pin", "inboard": "ground", "outboard": "hub",
+         "law": {"effort": effort}},
+        {"name": "weld", "type": "fixed", "inboard": "hub", "outboard": "beam"},
+    ]  # fmt: skip
+    scene = {"body": [center], "beam": [beam(modes={"y": 3})], "hinge": hinges}
+    how: dict[str, Any] = {
+        "rtol": 1e-7,
+        "atol": 1e-9,
+        "output_times": np.linspace(0, 2 * time, 101),
+    }
+    run, before = tried(model(scene, flexibility="one-way"), 2 * time, **how)
+    exact = model(scene).simulate(2 * time, **how)
+    moved = np.abs(run.position("beam.tip") - exact.position("beam.tip")).max()
+    return judged(hub, run, before, float(moved / np.abs(_tip(exact)).max()) / 0.3)
+
+
+def _rest(one: Any) -> tuple[Any, tuple[str, ...]]:
+    """A moment at rest."""
+    rest = one.equilibrium(), np.zeros(one.nu)
+    return tried(one, 1e-9, initial=rest, output_times=[0.0, 1e-9])
+
+
+def bent_far(rng: Rng) -> Trial:
+    """A clamped beam at rest under a force across its tip, sideways or oblique."""
+    load, angle = drawn(rng, 0.02, 2.0), float(rng.uniform(-0.6, 0.6))
+    force = [-load * math.sin(angle), load * math.cos(angle), 0.0]
+
+    def made(pieces: int) -> Any:
+        names = ["beam", *(f"piece{i}" for i in range(1, pieces))]
+        beams = [beam(name, modes={"y": 3}) | {"length": 1 / pieces} for name in names]
+        welds = [
+            {"name": f"weld{i}", "type": "fixed", "outboard": name,
+             "inboard": f"{names[i - 1]}.tip" if i else "ground"}
+            for i, name in enumerate(names)
+        ]  # fmt: skip
+        end = f"{names[-1]}.tip"
+        return model({"beam": beams, "hinge": welds, "load": [{"on": end, "force": force}]}), end
+
+    one, end = made(1)
+    run, before = _rest(one)
+    fine, far = made(10)
+    exact, _ = _rest(fine)
+    error = float(np.abs(run.position(end) - exact.position(far)).max())
+    return judged(load, run, before, error / 0.02)
+
+
+def shaken(rng: Rng) -> Trial:
+    """A clamped beam of some shapes whose root is shaken at a frequency drawn against the last."""
+    shapes, ratio = int(rng.integers(1, 4)), drawn(rng, 0.05, 8.0)
+    rate = ratio * FREQUENCIES[shapes - 1]
+    drive = f"0.002*(1 - cos({rate!r}*t))"
+    root = {"name": "root", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
+            "outboard": "beam", "drive": drive}  # fmt: skip
+    t_end = max(16 * math.pi / rate, 8 * math.pi / FIRST)
+    how: dict[str, Any] = {"method": "rodas5p", "rtol": 1e-7, "atol": 1e-10,
+                           "output_times": np.linspace(0, t_end, 301)}  # fmt: skip
+
+    def made(count: int) -> Any:
+        return model({"beam": [beam(modes={"y": count}, damping=0.05)], "hinge": [root]})
+
+    run, before = tried(made(shapes), t_end, **how)
+    exact = made(shapes + 4).simulate(t_end, **how)
+    return judged(ratio, run, before, _apart(run, exact) / 0.1)
