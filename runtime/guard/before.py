@@ -10,7 +10,7 @@ from mstmm.risk import Risk
 
 from ..run.notes import foreseen
 from ..run.stability import StepCheck, check_step
-from . import fast, heavy, shapes, spun
+from . import fast, heavy, locked, shapes, spun
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -39,6 +39,8 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
     """
     step = check_step(model.looped, settings, q, u)
     own = () if step is None or step.risk is None else (step.risk,)
-    guards = (heavy.lost_digits, spun.linear_bodies, shapes.too_few, fast.many_steps)
+    guards = (
+        heavy.lost_digits, locked.near_lock, spun.linear_bodies, shapes.too_few, fast.many_steps,
+    )  # fmt: skip
     found = (risk for guard in guards for risk in guard(model, settings, q, u))
     return Start(step, (*own, *foreseen(model.packed, settings), *found))

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 from mstmm.risk import Risk
 
 from ..integrate.steppers import AUTO, get
-from ..result.flexible.energy import modal_mass
 from ..run import classical, second_opinion
 from ..run.fastest import Fastest, may_be_fast
+from .shapes import squares
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -29,8 +27,8 @@ _STABLE = 3.0
 
 def _may_be(model: Compiled, rate: float) -> bool:
     """Whether laws or shapes may move as fast as that, 1/s."""
-    shapes = (np.diag(body.K) / modal_mass(body).diagonal() for body in model.flexible.values())
-    return may_be_fast(model.scene, rate) or any(x.max(initial=0.0) > rate**2 for x in shapes)
+    fast = (squares(body).max(initial=0.0) > rate * rate for body in model.flexible.values())
+    return may_be_fast(model.scene, rate) or any(fast)
 
 
 def many_steps(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:

@@ -16,16 +16,25 @@ from ..run.simulate import split
 from ..run.system import SceneSystem
 from ..run.trajectory import Trajectory
 
+#: Times at which drives are looked at.
+_TIMES = 65
+
 _NOTHING = Statistics(0, 0, 0, 0, None, None, None, None, 0.0, 0.0, False, 0)
 
 
+def times(model: Compiled, settings: Settings) -> list[float]:
+    """The start, and times up to the end (s) where there are drives."""
+    moves = model.packed.system.driven and settings.t_end > settings.t_start
+    return np.linspace(settings.t_start, settings.t_end, _TIMES if moves else 1).tolist()
+
+
 def states(
-    model: Compiled, settings: Settings, q: Array, u: Array, times: Sequence[float]
+    model: Compiled, settings: Settings, q: Array, u: Array, at: Sequence[float]
 ) -> Trajectory:
     """The states at some times (s) if only what is driven moved, as a trajectory."""
-    system, n = SceneSystem(model.looped), len(times)
+    system, n = SceneSystem(model.looped), len(at)
     start = system.start(settings.t_start, q, u)
-    t = np.array(times, dtype=float)
+    t = np.array(at, dtype=float)
     samples = Samples(
         t, np.tile(start, (n, 1)), np.tile(system.memory, (n, 1)), np.zeros(n, dtype=np.int64)
     )

@@ -39,9 +39,14 @@ def too_few(model: Compiled, settings: Settings, _: Array, __: Array) -> Iterato
             )  # fmt: skip
 
 
+def squares(body: ModalBody) -> Array:
+    """(n,) squared angular frequency of each shape by itself, the frame at rest, 1/s2; 0 where it
+    has no mass."""
+    mass = modal_mass(body).diagonal()
+    return np.divide(np.diag(body.K), mass, out=np.zeros(body.n), where=mass > 0)
+
+
 def _last(body: ModalBody) -> float:
-    """Angular frequency of the last bending shape, of bodies without them of the last one (rad/s),
-    the frame at rest and each shape by itself."""
-    squares = np.diag(body.K) / modal_mass(body).diagonal()
+    """Angular frequency of the last bending shape, of a body without any of the last one, rad/s."""
     bent = [k for k, name in enumerate(body.modes) if name.startswith(("y", "z"))]
-    return float(np.sqrt(np.max(squares[bent or slice(None)], initial=0.0)))
+    return float(np.sqrt(np.max(squares(body)[bent or slice(None)], initial=0.0)))

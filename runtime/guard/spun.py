@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mstmm.arrays import Array
 from mstmm.risk import Risk
 
@@ -20,14 +18,11 @@ from ..result.flexible.energy import frequencies
 from ..result.flexible.estimators import cross_spin, is_stiffened
 from ..result.flexible.risks import GAMMA
 from ..result.observed import Observed
-from .path import states
+from .path import states, times
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from ..integrate.settings import Settings
-
-#: Times between the start and the end at which drives are looked at.
-_TIMES = 65
 
 
 def linear_bodies(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
@@ -35,9 +30,7 @@ def linear_bodies(model: Compiled, settings: Settings, q: Array, u: Array) -> It
     linear = [name for name, body in model.flexible.items() if not is_stiffened(body)]
     if not linear:
         return
-    count = _TIMES if model.packed.system.driven and settings.t_end > settings.t_start else 1
-    times = np.linspace(settings.t_start, settings.t_end, count).tolist()
-    moved = states(model, settings, q, u, times)
+    moved = states(model, settings, q, u, times(model, settings))
     bodies = FlexibleBodies(model, Observed(model, moved))
     for name in linear:
         first = float(frequencies(model.flexible[name])[0])

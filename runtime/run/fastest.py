@@ -32,11 +32,15 @@ def may_be_fast(scene: Scene, rate: float) -> bool:
     """Whether springs and dampers are stiff enough, beside the smallest inertia, for a motion of
     that |lambda| (1/s); only if they are is it worth while to compute it."""
     laws = [table.law for table in (*scene.hinge, *(x for c in scene.chain for x in c.hinge))]
-    stiff = [k for law in laws for k in law.stiffness] + [s.law.stiffness for s in scene.spring]
-    damped = [c for law in laws for c in law.damping] + [s.law.damping for s in scene.spring]
+    stiffest = max([k for law in laws for k in law.stiffness], default=0.0)
+    stiffest = max([stiffest, *(spring.law.stiffness for spring in scene.spring)])
+    damped = max([c for law in laws for c in law.damping], default=0.0)
+    damped = max([damped, *(spring.law.damping for spring in scene.spring)])
+    if not (stiffest > 0 or damped > 0):
+        return False
     tables = (*scene.body, *(table for chain in scene.chain for table in chain.body))
     least = min((min(body.mass, max(body.inertia)) for body in tables), default=0.0)
-    return max(stiff, default=0.0) > rate * rate * least or max(damped, default=0.0) > rate * least
+    return stiffest > rate * rate * least or damped > rate * least
 
 
 class Fastest:

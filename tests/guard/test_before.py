@@ -52,6 +52,27 @@ def test_masses_that_are_alike_are_not_even_looked_at(monkeypatch: pytest.Monkey
     assert not seen(chain([1.0, 2.0, 5.0]))
 
 
+# --- angles ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle, drive, told", [
+    (1.570796, None, True), (1.0, None, False), (0.0, "0.3*t", True), (0.0, "0.1*t", False),
+])  # fmt: skip
+def test_three_angles_that_begin_or_are_driven_into_their_lock(
+    angle: float, drive: str | None, told: bool
+) -> None:
+    body = {"name": "top", "mass": 1.0, "inertia": [0.1, 0.2, 0.3]}
+    rings: dict[str, Any] = {"name": "rings", "type": "gimbal", "inboard": "ground",
+                             "outboard": "top"}  # fmt: skip
+    how: dict[str, Any] = {"initial": {"q": [0.0, angle, 0.0]}}
+    if drive is not None:
+        how = {"drive": ["free", drive, "free"]}
+    found = seen(mstmm.Scene(gravity=(0, 0, 0), body=[body], hinge=[rings | how]))
+    assert [(risk.name, risk.element) for risk in found] == (
+        [("gimbal", 'hinge "rings"')] if told else []
+    )
+
+
 # --- spin -----------------------------------------------------------------------------------------
 
 
