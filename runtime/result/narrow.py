@@ -82,12 +82,13 @@ def _ends_are_steps(run: Trajectory) -> bool:
 
 
 def _every_step(model: Compiled, run: Trajectory) -> Trajectory | None:
-    """The run once more with all its steps as samples: the same steps; None if that takes long, or
-    does not lead there again."""
+    """The run once more, as far as it came, with all its steps as samples; None if that takes long,
+    or does not lead there again."""
     if run.statistics.steps > _STEPS:
         return None
     _, q, u = run.first
-    settings = replace(run.settings, output_times=None)
+    t_end = run.settings.t_end if run.last is None else run.last[0]
+    settings = replace(run.settings, t_end=t_end, output_times=None)
     again = first_run(model, settings, q, u, Watch(None, settings))
     return replace(again, start=(q, u)) if again.success else None
 

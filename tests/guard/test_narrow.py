@@ -9,7 +9,11 @@ import pytest
 from support.result_scenes import motor
 
 import mstmm
+from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.result import narrow
 from mstmm.runtime.result.narrow import passed_over
+from mstmm.runtime.run import execution
+from mstmm.runtime.run.trajectory import Trajectory
 
 #: A push at q = 5 rad, 4 mrad wide, and the same where a comparison says so.
 PULSE = "100*exp(-((q - 5)/0.004)^2)"
@@ -54,6 +58,23 @@ def test_a_window_that_is_too_wide_is_no_help() -> None:
 ])  # fmt: skip
 def test_what_control_of_the_error_sees_is_let_be(effort: str) -> None:
     assert not told(effort)
+
+
+def test_a_run_is_made_again_as_far_as_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An event ends it; where its steps were is not in its samples."""
+    data = motor(PULSE, speed=1.0).model_dump(by_alias=True, exclude_unset=True)
+    scene = mstmm.Scene.from_data(data | {"event": [{"when": "motor.q > 7", "do": "stop"}]})
+    run = mstmm.compile(scene, engine="looped").simulate(100.0, output_times=[2.0, 6.0, 100.0])
+    assert run.success and run.last_state[0] == pytest.approx(6.7, abs=0.01)
+    ends, real = list[float](), execution.first_run
+
+    def again(model: Any, settings: Settings, *rest: Any) -> Trajectory:
+        ends.append(settings.t_end)
+        return real(model, settings, *rest)
+
+    monkeypatch.setattr(narrow, "first_run", again)
+    assert [risk.name for risk in passed_over(run.model, run.trajectory)] == ["narrow-load"]
+    assert ends == [run.last_state[0]]
 
 
 def test_the_remedy_names_the_coordinate() -> None:
