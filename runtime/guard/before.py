@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 from mstmm.arrays import Array
 from mstmm.risk import Risk
@@ -18,6 +20,19 @@ if TYPE_CHECKING:
     from ..run.trajectory import Trajectory
 
 
+Guard = Callable[["Compiled", "Settings", Array, Array], Iterable[Risk]]
+
+#: Whether a scene gives reason to look, and what looks.
+_GUARDS: tuple[tuple[Callable[[Compiled], bool], Guard], ...] = (
+    (heavy.concerns, heavy.lost_digits), (locked.concerns, locked.near_lock),
+    (spun.concerns, spun.linear_bodies), (shapes.concerns, shapes.too_few),
+    (fast.concerns, fast.many_steps),
+)  # fmt: skip
+
+#: The guards that the scene of a model gives reason for, found before its first run.
+_concerned: WeakKeyDictionary[Compiled, tuple[Guard, ...]] = WeakKeyDictionary()
+
+
 @dataclass(frozen=True)
 class Start:
     """What is known of a run at its start: the fixed step against the fastest motion, and risks;
@@ -27,9 +42,9 @@ class Start:
     risks: tuple[Risk, ...]
     told: bool = True
 
-    def given(self, run: Trajectory) -> Trajectory:
-        """The run with what was known of it."""
-        return replace(run, risks=(*self.risks, *run.risks), told=self.told)
+    def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
+        """The run from (nq,), (nu,) with what was known of it."""
+        return replace(run, start=(q, u), risks=(*self.risks, *run.risks), told=self.told)
 
 
 def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
@@ -39,8 +54,7 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
     """
     step = check_step(model.looped, settings, q, u)
     own = () if step is None or step.risk is None else (step.risk,)
-    guards = (
-        heavy.lost_digits, locked.near_lock, spun.linear_bodies, shapes.too_few, fast.many_steps,
-    )  # fmt: skip
-    found = (risk for guard in guards for risk in guard(model, settings, q, u))
+    if model not in _concerned:
+        _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
+    found = (risk for guard in _concerned[model] for risk in guard(model, settings, q, u))
     return Start(step, (*own, *foreseen(model.packed, settings), *found))

@@ -25,6 +25,11 @@ _MANY = 2e4
 _STABLE = 3.0
 
 
+def concerns(model: Compiled) -> bool:
+    """Whether there are any."""
+    return _may_be(model, 0.0)
+
+
 def _may_be(model: Compiled, rate: float) -> bool:
     """Whether laws or shapes may move as fast as that, 1/s."""
     fast = (squares(body).max(initial=0.0) > rate * rate for body in model.flexible.values())

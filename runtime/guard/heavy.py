@@ -25,10 +25,13 @@ _WORST = 1e3
 _MOST = 2000
 
 
+def concerns(model: Compiled) -> bool:
+    """Whether masses are so unlike that digits may be lost."""
+    return len(model.scene.bodies) <= _MOST and _WORST * _unlike(model.scene) >= LOSS
+
+
 def lost_digits(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
-    """The worst loss of the start's sweep; not computed where masses are alike."""
-    if len(model.scene.bodies) > _MOST or _WORST * _unlike(model.scene) < LOSS:
-        return
+    """The worst loss of the start's sweep."""
     found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
     if found is not None and found.risk is not None:
         yield replace(found.risk, before=True)

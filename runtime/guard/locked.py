@@ -17,18 +17,16 @@ if TYPE_CHECKING:
     from ..integrate.settings import Settings
 
 
-def near_lock(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
-    """The nearest of them, at the start and where drives go."""
-    if not _any(model):
-        return
-    moved = states(model, settings, q, u, times(model, settings))
-    found = singular_distance(model, moved)
-    if found is not None and found.risk is not None:
-        yield replace(found.risk, before=True)
-
-
-def _any(model: Compiled) -> bool:
+def concerns(model: Compiled) -> bool:
     """Whether coordinates of a hinge fail anywhere."""
     kinds = {slots.type for group in model.layout.groups for slots in group.hinges}
     known = model.packed.elements
     return any("singularity" in known["hinge", kind].functions for kind in kinds)
+
+
+def near_lock(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
+    """The nearest of them, at the start and where drives go."""
+    moved = states(model, settings, q, u, times(model, settings))
+    found = singular_distance(model, moved)
+    if found is not None and found.risk is not None:
+        yield replace(found.risk, before=True)

@@ -29,7 +29,7 @@ def started(model: Compiled, settings: Settings, q: Array, u: Array, on_risk: st
     seen = look(model, settings, q, u)
     if on_risk == "refuse":
         _refuse((*model.scene.risks, *seen.risks), "before the run")
-    return replace(seen, told=on_risk != "ignore")
+    return seen if on_risk != "ignore" else replace(seen, told=False)
 
 
 def ended(result: Result, on_risk: str) -> Result:

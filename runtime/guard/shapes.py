@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 _FASTER = 1.5
 
 
+def concerns(model: Compiled) -> bool:
+    """Whether there are any."""
+    return bool(model.flexible)
+
+
 def too_few(model: Compiled, settings: Settings, _: Array, __: Array) -> Iterator[Risk]:
     """Bodies whose last bending shape is slower than the fastest expression of time.  Advice: the
     load may be small, or act on another body; the run tells what the shapes missed."""

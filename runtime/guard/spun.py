@@ -25,14 +25,20 @@ if TYPE_CHECKING:
     from ..integrate.settings import Settings
 
 
+def concerns(model: Compiled) -> bool:
+    """Whether there are any."""
+    return bool(_linear(model))
+
+
+def _linear(model: Compiled) -> list[str]:
+    return [name for name, body in model.flexible.items() if not is_stiffened(body)]
+
+
 def linear_bodies(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:
     """Those whose stiffness a spin that is known before the run changes by more than GAMMA."""
-    linear = [name for name, body in model.flexible.items() if not is_stiffened(body)]
-    if not linear:
-        return
     moved = states(model, settings, q, u, times(model, settings))
     bodies = FlexibleBodies(model, Observed(model, moved))
-    for name in linear:
+    for name in _linear(model):
         first = float(frequencies(model.flexible[name])[0])
         spin = cross_spin(bodies.motion(name))
         ratio = spin / first if first > 0 else 0.0

@@ -53,7 +53,7 @@ def simulate(
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
     run = first_run(model, settings, q, u, watch, resume, seen.step)
-    run = seen.given(replace(run, start=(q, u)))
+    run = seen.given(run, q, u)
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))

@@ -105,7 +105,7 @@ class Search:
         run = first_run(self._model, settings, self._q, self._u, watch)
         spent = time.process_time() - begin
         self._notes += [note for note in watch.notes if note not in self._notes]
-        run = self._seen.given(replace(run, start=(self._q, self._u)))
+        run = self._seen.given(run, self._q, self._u)
         if not run.success:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
