@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mstmm.arrays import Array
 from mstmm.risk import Risk
 
-from ..result.conditioning import singular_distance
+from ..result.conditioning import may_be_singular, singular_distance
 from .path import states, times
 
 if TYPE_CHECKING:
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 def concerns(model: Compiled) -> bool:
     """Whether coordinates of a hinge fail anywhere."""
-    kinds = {slots.type for group in model.layout.groups for slots in group.hinges}
-    known = model.packed.elements
-    return any("singularity" in known["hinge", kind].functions for kind in kinds)
+    return may_be_singular(model)
 
 
 def near_lock(model: Compiled, settings: Settings, q: Array, u: Array) -> Iterator[Risk]:

@@ -193,6 +193,15 @@ def _carried_motion(turn: Array, shift: Array) -> Array:
 # --- coordinates that fail ------------------------------------------------------------------------
 
 
+def may_be_singular(model: Compiled) -> bool:
+    """Whether coordinates of a hinge fail anywhere."""
+    return any(
+        _measure(model, group.first + k) is not None
+        for group in model.layout.groups
+        for k in range(min(group.count, len(group.hinges)))
+    )
+
+
 def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | None:
     """The smallest measure over all samples and hinges that have one; None without such hinges.
 

@@ -73,6 +73,13 @@ def test_three_angles_that_begin_or_are_driven_into_their_lock(
     )
 
 
+@pytest.mark.parametrize("kind", ["elastic", "free", "ball", "fixed", "planar"])
+def test_hinges_without_such_angles_are_let_be(kind: str) -> None:
+    held = {"name": "held", "type": kind, "inboard": "ground", "outboard": "rod"}
+    scene = mstmm.Scene(gravity=(0, 0, 0), body=[rod("rod")], hinge=[held])
+    assert not seen(scene)
+
+
 # --- spin -----------------------------------------------------------------------------------------
 
 
