@@ -64,8 +64,7 @@ _LAZY = {
 __all__ = [
     "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
     "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
-    "chart",
-    "compile", "generate_file", "load_result", "load_scene", "register", "stability",
+    "chart", "compile", "generate_file", "load_result", "load_scene", "register", "stability",
 ]  # fmt: skip
 
 

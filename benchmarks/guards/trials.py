@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +47,7 @@ def model(scene: Scene, **options: Any) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**{"gravity": [0, 0, 0], **scene}), engine="looped", **options)
 
 
-def names(risks: tuple[Risk, ...]) -> tuple[str, ...]:
+def names(risks: Iterable[Risk]) -> tuple[str, ...]:
     """Each once."""
     return tuple(dict.fromkeys(risk.name for risk in risks))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ from .hinges import needless, rigid
 from .record import Advice
 from .renaming import Renaming
 from .request import Request
-from .search import AS_CHEAP, Choices, Search
+from .search import Choices, Search
 from .settings import Chosen, cheapest
 from .telling import told
 from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
@@ -75,7 +74,7 @@ def advised(
     work.whole = Bodies(top.scene).richest
     base, evidence = in_parts(work, base, evidence)
     still = rigid(base.scene, richest, q, work.length)
-    base = changed(work, base, "rigid", still, _RIGID * asked.error, AS_CHEAP)
+    base = changed(work, base, "rigid", still, _RIGID * asked.error, cheap=True)
     return _reduced(work, base, evidence)
 
 
@@ -110,7 +109,7 @@ def _reduced(work: Work, base: Tried, evidence: Mapping[str, Evidence]) -> Advic
         work.notes.append("time ended before every smaller model was tried: give more --budget")
     work.told.setdefault(best.name, work.told[base.name])
     enough = max(_NEEDLESS * work.asked.error, _HARDLY * best.error)
-    best = changed(work, best, "without", needless(best.scene), enough, math.inf)
+    best = changed(work, best, "without", needless(best.scene), enough, cheap=False)
     best = lumped(work, best, enough)
     search.made.setdefault(best.name, choices)
     chosen = _chosen(work, best, choices, search)

@@ -119,10 +119,11 @@ def _of_parts(
 
 
 def changed(
-    work: Work, base: Tried, word: str, changes: list[Change], enough: float, times: float
+    work: Work, base: Tried, word: str, changes: list[Change], enough: float, cheap: bool
 ) -> Tried:
-    """The model with as many of these changes as it bears within an error that is enough and
-    so many times the time: all at once, or one after the other."""
+    """The model with as many of these changes as it bears within an error that is enough, and
+    within the time of the one before if they are to be `cheap`: all at once, or one after the
+    other."""
     likely = [one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]
     kept: list[Change] = []
     best = base
@@ -133,7 +134,7 @@ def changed(
         names = ", ".join(one.name for one in (*kept, *more))
         scene = applied(base.scene, [*kept, *more])
         found = work.bench.tried(f"{base.name}; {word}: {names}", scene)
-        if found.error <= enough and found.cpu_s <= times * best.cpu_s:
+        if found.error <= enough and (not cheap or work.bench.as_cheap(found, best)):
             kept, best = [*kept, *more], found
     work.told[best.name] = (*work.told[base.name], *map(str, kept))
     return best

@@ -21,7 +21,8 @@ from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 from mstmm.scene import split
 
-from ..result.flexible.certify import GAMMA, Flexibility
+from ..result.flexible.certify import Flexibility
+from ..result.flexible.risks import GAMMA
 from ..result.one_way.response import rigidity
 from ..result.one_way.result import OneWayResult
 from .choice import LINEAR, ONE_WAY, RIGID, Choice

@@ -22,9 +22,6 @@ _ENOUGH, _HOPELESS, _DOUBTFUL = 0.5, 50.0, 3.0
 #: Bodies get richer together where this part of the largest error is expected of them.
 _TOGETHER = 0.1
 
-#: A choice counts as cheaper up to this many times the time, for times scatter.
-AS_CHEAP = 1.05
-
 Choices = dict[str, Choice]
 
 
@@ -169,7 +166,7 @@ class Search:
                         return choices, best
                     other = {**choices, name: choice}
                     tried = self.tried(other)
-                    if tried.error <= self.enough and tried.cpu_s <= AS_CHEAP * best.cpu_s:
+                    if tried.error <= self.enough and self.bench.as_cheap(tried, best):
                         choices, best, lowered = other, tried, True
                         break
                     self.failed.add((name, choice))

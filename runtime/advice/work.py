@@ -16,7 +16,7 @@ from ..chart.models import at_level
 from ..chart.point import Setting
 from ..chart.trial import Runs
 from ..integrate.steppers import AUTO
-from ..result.flexible.certify import SLOPE
+from ..result.flexible.risks import SLOPE
 from .request import Request
 from .trials import first_rtol
 

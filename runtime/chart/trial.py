@@ -11,6 +11,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+from mstmm.risk import sentences
 from mstmm.scene import Scene
 from mstmm.scene.checks.flexible import short_beams
 
@@ -138,7 +139,7 @@ class Runs:
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """What is warned of in every run of a scene, whatever the method."""
-    return (*scene.warnings, *short_beams(scene))
+    return sentences((*scene.risks, *short_beams(scene)))
 
 
 def _told(result: Result) -> tuple[tuple[str, ...], bool]:
@@ -149,7 +150,7 @@ def _told(result: Result) -> tuple[tuple[str, ...], bool]:
         return (_short(str(error)),), False
     scene = warnings_of(result.model.scene)
     own = tuple(_short(text) for text in found if text not in scene)
-    return own, step is not None and step.warning is not None
+    return own, step is not None and step.risk is not None
 
 
 def factorizations(setting: Setting, statistics: Statistics | None) -> int | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -33,18 +33,35 @@ _GUARDS: tuple[tuple[Callable[[Compiled], bool], Guard], ...] = (
 _concerned: WeakKeyDictionary[Compiled, tuple[Guard, ...]] = WeakKeyDictionary()
 
 
+class Later:
+    """Risks that are looked for when somebody asks for them, once: a run costs nothing for them."""
+
+    def __init__(self, find: Callable[[], Iterable[Risk]]) -> None:
+        self._find: Callable[[], Iterable[Risk]] | None = find
+        self._found: tuple[Risk, ...] = ()
+
+    def __iter__(self) -> Iterator[Risk]:
+        if self._find is not None:
+            self._found, self._find = tuple(self._find()), None
+        return iter(self._found)
+
+    def __reduce__(self) -> tuple[type[tuple[Risk, ...]], tuple[tuple[Risk, ...]]]:
+        return tuple, (tuple(self),)
+
+
 @dataclass(frozen=True)
 class Start:
     """What is known of a run at its start: the fixed step against the fastest motion, and risks;
     whether its user wants to be told of those."""
 
     step: StepCheck | None
-    risks: tuple[Risk, ...]
+    risks: Iterable[Risk]
     told: bool = True
 
     def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
         """The run from (nq,), (nu,) with what was known of it."""
-        return replace(run, start=(q, u), risks=(*self.risks, *run.risks), told=self.told)
+        risks = Later(lambda: (*self.risks, *run.risks))
+        return replace(run, start=(q, u), risks=risks, told=self.told)
 
 
 def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
@@ -56,5 +73,10 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
     own = () if step is None or step.risk is None else (step.risk,)
     if model not in _concerned:
         _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
-    found = (risk for guard in _concerned[model] for risk in guard(model, settings, q, u))
-    return Start(step, (*own, *foreseen(model.packed, settings), *found))
+    guards, known = _concerned[model], (*own, *foreseen(model.packed, settings))
+    if not guards:
+        return Start(step, known)
+    return Start(
+        step,
+        Later(lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u)))),
+    )

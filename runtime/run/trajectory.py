@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,7 +42,7 @@ class Trajectory:
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
-    risks: tuple[Risk, ...] = ()  # seen before the run and by it, which samples do not tell
+    risks: Iterable[Risk] = ()  # seen before the run and by it, which samples do not tell
     methods: tuple[Stretch, ...] = ()  # of a run that chose among them
     reached: ReachedError | None = None  # of a run that was asked for an error
     told: bool = True  # whether its risks are wanted among its warnings

@@ -38,7 +38,7 @@ def test_warnings_are_those_of_the_run() -> None:
     for point in ran:
         result = model.simulate(T_END, output_times=[0.0, T_END], **point.setting.options)
         step = result.certificate.step
-        assert point.too_coarse == (step is not None and step.warning is not None)
+        assert point.too_coarse == (step is not None and step.risk is not None)
         assert not point.too_coarse or "too long for the fastest motion" in " ".join(point.warnings)
     assert pytest.approx(5.2e-6) in [p.setting.value for p in ran if p.too_coarse]
     assert [p for p in ran if p.method == "rk4" and not p.too_coarse]
