@@ -33,7 +33,7 @@ def advise(
     Args:
         scene: a scene, or a model of one.
         t_end: end of the run that the advice is for, s.
-        error: largest error wanted, above 0 and below 1.
+        error: largest error wanted, above 0; below 1 unless it is that of one quantity.
         of: quantity or quantities whose error is meant, of one in its unit, of several each in
             parts of its largest excursion; otherwise the places of all bodies and ends, in parts of
             the length of the scene.

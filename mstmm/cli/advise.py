@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mstmm.defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
+from mstmm.errors import SceneError
 
 from .chart import follow
 from .options import Json, finite, output_file, positive
@@ -21,7 +23,7 @@ def advise(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
     error: Annotated[
         float, typer.Option("--error", metavar="E", parser=finite, help="Largest error wanted, "
-                            "above 0 and below 1.")
+                            "above 0; below 1 where it is no quantity's.")
     ] = CHART_ERROR,
     of: Annotated[
         list[str] | None,
@@ -62,6 +64,8 @@ def advise(
     from . import output
 
     file = None if write is None else output_file(write, (".toml",), "--write")
+    if file is not None and file.exists() and Path(scene).exists() and file.samefile(scene):
+        raise SceneError(f"--write {write}: this is the scene itself; give another name")
     use_files(hinge or [])
     import mstmm
 

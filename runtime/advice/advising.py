@@ -24,6 +24,7 @@ from .search import Choices, Search
 from .settings import Chosen, cheapest
 from .telling import told
 from .trials import Bench, Compile, Tell, Tried, first_rtol, probe
+from .whole_run import over_all
 from .work import RICHEST, Work, size_of
 
 if TYPE_CHECKING:
@@ -92,6 +93,11 @@ def _bench(
     richest = bench.refer_to(top.scene, model, RICHEST, asked.error, work.part)
     state(f"models are compared over {span}; the reference itself errs by about "
                f"{richest.error:.1e}")  # fmt: skip
+    if not span.whole:
+        work.notes.append(
+            "what moves after the window was not seen: planes, hinges, springs and dampers stay "
+            "as they are; give more --budget to have them looked at"
+        )
     return bench, richest
 
 
@@ -131,6 +137,13 @@ def _chosen(work: Work, best: Tried, choices: Choices, search: Search) -> Chosen
         ),
         key=lambda one: one.cpu_s,
     )
+    if not work.bench.span.whole:
+        beyond = over_all(best, work, _WITH_SETTING * asked - best.error)
+        if beyond is not None:
+            return beyond
+        work.notes.append(
+            "method and tolerance were judged in the window, too: what they err after it is guessed"
+        )
     finalists = [best, *others][:_FINALISTS]
     seconds = max(_SETTINGS * work.asked.budget, work.budget.left())
     asked, growth = _WITH_SETTING * asked, work.bench.span.growth

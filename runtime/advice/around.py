@@ -5,6 +5,7 @@ welded bodies; each change is run beside the reference before it counts.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from mstmm.errors import MstmmError
@@ -41,7 +42,7 @@ _UNLIKELY = 5.0
 
 def in_plane(work: Work, top: Variant, model: Model, richest: Tried) -> Tried:
     """The richest scene in its plane where that is the same motion."""
-    flat = planar(top, model, work.bench.reference.q)
+    flat = planar(top, model, work.bench.reference.q) if work.bench.span.whole else None
     if flat is None:
         return richest
     found = work.bench.tried("planar", flat.scene)
@@ -94,6 +95,12 @@ def in_parts(
     return _of_parts(work, base, found, finer if apart <= _PARTS * asked else run)
 
 
+def _other_names(of: str, names: Mapping[str, str]) -> str:
+    """Ends of a beam that are those of a part now: their former names are ends of another one."""
+    own = [f"{old} is {new}" for old, new in names.items() if old.startswith(f"{of}.")]
+    return f"; {', '.join(own)} now" if own else ""
+
+
 def _of_parts(
     work: Work, base: Tried, found: Split, reference: Trial
 ) -> tuple[Tried, dict[str, Evidence]]:
@@ -109,7 +116,7 @@ def _of_parts(
         wholes.setdefault(of, []).append(part)
     work.told[tried.name] = (*told, *(
         f'beam "{of}": {len(parts)} welded beams ({", ".join(parts)}) with frames of their '
-        f"own, for with one frame it errs by {single:.1e}"
+        f"own, for with one frame it errs by {single:.1e}" + _other_names(of, found.names)
         for of, parts in wholes.items()
     ))  # fmt: skip
     evidence, why = gathered(work.least(found.scene), work.length)
@@ -124,6 +131,8 @@ def changed(
     """The model with as many of these changes as it bears within an error that is enough, and
     within the time of the one before if they are to be `cheap`: all at once, or one after the
     other."""
+    if not work.bench.span.whole:
+        return base
     likely = [one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]
     kept: list[Change] = []
     best = base

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
 from ..chart.point import Setting
@@ -123,6 +124,11 @@ class Advice:
         return self.setting.options
 
     @property
+    def in_words(self) -> str:
+        """What errors without a unit are parts of, in brackets; "" for others."""
+        return f" ({self.scaling})" if self.unit == "1" and self.scaling else ""
+
+    @property
     def reduced(self) -> bool:
         """Whether the advised scene is less than the given one."""
         return bool(self.changes) or any(one.choice != one.given for one in self.bodies)
@@ -155,8 +161,8 @@ class Advice:
         unit = "" if self.unit == "1" else f" {self.unit}"
         options = " ".join(f"--{key} {value:g}" for key, value in self.setting.numbers.items())
         lines = [
-            f"Reduced for an error of {self.asked:g}{unit} of {self.measure}; it errs by "
-            f"{self.error:.1e} over {self.compared}.",
+            f"Reduced for an error of {self.asked:g}{unit} of {self.measure}{self.in_words}; it "
+            f"errs by {self.error:.1e} over {self.compared}.",
             f"Run it by: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} "
             f"{options}",
             *(f"{one.name}: {one.choice} (was {one.given}). {one.reason}" for one in self.bodies),
@@ -166,8 +172,10 @@ class Advice:
         return "\n".join(f"# {line}" for line in head) + "\n\n" + self.scene.to_toml()
 
     def write(self, path: str | Path) -> Path:
-        """Write the reduced scene (.toml)."""
+        """Write the reduced scene.  SceneError for a name that does not end in .toml."""
         place = Path(path)
+        if place.suffix != ".toml":
+            raise SceneError(f"{place}: expected a name that ends in .toml")
         with replacing(place) as temporary:
             temporary.write_text(self.to_toml(), encoding="utf-8")
         return place

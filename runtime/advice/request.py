@@ -26,15 +26,26 @@ def request(
     t_end: float, error: float, of: str | Sequence[str], budget: float, samples: int, rounds: int
 ) -> Request:
     """SceneError naming the first argument that makes no sense."""
-    asked = real("error", error, "an error above 0 and below 1")
-    if not 0 < asked < 1:
-        raise SceneError(f"error = {asked:g}: expected an error above 0 and below 1, such as 1e-3")
+    wanted = _names(of)
+    asked = real("error", error, "an error above 0")
+    in_parts = len(wanted) != 1  # a quantity alone has a unit, in which 5 may be little
+    if not asked > 0 or not math.isfinite(asked) or (in_parts and asked >= 1):
+        limits = "above 0 and below 1" if in_parts else "above 0, in the unit of the quantity"
+        raise SceneError(f"error = {asked:g}: expected an error {limits}, such as 1e-3")
     return Request(
-        _above_zero("t_end", t_end), asked, (of,) if isinstance(of, str) else tuple(of),
+        _above_zero("t_end", t_end), asked, wanted,
         _above_zero("budget", budget),
         whole("samples", samples, 2, "a whole number of samples, 2 or more"),
         whole("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
     )  # fmt: skip
+
+
+def _names(of: str | Sequence[str]) -> tuple[str, ...]:
+    if isinstance(of, str):
+        return (of,)
+    if not isinstance(of, Sequence) or not all(isinstance(name, str) for name in of):
+        raise SceneError(f"of = {of!r:.60}: expected the name of a quantity, or several")
+    return tuple(of)
 
 
 def _above_zero(name: str, value: float) -> float:

@@ -30,10 +30,12 @@ _AGAIN, _AS_QUICK = 8, 1.15
 
 @dataclass(frozen=True)
 class Chosen:
-    """A setting of a model: its point holds error and processor time over the span."""
+    """A setting of a model: its point holds error and processor time over the span; those of the
+    integration over the `whole` run, where that is more."""
 
     tried: Tried
     point: Point
+    whole: bool = False
 
 
 def cheapest(

@@ -9,22 +9,26 @@ from .record import Advice
 def summary(advice: Advice) -> list[str]:
     """The advice in a few lines."""
     unit = "" if advice.unit == "1" else f" {advice.unit}"
-    asked = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}"
+    asked = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}{advice.in_words}"
     met = "" if advice.error <= advice.asked else ", MORE than was asked"
     lines = [
         f"{asked}: {_model(advice)} by {advice.method}, {advice.setting}: error "
         f"{advice.error:.1e}{met}, {time_of(advice.cpu_s)} CPU over {advice.compared}",
     ]
     savings = [
-        f"the model saves a factor of {advice.model_saving:.2g}"
-        if advice.model_saving and advice.reduced
-        else "",
-        f"method and tolerance save a factor of {advice.setting_saving:.2g} beside the default ones"
-        if advice.setting_saving
-        else "",
+        _saved("the model", advice.model_saving if advice.reduced else None, "the given scene"),
+        _saved("method and tolerance", advice.setting_saving, "the default ones"),
     ]
     told = ", ".join(text for text in savings if text)
     return [*lines, *([told] if told else [])]
+
+
+def _saved(what: str, factor: float | None, other: str) -> str:
+    if not factor:
+        return ""
+    if factor < 1:
+        return f"{1 / factor:.2g} times the time of {other} by {what}"
+    return f"a factor of {factor:.2g} less time than {other} by {what}"
 
 
 def _model(advice: Advice) -> str:

@@ -45,7 +45,7 @@ def told(
     assert error is not None and chosen.point.cpu_s is not None
     return Advice(
         asked.error, work.measure.name, work.measure.unit, work.measure.scaling, asked.t_end,
-        str(bench.span), bench.span.whole, max(bench.floor, work.unseen), bodies, changes,
+        _compared(work, chosen), bench.span.whole, max(bench.floor, work.unseen), bodies, changes,
         chosen.point.setting, error * growth + work.unseen, chosen.point.cpu_s, model_saving,
         setting_saving, chosen.tried.scene,
         dict(work.measure.names_in(chosen.tried.running)), dict(work.parts),
@@ -58,6 +58,15 @@ def told(
             if math.isfinite(one.cpu_s)
         ),
     )  # fmt: skip
+
+
+def _compared(work: Work, chosen: Chosen) -> str:
+    """Over what errors were seen."""
+    bench, said = work.bench, str(work.bench.span)
+    if chosen.whole:
+        said += f" (the integration over all of its {work.asked.t_end:g} s)"
+    ended = bench.reference.ended
+    return f"{said}, up to its end at {bench.reference.t[-1]:.4g} s: {ended}" if ended else said
 
 
 def _body(

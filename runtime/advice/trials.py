@@ -28,7 +28,7 @@ _PART, _LOOSEST, _TIGHTEST, _TIGHTER, _AGREE = 1e-3, 1e-6, 1e-12, 1e-2, 0.05
 
 #: The part of the run by which its time is guessed, the parts of the budget that reference runs may
 #: take and that a window aims at, and the part that one model may take.
-_LOOK, _WHOLE, _WINDOW, _ONE = 1 / 20, 0.25, 0.1, 0.2
+_LOOK, _WHOLE, _WINDOW, _ONE = 1 / 20, 0.35, 0.1, 0.2
 
 #: Runs shorter than this (s) are made so many times: the least time counts.
 _SHORT, _REPEATS = 0.03, 3
@@ -255,7 +255,8 @@ class Bench:
         self.tell(f"{name}, rtol {rtol:.0e}")
         trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
         if trial.numbers is None:
-            raise NumericalFailure(f"the richest model, {name}: {trial.failure}")
+            more = "; give more --budget" if trial.late else ""
+            raise NumericalFailure(f"{name}: {trial.failure}{more}")
         return trial
 
 

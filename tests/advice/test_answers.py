@@ -48,6 +48,9 @@ def test_bodies_that_respond_no_way_but_coupled() -> None:
         ({"error": 1.0}, "above 0 and below 1"),
         ({"error": float("nan")}, "error"),
         ({"error": "small"}, "error"),
+        ({"error": 0, "of": TIP}, "in the unit of the quantity"),
+        ({"of": 3}, "expected the name of a quantity"),
+        ({"of": [TIP, 3]}, "expected the name of a quantity"),
         ({"of": "arm.tip.positon"}, "did you mean"),
         ({"t_end": 0}, "a time in s above 0"),
         ({"budget": -1}, "a time in s above 0"),
@@ -87,6 +90,20 @@ def test_the_scene_that_is_written(tmp_path: Path) -> None:
     scene = mstmm.load_scene(path)
     assert scene == mstmm.Scene.from_data(tomllib.loads(made.scene.to_toml()))
     assert mstmm.compile(scene, engine="looped").simulate(0.1).success
+
+
+def test_an_error_of_a_quantity_has_its_unit() -> None:
+    made = mstmm.advise(
+        hub_and_beam("B", 1), period("B"), error=20.0, of="root.force", rounds=0, budget=600
+    )
+    assert (made.unit, made.asked) == ("N", 20.0)
+    assert made.error <= 20.0
+
+
+def test_what_is_written_is_toml(tmp_path: Path) -> None:
+    made = mstmm.advise(pendulum(), 0.2, rounds=0, budget=600)
+    with pytest.raises(mstmm.SceneError, match=r"ends in \.toml"):
+        made.write(tmp_path / "small.json")
 
 
 def test_as_plain_values() -> None:
