@@ -11,7 +11,7 @@ from mstmm.defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUN
 from mstmm.errors import SceneError
 
 from .chart import follow
-from .options import Json, finite, output_file, positive
+from .options import Budget, Elements, Json, Rounds, at_least, finite, output_file, positive
 from .progress import bar
 from .simulate import compiled, use_files
 
@@ -38,26 +38,17 @@ def advise(
         str | None,
         typer.Option("--write", metavar="FILE", help="Write the reduced scene, .toml."),
     ] = None,
-    budget: Annotated[
-        float, typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that the "
-                            "runs may take, s of the clock.")
-    ] = CHART_BUDGET,
+    budget: Budget = CHART_BUDGET,
     samples: Annotated[
-        int, typer.Option("--times", metavar="N", help="Times from 0 to the end at which errors "
-                          "are looked at; the largest counts.")
+        int, typer.Option("--times", metavar="N", parser=at_least(2), help="Times from 0 to the "
+                          "end at which errors are looked at; the largest counts.")
     ] = ADVICE_SAMPLES,
-    rounds: Annotated[
-        int, typer.Option("--rounds", metavar="N", help="How often times are taken again.")
-    ] = CHART_ROUNDS,
+    rounds: Rounds = CHART_ROUNDS,
     engine: Annotated[
         str, typer.Option("--engine", metavar="NAME", help="looped, auto, or fused: code compiled "
                           "for each model.")
     ] = "looped",
-    hinge: Annotated[
-        list[str] | None,
-        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
-                     "be repeated. The file is executed."),
-    ] = None,
+    hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Advise the smallest model that suffices: what may be rigid, how many shapes, which method."""

@@ -11,7 +11,7 @@ import typer
 from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
 
 from .extras import install, missing
-from .options import Json, at_least, output_folder, positive
+from .options import Budget, Elements, Json, Rounds, at_least, output_folder, positive
 from .progress import Bar, bar
 from .simulate import compiled, use_files
 
@@ -51,29 +51,19 @@ def chart(
         float, typer.Option("--error", metavar="E", parser=positive, help="Error for which to "
                             "recommend the cheapest setting.")
     ] = CHART_ERROR,
-    budget: Annotated[
-        float, typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that the "
-                            "runs may take, s of the clock.")
-    ] = CHART_BUDGET,
+    budget: Budget = CHART_BUDGET,
     samples: Annotated[
         int | None,
         typer.Option("--times", metavar="N", parser=at_least(2), show_default=str(CHART_SAMPLES),
                      help="Even times from 0 to the end at which errors are looked at; the largest "
                      "counts. Unless given also more where the motion is fast."),
     ] = None,
-    rounds: Annotated[
-        int, typer.Option("--rounds", metavar="N", parser=at_least(0), help="How often times are "
-                          "taken again.")
-    ] = CHART_ROUNDS,
+    rounds: Rounds = CHART_ROUNDS,
     engine: Annotated[
         str, typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled "
                           "for this scene.")
     ] = "auto",
-    hinge: Annotated[
-        list[str] | None,
-        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
-                     "be repeated. The file is executed."),
-    ] = None,
+    hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Chart cost against accuracy: every method over its settings, and which one to take."""

@@ -178,3 +178,21 @@ def python_file(path: str) -> str:
     if "\0" in path or not os.path.isfile(path):
         raise MstmmError(f"{quoted(path)}: there is no such Python file; check the path")
     return path
+
+
+#: Options that several commands have.
+Elements = Annotated[
+    list[str] | None,
+    typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
+                 "be repeated. The file is executed."),
+]  # fmt: skip
+Budget = Annotated[
+    float,
+    typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that the runs may "
+                 "take, s of the clock."),
+]  # fmt: skip
+Rounds = Annotated[
+    int,
+    typer.Option("--rounds", metavar="N", parser=at_least(0), help="How often times are taken "
+                 "again."),
+]  # fmt: skip

@@ -22,7 +22,16 @@ from mstmm.errors import (
 )
 
 from .extras import need_for, result_ending
-from .options import Json, Times, not_negative, output_file, positive, python_file, times
+from .options import (
+    Elements,
+    Json,
+    Times,
+    not_negative,
+    output_file,
+    positive,
+    python_file,
+    times,
+)
 from .progress import Bar, bar, waiting
 
 if TYPE_CHECKING:
@@ -159,11 +168,7 @@ def simulate(
         typer.Option("--quantity", "-q", metavar="NAME", help="What to plot and to print, such as "
                      "shoulder.angle, rod1.tip.position, energy; may be repeated."),
     ] = None,
-    hinge: Annotated[
-        list[str] | None,
-        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
-                     "be repeated. The file is executed."),
-    ] = None,
+    hinge: Elements = None,
     certify: Annotated[
         bool | None,
         typer.Option("--certify/--no-certify", help="Estimate the error by a second, more accurate "

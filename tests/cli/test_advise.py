@@ -64,7 +64,7 @@ def test_nothing_to_reduce(mstmm: Command, folder: Path) -> None:
         (("pendulum.toml", "--write", "./pendulum.toml"), "this is the scene itself"),
         (("pendulum.toml", "--write", "small.json"), "expected a name ending in .toml"),
         (("pendulum.toml", "--write", "none/small.toml"), "there is no folder none"),
-        (("pendulum.toml", "--times", "1"), "2 or more"),
+        (("pendulum.toml", "--times", "1"), "--times"),
         (("pendulum.toml", "--engine", "fast"), "there are: auto, fused, looped"),
     ],
 )
