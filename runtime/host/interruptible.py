@@ -32,6 +32,13 @@ def interruptible() -> Iterator[list[bool]]:
     if threading.current_thread() is not threading.main_thread():
         yield flag
         return
+    if _open:  # its handler sets all flags
+        _open.append(flag)
+        try:
+            yield flag
+        finally:
+            _open.pop()
+        return
 
     def note(*_: object) -> None:
         for outer in _open:

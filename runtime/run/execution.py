@@ -126,7 +126,8 @@ def first_run(
     if status is Status.RUNNING:
         status, message = _advanced(system, run, watch, earlier)
     found = trajectory(system, run, settings, status, message, earlier)
-    found = replace(found, before=watch.before)
+    if watch.before:
+        found = replace(found, before=watch.before)
     if watch.choice is not None:
         found = replace(found, methods=tuple(watch.choice.stretches))
     if step is not None and status is not None and not found.success:

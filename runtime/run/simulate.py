@@ -127,7 +127,8 @@ def trajectory(
         None if failure is None else failure.time,
     )  # fmt: skip
     held = () if run.chatter is None else (endless(system, run.chatter),)
-    return replace(found, risks=(*held, *unresolved(found)))
+    risks = (*held, *unresolved(found))
+    return replace(found, risks=risks) if risks else found
 
 
 def said(system: SceneSystem, run: Run, status: Status | None) -> str:
