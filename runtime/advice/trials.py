@@ -160,7 +160,7 @@ class Bench:
                 raise NumericalFailure(
                     f"two runs of the richest model are {far:.1e} apart at tolerances of "
                     f"{self.rtol:.0e} and {tight:.0e}, so that no error of {asked:.1e} can be "
-                    "judged: end earlier, or ask for less"
+                    "judged: end earlier, or allow a larger error"
                 )
             self.rtol, run = tight, tighter
         self.reference, self.floor = tighter, far

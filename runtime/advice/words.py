@@ -14,8 +14,11 @@ def reason(
     if known is None:
         return "found by trying, for nothing was known of it beforehand"
     deflects = f"it deflects by {known.deflection * in_measure:.1e}"
+    if not known.deflection > 0:
+        deflects = "its ends do not leave its frame, whatever it does between them"
     if choice.level == RIGID:
-        return f"{deflects}, about what a rigid body leaves out"
+        left_out = ", about what a rigid body leaves out" if known.deflection > 0 else ""
+        return f"{deflects}{left_out}"
     if choice.level == ONE_WAY:
         return (
             f"{deflects}; its reaction on the motion is little (chi {known.coupling:.2g}, "
