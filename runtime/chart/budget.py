@@ -61,5 +61,6 @@ class Budget:
         reference, settings = REFERENCE * self.seconds, (SETTINGS - REFERENCE) * self.seconds
         return (
             f"budget {self.seconds:g} s: up to {reference:.3g} s for the reference, then "
-            f"{settings:.3g} s for the settings of {curves} curve{'s' * (curves != 1)}, the rest to repeat runs"
+            f"{settings:.3g} s for the settings of {curves} curve{'s' * (curves != 1)}, the rest "
+            "to repeat runs"
         )
