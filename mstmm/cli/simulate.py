@@ -248,7 +248,7 @@ def simulate(
     if plan.plot is not None:
         names = plan.quantities or report.default_panels(result)
         result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
-    _report(plan, result, seconds + result.trajectory.before, json)
+    _report(plan, result, seconds + result.trajectory.before, json, refused)
     if interrupted(result):
         raise typer.Exit(130)
     if not result.success:
@@ -453,13 +453,20 @@ def interrupted(result: Result) -> bool:
 # --- what it says ---------------------------------------------------------------------------------
 
 
-def _report(plan: Plan, result: Result, seconds: float, json: bool) -> None:
+def _report(
+    plan: Plan, result: Result, seconds: float, json: bool, refused: RiskRefused | None
+) -> None:
     from . import output, report
 
     made = [str(path) for path in (plan.output, plan.plot) if path is not None]
     if json:
         data = report.to_json(result, seconds, _verdict(plan, result))
         data |= {"scene": plan.scene, "files": made}
+        if refused is not None:
+            data["error"] = {
+                "type": type(refused).__name__, "message": str(refused),
+                "exit_code": refused.exit_code,
+            }  # fmt: skip
         if interrupted(result) and plan.resumable:
             data["checkpoint"] = str(plan.checkpoint)
         output.emit_json(data)

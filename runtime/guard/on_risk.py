@@ -39,7 +39,14 @@ def ended(result: Result, on_risk: str) -> Result:
     the numbers of a run that reached its end.
     """
     if on_risk == "refuse" and result.success:
-        _refuse(result.risks, "in what it gave", result)
+        try:
+            risks = result.risks
+        except KeyboardInterrupt as stopped:
+            raise RiskRefused(
+                'the run ended, but the look at its risks was interrupted (on_risk = "refuse")', [],
+                result,
+            ) from stopped  # fmt: skip
+        _refuse(risks, "in what it gave", result)
     return result
 
 

@@ -144,3 +144,37 @@ def test_a_saved_result_has_the_same(tmp_path: Path) -> None:
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
     assert again.risks == run.risks
     assert again.certificate.warnings == run.certificate.warnings
+
+
+def test_a_look_that_is_interrupted_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: mstmm.Result) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(mstmm.Result, "risks", property(interrupted))
+    with pytest.raises(mstmm.RiskRefused, match="interrupted") as refused:
+        swinging().simulate(0.5, on_risk="refuse")
+    assert refused.value.result.success and refused.value.result.t[-1] == 0.5
+
+
+@pytest.mark.parametrize(("axial", "told"), [(-600.0, True), (-20.0, False)])
+def test_a_one_way_response_knows_no_stiffening(axial: float, told: bool) -> None:
+    """A clamped column: 1382 N buckle it, pi^2 EI / (4 L^2), and a response that does not know of
+    the axial load is too small by its share of that."""
+    beam = {"name": "column", "length": 5.0, "mass_per_length": 1.2, "bending_stiffness": 1.4e4,
+            "damping": {"ratio": [0.3]}, "modes": {"z": 3}}  # fmt: skip
+    scene = mstmm.Scene(
+        gravity=[0, 0, 0],
+        beam=[beam],
+        hinge=[{"name": "foot", "type": "fixed", "inboard": "ground", "outboard": "column"}],
+        load=[{"on": "column.tip", "force": [axial, 0, 5]}],
+    )
+    runs = [
+        mstmm.compile(scene, engine="looped", flexibility=level).simulate(6.0, method="rodas4p2")
+        for level in ("one-way", "coupled")
+    ]
+    ends = [run.deflection("column", "tip")[-1, 2] for run in runs]
+    assert ends[0] / ends[1] == pytest.approx(1 + axial / 1382, abs=0.01)
+    rows = [risk for risk in runs[0].risks if risk.name == "stiffening"]
+    assert bool(rows) == told and not [r for r in runs[1].risks if r.name == "stiffening"]
+    assert all("coupled" in risk.remedy for risk in rows)
+    assert all(risk.figure == pytest.approx(-axial / 1382, rel=0.02) for risk in rows)

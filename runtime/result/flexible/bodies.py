@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ class FlexibleBodies:
     def __init__(self, model: Compiled, observed: Observed) -> None:
         self.model, self.observed, self.run = model, observed, observed.run
         self.known: Mapping[str, ModalBody] = model.flexible
+        self.one_way: Collection[str] = ()  # those that respond, and are no part of the run
         self._motions: dict[str, Motion] = {}
 
     def body(self, name: str, what: str) -> ModalBody:

@@ -57,6 +57,7 @@ class Flexibility:
         sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
             where it has all shapes.
         said: what is known of the body's model before it moves, one sentence each.
+        one_way: it responds to a rigid run, linearly, and is no part of it.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Flexibility:
     strain: float | None = None
     sideways: float | None = None
     said: tuple[str, ...] = ()
+    one_way: bool = False
 
     @property
     def frame_error(self) -> float:
@@ -122,11 +124,12 @@ def _one(
     tail, aside = _from_sections(flexible, name, some, line) if shapes is not None else (None, None)
     return Flexibility(
         name, len(body.modes), body.frame,
-        e.is_stiffened(body),
+        e.is_stiffened(body) and name not in flexible.one_way,
         slope, e.largest_turn(bent_all), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         tail if slope > _STRAIGHT else None, _leading(motion, coupling),
         e.shear_error(body, line), e.largest_strain(bent_all), aside, body.warnings,
+        name in flexible.one_way,
     )  # fmt: skip
 
 
@@ -235,6 +238,7 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
         low, high = one.gamma
         worst = high if high >= -low else low
         word = "stiffened" if worst >= 0 else "softened"
+        word = f"not {word}" if one.one_way else word
         went.append(f"{word} by loads {abs(worst):.2g} (gamma)")
     kept = [f"{one.modes} in a {one.frame} frame" if one.frame else f"{one.modes}"]
     if one.last_share is not None and one.last_share[1]:

@@ -31,20 +31,22 @@ def risks(found: Sequence[Flexibility]) -> list[Risk]:
 def _linear(one: Flexibility) -> Risk | None:
     if one.stiffening:
         return None
+    stiffens = 'take flexibility = "coupled"' if one.one_way else "leave stiffening on"
+    lacks = "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
     if one.spin_ratio > SPIN:
-        way_out = "leave stiffening on" if one.gamma else "model it by beams, or from a mesh"
+        way_out = stiffens if one.gamma or one.one_way else "model it by beams, or from a mesh"
         return Risk(
             "stiffening", f'"{one.name}"',
-            f'"{one.name}" has no geometric stiffening and spins at {one.spin_ratio:.2g} times its '
+            f'"{one.name}" {lacks} and spins at {one.spin_ratio:.2g} times its '
             "first frequency: its deflection grows without bound where a real body stiffens",
             way_out, one.spin_ratio, SPIN,
         )  # fmt: skip
     if one.load_ratio > GAMMA:
         return Risk(
             "stiffening", f'"{one.name}"',
-            f'"{one.name}" has no geometric stiffening, but its loads change its stiffness by '
+            f'"{one.name}" {lacks}, but its loads change its stiffness by '
             f"{one.load_ratio:.0%} (gamma): deflections err by about as much",
-            "leave stiffening on", one.load_ratio, GAMMA,
+            stiffens, one.load_ratio, GAMMA,
         )  # fmt: skip
     return None
 

@@ -148,6 +148,7 @@ class _OneWayBodies(FlexibleBodies):
         self._result = result
         self._responding = rigidity(result.model).one_way
         self.known = {**self.known, **self._responding}
+        self.one_way = self._responding
 
     def coupled_start(self) -> tuple[Compiled, Array]:
         """A model in which all of them are coupled, and its q at the start of the run."""
