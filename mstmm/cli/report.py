@@ -150,9 +150,10 @@ def _certificate(result: Result) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def verdict_lines(verdict: Verdict, width: int) -> list[str]:
-    """The verdict, folded to the width of the terminal."""
-    return textwrap.wrap(str(verdict).replace("certify=True", "--certify"), max(width, 40))
+def verdict_lines(verdict: Verdict, width: int, told: bool = True) -> list[str]:
+    """The verdict, folded to the width of the terminal; `told`: its reasons follow."""
+    text = str(verdict).replace("certify=True", "--certify")
+    return textwrap.wrap(text if told else text.replace(", see below", ""), max(width, 40))
 
 
 def certificate_lines(result: Result, width: int) -> list[str]:

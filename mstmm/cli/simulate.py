@@ -489,7 +489,8 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
     from . import output, report
 
     console = output.console()
-    for line in report.verdict_lines(_verdict(plan, result), console.width):
+    verdict, told = _verdict(plan, result), result.trajectory.told
+    for line in report.verdict_lines(verdict, console.width, told):
         output.say(line)
     output.say(f"{plan.scene}: {report.sizes(result)}, {result.model.engine} engine")
     output.say(report.effort(result, seconds))

@@ -179,8 +179,9 @@ class Calls:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
                 "what it carries has no positive inertia in that direction (a thin rod on a ball, "
-                "a point mass, collinear axes, a negative principal moment); give the body "
-                "inertia, give the hinge rotor inertia (law.inertia), or fix that motion"
+                "a point mass, collinear axes, three angles at their lock, a negative principal "
+                "moment); give the body inertia, give the hinge rotor inertia (law.inertia), fix "
+                "that motion, or take a ball hinge for three angles"
             )
         if reason == Failed.FORCE:
             name = self.packed.scene.spring[element].name

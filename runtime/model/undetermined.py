@@ -39,9 +39,9 @@ def refuse_undetermined_start(model: Compiled, q: Array, u: Array) -> None:
         said = (
             f"{_listed([engine.hinge_name(k) for k in sorted(places)])} at t = 0 s: motions of "
             "them are undetermined, because what they carry has no positive inertia in that "
-            "direction (thin rods on balls, point masses, collinear axes, negative principal "
-            "moments); give the bodies inertia, give the hinges rotor inertia (law.inertia), or "
-            "fix those motions"
+            "direction (thin rods on balls, point masses, collinear axes, three angles at their "
+            "lock, negative principal moments); give the bodies inertia, give the hinges rotor "
+            "inertia (law.inertia), fix those motions, or take ball hinges for three angles"
         )
     raise SceneError(f"scene: {said}")
 

@@ -80,7 +80,7 @@ class SingularDistance:
         """That the coordinates come to where they fail, or that fixed steps are too long for how
         fast they are near it; None else."""
         near = f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
-        near += f"coordinates fail, at t = {self.time:.6g} s"
+        near += f"coordinates fail, at about t = {self.time:.4g} s"
         if self.measure < SINGULAR:
             return Risk("gimbal", f'hinge "{self.hinge}"', near, "use a ball hinge", self.measure,
                         SINGULAR)  # fmt: skip
@@ -223,11 +223,15 @@ def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | No
 def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) -> SingularDistance:
     k = int(np.abs(measures).argmin())
     changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
-    k, value = (int(changes[0]), 0.0) if len(changes) else (k, float(abs(measures[k])))
+    value, time = float(abs(measures[k])), float(run.t[k])
+    if len(changes):
+        k, value = int(changes[0]), 0.0
+        part = measures[k] / (measures[k] - measures[k + 1])
+        time = float(run.t[k] + part * (run.t[k + 1] - run.t[k]))
     speeds = np.abs(run.u[:, model.layout.slots(number).u_slice])
     turned = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
     name = model.packed.scene.hinges.name(number)
-    return SingularDistance(value, name, float(run.t[k]), turned)
+    return SingularDistance(value, name, time, turned)
 
 
 def _measure(model: Compiled, number: int) -> Any:
