@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -32,8 +33,12 @@ STILL_SEEN = {"numerical-damping"}
 
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[Result]:
-    """Whatever a case runs from now on."""
+    """Whatever a case runs from now on, nothing of which other tests have kept."""
     made, finished = list[Result](), measures.finished
+    for name, module in list(sys.modules.items()):
+        if name.startswith(cases.__name__):
+            for one in vars(module).values():
+                getattr(one, "cache_clear", lambda: None)()
 
     def kept(run: Result) -> Result:
         made.append(run)
