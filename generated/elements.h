@@ -618,6 +618,10 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -663,6 +667,10 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -740,6 +748,10 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -817,6 +829,10 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -894,6 +910,10 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -971,6 +991,10 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -1048,6 +1072,10 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -1310,6 +1338,14 @@ int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const r
 int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
     const real *restrict d_e_f, real *restrict d_tau);
+
+extern const mstmm_element mstmm_sweep_qr;
+int mstmm_sweep_qr_factor(const real *restrict S, real *restrict U);
+int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
+    const real *restrict d_V, const real *restrict e_Q, const real *restrict U_P,
+    const real *restrict d_P, real *restrict U, real *restrict d, real *restrict e_I);
+int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, const real *restrict e,
+    real *restrict S, real *restrict e_S);
 
 extern const mstmm_element mstmm_sweep_tangent;
 int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,

@@ -1487,6 +1487,50 @@ static inline int mstmm_tangent_placed_left_by(struct mstmm_tangent_placed_left 
 }
 #define mstmm_tangent_placed_left(...) mstmm_tangent_placed_left_by((struct mstmm_tangent_placed_left){__VA_ARGS__})
 
+struct mstmm_qr_factor {
+    const real *S;
+    real *U;
+};
+static inline int mstmm_qr_factor_by(struct mstmm_qr_factor to)
+{
+    return mstmm_sweep_qr_factor(
+        to.S, to.U);
+}
+#define mstmm_qr_factor(...) mstmm_qr_factor_by((struct mstmm_qr_factor){__VA_ARGS__})
+
+struct mstmm_qr_merge {
+    const real *Rc;
+    const real *r;
+    const real *V;
+    const real *d_V;
+    const real *e_Q;
+    const real *U_P;
+    const real *d_P;
+    real *U;
+    real *d;
+    real *e_I;
+};
+static inline int mstmm_qr_merge_by(struct mstmm_qr_merge to)
+{
+    return mstmm_sweep_qr_merge(
+        to.Rc, to.r, to.V, to.d_V, to.e_Q, to.U_P, to.d_P, to.U, to.d, to.e_I);
+}
+#define mstmm_qr_merge(...) mstmm_qr_merge_by((struct mstmm_qr_merge){__VA_ARGS__})
+
+struct mstmm_qr_restored {
+    const real *U;
+    const real *d;
+    const real *e;
+    real *S;
+    real *e_S;
+};
+static inline int mstmm_qr_restored_by(struct mstmm_qr_restored to)
+{
+    return mstmm_sweep_qr_restored(
+        to.U, to.d, to.e, to.S, to.e_S);
+}
+#define mstmm_qr_restored(...) mstmm_qr_restored_by((struct mstmm_qr_restored){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;
@@ -2329,6 +2373,32 @@ static inline int mstmm_generic_answer_by(int speeds, struct mstmm_generic_answe
         to.Rc, to.r, to.H, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
 }
 #define mstmm_generic_answer(speeds, ...) mstmm_generic_answer_by(speeds, (struct mstmm_generic_answer){__VA_ARGS__})
+
+struct mstmm_generic_qr_eliminate {
+    const real *H;
+    const real *J;
+    const real *floor_;
+    const real *U;
+    const real *d;
+    const real *e;
+    const real *tau;
+    real *G;
+    real *g;
+    real *V;
+    real *d_V;
+    real *e_Q;
+};
+typedef int mstmm_generic_qr_eliminate_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict, real *restrict, real *restrict, real *restrict);
+extern mstmm_generic_qr_eliminate_kernel *const mstmm_generic_qr_eliminate_table[];
+static inline int mstmm_generic_qr_eliminate_by(int speeds, struct mstmm_generic_qr_eliminate to)
+{
+    return mstmm_generic_qr_eliminate_table[speeds](
+        to.H, to.J, to.floor_, to.U, to.d, to.e, to.tau, to.G, to.g, to.V, to.d_V, to.e_Q);
+}
+#define mstmm_generic_qr_eliminate(speeds, ...) mstmm_generic_qr_eliminate_by(speeds, (struct mstmm_generic_qr_eliminate){__VA_ARGS__})
 
 struct mstmm_generic_forward_slope {
     const real *Rt;

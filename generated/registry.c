@@ -66,8 +66,9 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_link_prismatic,
     &mstmm_sweep_link_screw,
     &mstmm_sweep_modal,
+    &mstmm_sweep_qr,
     &mstmm_sweep_tangent,
     NULL,
 };
 
-const int mstmm_element_count = 63;
+const int mstmm_element_count = 64;

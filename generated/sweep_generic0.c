@@ -35,6 +35,10 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -1552,6 +1556,242 @@ static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
+/* rows behind a hinge with no free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
+ * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
+ * in  H[6][0] motion subspace of the free coordinates
+ * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
+ * in  U[21] upper triangle, row by row: S = U^T U
+ * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[0] (N, N*m) efforts on the free coordinates
+ * out G[0][6] udot = g - G a_Q
+ * out g[0] udot = g - G a_Q
+ * out V[21] upper triangle of what is behind the hinge
+ * out d_V[6] load that its rows take
+ * out e_Q[6] (N, N*m) load that they do not take
+ */
+int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q)
+{
+    (void)H;
+    (void)J;
+    (void)floor_;
+    (void)tau;
+    (void)G;
+    (void)g;
+    const real t0 = U[0] < 0.0;
+    const real t1 = t0 != 0 ? (-1.0) : 1.0;
+    const real t2 = U[0] * t1;
+    V[0] = t2;
+    const real t3 = U[1] * t1;
+    V[1] = t3;
+    const real t4 = U[2] * t1;
+    V[2] = t4;
+    const real t5 = U[3] * t1;
+    V[3] = t5;
+    const real t6 = U[4] * t1;
+    V[4] = t6;
+    const real t7 = U[5] * t1;
+    V[5] = t7;
+    const real t8 = U[6] < 0.0;
+    const real t9 = t8 != 0 ? (-1.0) : 1.0;
+    const real t10 = U[6] * t9;
+    V[6] = t10;
+    const real t11 = U[7] * t9;
+    V[7] = t11;
+    const real t12 = U[8] * t9;
+    V[8] = t12;
+    const real t13 = U[9] * t9;
+    V[9] = t13;
+    const real t14 = U[10] * t9;
+    V[10] = t14;
+    const real t15 = U[11] < 0.0;
+    const real t16 = t15 != 0 ? (-1.0) : 1.0;
+    const real t17 = U[11] * t16;
+    V[11] = t17;
+    const real t18 = U[12] * t16;
+    V[12] = t18;
+    const real t19 = U[13] * t16;
+    V[13] = t19;
+    const real t20 = U[14] * t16;
+    V[14] = t20;
+    const real t21 = U[15] < 0.0;
+    const real t22 = t21 != 0 ? (-1.0) : 1.0;
+    const real t23 = U[15] * t22;
+    V[15] = t23;
+    const real t24 = U[16] * t22;
+    V[16] = t24;
+    const real t25 = U[17] * t22;
+    V[17] = t25;
+    const real t26 = U[18] < 0.0;
+    const real t27 = t26 != 0 ? (-1.0) : 1.0;
+    const real t28 = U[18] * t27;
+    V[18] = t28;
+    const real t29 = U[19] * t27;
+    V[19] = t29;
+    const real t30 = U[20] < 0.0;
+    const real t31 = t30 != 0 ? (-1.0) : 1.0;
+    const real t32 = U[20] * t31;
+    V[20] = t32;
+    const real t33 = U[0] * U[0];
+    const real t34 = t33 * 1e-26;
+    const real t35 = t34 < t33;
+    const real t36 = 1.0 / U[0];
+    const real t37 = e[0] * t36;
+    const real t38 = t35 != 0 ? t37 : 0.0;
+    const real t39 = d[0] + t38;
+    const real t40 = t39 * t1;
+    d_V[0] = t40;
+    const real t41 = U[6] * U[6];
+    const real t42 = U[1] * U[1];
+    const real t43 = t41 + t42;
+    const real t44 = 1e-26 * t43;
+    const real t45 = t44 < t41;
+    const real t46 = U[1] * t38;
+    const real t47 = e[1] - t46;
+    const real t48 = 1.0 / U[6];
+    const real t49 = t47 * t48;
+    const real t50 = t45 != 0 ? t49 : 0.0;
+    const real t51 = d[1] + t50;
+    const real t52 = t51 * t9;
+    d_V[1] = t52;
+    const real t53 = U[11] * U[11];
+    const real t54 = U[2] * U[2];
+    const real t55 = U[7] * U[7];
+    const real t56 = t54 + t55;
+    const real t57 = t53 + t56;
+    const real t58 = 1e-26 * t57;
+    const real t59 = t58 < t53;
+    const real t60 = U[2] * t38;
+    const real t61 = U[7] * t50;
+    const real t62 = t60 + t61;
+    const real t63 = e[2] - t62;
+    const real t64 = 1.0 / U[11];
+    const real t65 = t63 * t64;
+    const real t66 = t59 != 0 ? t65 : 0.0;
+    const real t67 = d[2] + t66;
+    const real t68 = t67 * t16;
+    d_V[2] = t68;
+    const real t69 = U[15] * U[15];
+    const real t70 = U[12] * U[12];
+    const real t71 = U[3] * U[3];
+    const real t72 = U[8] * U[8];
+    const real t73 = t71 + t72;
+    const real t74 = t70 + t73;
+    const real t75 = t69 + t74;
+    const real t76 = 1e-26 * t75;
+    const real t77 = t76 < t69;
+    const real t78 = U[12] * t66;
+    const real t79 = U[3] * t38;
+    const real t80 = U[8] * t50;
+    const real t81 = t79 + t80;
+    const real t82 = t78 + t81;
+    const real t83 = e[3] - t82;
+    const real t84 = 1.0 / U[15];
+    const real t85 = t83 * t84;
+    const real t86 = t77 != 0 ? t85 : 0.0;
+    const real t87 = d[3] + t86;
+    const real t88 = t87 * t22;
+    d_V[3] = t88;
+    const real t89 = U[18] * U[18];
+    const real t90 = U[16] * U[16];
+    const real t91 = U[13] * U[13];
+    const real t92 = U[4] * U[4];
+    const real t93 = U[9] * U[9];
+    const real t94 = t92 + t93;
+    const real t95 = t91 + t94;
+    const real t96 = t90 + t95;
+    const real t97 = t89 + t96;
+    const real t98 = 1e-26 * t97;
+    const real t99 = t98 < t89;
+    const real t100 = U[16] * t86;
+    const real t101 = U[13] * t66;
+    const real t102 = U[4] * t38;
+    const real t103 = U[9] * t50;
+    const real t104 = t102 + t103;
+    const real t105 = t101 + t104;
+    const real t106 = t100 + t105;
+    const real t107 = e[4] - t106;
+    const real t108 = 1.0 / U[18];
+    const real t109 = t107 * t108;
+    const real t110 = t99 != 0 ? t109 : 0.0;
+    const real t111 = d[4] + t110;
+    const real t112 = t111 * t27;
+    d_V[4] = t112;
+    const real t113 = U[20] * U[20];
+    const real t114 = U[19] * U[19];
+    const real t115 = U[17] * U[17];
+    const real t116 = U[14] * U[14];
+    const real t117 = U[5] * U[5];
+    const real t118 = U[10] * U[10];
+    const real t119 = t117 + t118;
+    const real t120 = t116 + t119;
+    const real t121 = t115 + t120;
+    const real t122 = t114 + t121;
+    const real t123 = t113 + t122;
+    const real t124 = 1e-26 * t123;
+    const real t125 = t124 < t113;
+    const real t126 = U[19] * t110;
+    const real t127 = U[17] * t86;
+    const real t128 = U[14] * t66;
+    const real t129 = U[5] * t38;
+    const real t130 = U[10] * t50;
+    const real t131 = t129 + t130;
+    const real t132 = t128 + t131;
+    const real t133 = t127 + t132;
+    const real t134 = t126 + t133;
+    const real t135 = e[5] - t134;
+    const real t136 = 1.0 / U[20];
+    const real t137 = t135 * t136;
+    const real t138 = t125 != 0 ? t137 : 0.0;
+    const real t139 = d[5] + t138;
+    const real t140 = t139 * t31;
+    d_V[5] = t140;
+    const real t141 = t35 != 0 ? 0.0 : e[0];
+    e_Q[0] = t141;
+    const real t142 = t45 != 0 ? 0.0 : t47;
+    e_Q[1] = t142;
+    const real t143 = t59 != 0 ? 0.0 : t63;
+    e_Q[2] = t143;
+    const real t144 = t77 != 0 ? 0.0 : t83;
+    e_Q[3] = t144;
+    const real t145 = t99 != 0 ? 0.0 : t107;
+    e_Q[4] = t145;
+    const real t146 = t125 != 0 ? 0.0 : t135;
+    e_Q[5] = t146;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_qr_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_qr_eliminate_inputs[] = {
+    {"H", 0, "", 0, 0},
+    {"J", 0, "kg*m2 or kg", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
+    {"U", 21, "", 0, 0},
+    {"d", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 0, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_qr_eliminate_outputs[] = {
+    {"G", 0, "", 0, 0},
+    {"g", 0, "", 0, 0},
+    {"V", 21, "", 0, 0},
+    {"d_V", 6, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+};
+
 /* motion of Q across a hinge with 0 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -2500,6 +2740,18 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "qr_eliminate",
+        .function = (void (*)(void))mstmm_sweep_generic0_qr_eliminate,
+        .call = mstmm_sweep_generic0_qr_eliminate_call,
+        .n_inputs = 7,
+        .n_outputs = 5,
+        .inputs = mstmm_sweep_generic0_qr_eliminate_inputs,
+        .outputs = mstmm_sweep_generic0_qr_eliminate_outputs,
+        .ir_hash = "8c13e67f46b02021b1d9475422398269c4a37b37cb09d83e956b0901ebe6eeb7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "tangent_carrier",
         .function = (void (*)(void))mstmm_sweep_generic0_tangent_carrier,
         .call = mstmm_sweep_generic0_tangent_carrier_call,
@@ -2553,7 +2805,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "a7605df0819bb5deb87a5eaa7ddb5e6abc2c1fa919f72176d85da565ba3b7058",
+    .hash = "30274f30883bd614134b23779c9f66c6fee14edc0fce2ed1ba180cbf440886ca",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2563,6 +2815,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 12,
+    .n_kernels = 13,
     .kernels = mstmm_sweep_generic0_kernels,
 };

@@ -36,6 +36,10 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -2103,6 +2107,576 @@ static const mstmm_port mstmm_sweep_generic1_answer_inputs[] = {
 static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
     {"udot", 1, "", 0, 0},
     {"delta", 6, "", 0, 0},
+};
+
+/* rows behind a hinge with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
+ * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
+ * in  H[6] motion subspace of the free coordinates
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
+ * in  U[21] upper triangle, row by row: S = U^T U
+ * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[1] (N, N*m) efforts on the free coordinates
+ * out G[1][6] udot = g - G a_Q
+ * out g[1] udot = g - G a_Q
+ * out V[21] upper triangle of what is behind the hinge
+ * out d_V[6] load that its rows take
+ * out e_Q[6] (N, N*m) load that they do not take
+ */
+int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q)
+{
+    const real t0 = H[2] * H[2];
+    const real t1 = H[0] * H[0];
+    const real t2 = H[1] * H[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = 0.0 < floor_[0];
+    const real t6 = U[11] * U[11];
+    const real t7 = U[7] * U[7];
+    const real t8 = U[6] * U[6];
+    const real t9 = U[2] * U[2];
+    const real t10 = U[0] * U[0];
+    const real t11 = U[1] * U[1];
+    const real t12 = t10 + t11;
+    const real t13 = t9 + t12;
+    const real t14 = t8 + t13;
+    const real t15 = t7 + t14;
+    const real t16 = t6 + t15;
+    const real t17 = ((real)1 / (real)300000000000000) * t16;
+    const real t18 = t5 != 0 ? floor_[0] : t17;
+    const real t19 = t4 * t18;
+    const real t20 = H[5] * H[5];
+    const real t21 = H[3] * H[3];
+    const real t22 = H[4] * H[4];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    const real t25 = 0.0 < floor_[1];
+    const real t26 = U[20] * U[20];
+    const real t27 = U[19] * U[19];
+    const real t28 = U[18] * U[18];
+    const real t29 = U[17] * U[17];
+    const real t30 = U[16] * U[16];
+    const real t31 = U[15] * U[15];
+    const real t32 = U[14] * U[14];
+    const real t33 = U[13] * U[13];
+    const real t34 = U[12] * U[12];
+    const real t35 = U[10] * U[10];
+    const real t36 = U[9] * U[9];
+    const real t37 = U[8] * U[8];
+    const real t38 = U[5] * U[5];
+    const real t39 = U[3] * U[3];
+    const real t40 = U[4] * U[4];
+    const real t41 = t39 + t40;
+    const real t42 = t38 + t41;
+    const real t43 = t37 + t42;
+    const real t44 = t36 + t43;
+    const real t45 = t35 + t44;
+    const real t46 = t34 + t45;
+    const real t47 = t33 + t46;
+    const real t48 = t32 + t47;
+    const real t49 = t31 + t48;
+    const real t50 = t30 + t49;
+    const real t51 = t29 + t50;
+    const real t52 = t28 + t51;
+    const real t53 = t27 + t52;
+    const real t54 = t26 + t53;
+    const real t55 = ((real)1 / (real)300000000000000) * t54;
+    const real t56 = t25 != 0 ? floor_[1] : t55;
+    const real t57 = t24 * t56;
+    const real t58 = t19 + t57;
+    const real t59 = H[5] * U[20];
+    const real t60 = t59 * t59;
+    const real t61 = H[4] * U[18];
+    const real t62 = H[5] * U[19];
+    const real t63 = t61 + t62;
+    const real t64 = t63 * t63;
+    const real t65 = H[3] * U[15];
+    const real t66 = H[4] * U[16];
+    const real t67 = t65 + t66;
+    const real t68 = H[5] * U[17];
+    const real t69 = t67 + t68;
+    const real t70 = t69 * t69;
+    const real t71 = H[2] * U[11];
+    const real t72 = H[3] * U[12];
+    const real t73 = t71 + t72;
+    const real t74 = H[4] * U[13];
+    const real t75 = t73 + t74;
+    const real t76 = H[5] * U[14];
+    const real t77 = t75 + t76;
+    const real t78 = t77 * t77;
+    const real t79 = H[1] * U[6];
+    const real t80 = H[2] * U[7];
+    const real t81 = t79 + t80;
+    const real t82 = H[3] * U[8];
+    const real t83 = t81 + t82;
+    const real t84 = H[4] * U[9];
+    const real t85 = t83 + t84;
+    const real t86 = H[5] * U[10];
+    const real t87 = t85 + t86;
+    const real t88 = t87 * t87;
+    const real t89 = H[0] * U[0];
+    const real t90 = H[1] * U[1];
+    const real t91 = t89 + t90;
+    const real t92 = H[2] * U[2];
+    const real t93 = t91 + t92;
+    const real t94 = H[3] * U[3];
+    const real t95 = t93 + t94;
+    const real t96 = H[4] * U[4];
+    const real t97 = t95 + t96;
+    const real t98 = H[5] * U[5];
+    const real t99 = t97 + t98;
+    const real t100 = t99 * t99;
+    const real t101 = J[0] + t100;
+    const real t102 = t88 + t101;
+    const real t103 = t78 + t102;
+    const real t104 = t70 + t103;
+    const real t105 = t64 + t104;
+    const real t106 = t60 + t105;
+    const real t107 = t58 < t106;
+    if (!(t107 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+    const real t108 = 1e-26 * t106;
+    const real t109 = sqrt(J[0]);
+    const real t110 = t109 * t109;
+    const real t111 = t60 + t110;
+    const real t112 = sqrt(t111);
+    const real t113 = t112 * t112;
+    const real t114 = t64 + t113;
+    const real t115 = sqrt(t114);
+    const real t116 = t115 * t115;
+    const real t117 = t70 + t116;
+    const real t118 = sqrt(t117);
+    const real t119 = t118 * t118;
+    const real t120 = t78 + t119;
+    const real t121 = sqrt(t120);
+    const real t122 = t121 * t121;
+    const real t123 = t88 + t122;
+    const real t124 = sqrt(t123);
+    const real t125 = t124 * t124;
+    const real t126 = t100 + t125;
+    const real t127 = sqrt(t126);
+    const real t128 = t127 * t127;
+    const real t129 = t108 < t128;
+    if (!(t129 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t130 = 0.0 < t127;
+    const real t131 = t130 != 0 ? t127 : 1.0;
+    const real t132 = 1.0 / t131;
+    const real t133 = t99 * t132;
+    const real t134 = t130 != 0 ? t133 : 1.0;
+    const real t135 = U[0] * t134;
+    const real t136 = 1.0 / t127;
+    const real t137 = t135 * t136;
+    G[0] = t137;
+    const real t138 = U[1] * t134;
+    const real t139 = 0.0 < t124;
+    const real t140 = t139 != 0 ? t124 : 1.0;
+    const real t141 = 1.0 / t140;
+    const real t142 = t87 * t141;
+    const real t143 = t139 != 0 ? t142 : 1.0;
+    const real t144 = U[6] * t143;
+    const real t145 = t124 * t132;
+    const real t146 = t144 * t145;
+    const real t147 = t138 + t146;
+    const real t148 = t147 * t136;
+    G[1] = t148;
+    const real t149 = U[2] * t134;
+    const real t150 = U[7] * t143;
+    const real t151 = 0.0 < t121;
+    const real t152 = t151 != 0 ? t121 : 1.0;
+    const real t153 = 1.0 / t152;
+    const real t154 = t77 * t153;
+    const real t155 = t151 != 0 ? t154 : 1.0;
+    const real t156 = U[11] * t155;
+    const real t157 = t121 * t141;
+    const real t158 = t156 * t157;
+    const real t159 = t150 + t158;
+    const real t160 = t159 * t145;
+    const real t161 = t149 + t160;
+    const real t162 = t161 * t136;
+    G[2] = t162;
+    const real t163 = U[3] * t134;
+    const real t164 = U[8] * t143;
+    const real t165 = U[12] * t155;
+    const real t166 = 0.0 < t118;
+    const real t167 = t166 != 0 ? t118 : 1.0;
+    const real t168 = 1.0 / t167;
+    const real t169 = t69 * t168;
+    const real t170 = t166 != 0 ? t169 : 1.0;
+    const real t171 = U[15] * t170;
+    const real t172 = t118 * t153;
+    const real t173 = t171 * t172;
+    const real t174 = t165 + t173;
+    const real t175 = t174 * t157;
+    const real t176 = t164 + t175;
+    const real t177 = t176 * t145;
+    const real t178 = t163 + t177;
+    const real t179 = t178 * t136;
+    G[3] = t179;
+    const real t180 = U[4] * t134;
+    const real t181 = U[9] * t143;
+    const real t182 = U[13] * t155;
+    const real t183 = U[16] * t170;
+    const real t184 = 0.0 < t115;
+    const real t185 = t184 != 0 ? t115 : 1.0;
+    const real t186 = 1.0 / t185;
+    const real t187 = t63 * t186;
+    const real t188 = t184 != 0 ? t187 : 1.0;
+    const real t189 = U[18] * t188;
+    const real t190 = t115 * t168;
+    const real t191 = t189 * t190;
+    const real t192 = t183 + t191;
+    const real t193 = t192 * t172;
+    const real t194 = t182 + t193;
+    const real t195 = t194 * t157;
+    const real t196 = t181 + t195;
+    const real t197 = t196 * t145;
+    const real t198 = t180 + t197;
+    const real t199 = t198 * t136;
+    G[4] = t199;
+    const real t200 = U[5] * t134;
+    const real t201 = U[10] * t143;
+    const real t202 = U[14] * t155;
+    const real t203 = U[17] * t170;
+    const real t204 = U[19] * t188;
+    const real t205 = 0.0 < t112;
+    const real t206 = t205 != 0 ? t112 : 1.0;
+    const real t207 = 1.0 / t206;
+    const real t208 = t59 * t207;
+    const real t209 = t205 != 0 ? t208 : 1.0;
+    const real t210 = U[20] * t209;
+    const real t211 = t112 * t186;
+    const real t212 = t210 * t211;
+    const real t213 = t204 + t212;
+    const real t214 = t213 * t190;
+    const real t215 = t203 + t214;
+    const real t216 = t215 * t172;
+    const real t217 = t202 + t216;
+    const real t218 = t217 * t157;
+    const real t219 = t201 + t218;
+    const real t220 = t219 * t145;
+    const real t221 = t200 + t220;
+    const real t222 = t221 * t136;
+    G[5] = t222;
+    const real t223 = t10 * 1e-26;
+    const real t224 = t223 < t10;
+    const real t225 = t224 != 0 ? 0.0 : e[0];
+    const real t226 = H[0] * t225;
+    const real t227 = t8 + t11;
+    const real t228 = 1e-26 * t227;
+    const real t229 = t228 < t8;
+    const real t230 = 1.0 / U[0];
+    const real t231 = e[0] * t230;
+    const real t232 = t224 != 0 ? t231 : 0.0;
+    const real t233 = U[1] * t232;
+    const real t234 = e[1] - t233;
+    const real t235 = t229 != 0 ? 0.0 : t234;
+    const real t236 = H[1] * t235;
+    const real t237 = t226 + t236;
+    const real t238 = t9 + t7;
+    const real t239 = t6 + t238;
+    const real t240 = 1e-26 * t239;
+    const real t241 = t240 < t6;
+    const real t242 = U[2] * t232;
+    const real t243 = 1.0 / U[6];
+    const real t244 = t234 * t243;
+    const real t245 = t229 != 0 ? t244 : 0.0;
+    const real t246 = U[7] * t245;
+    const real t247 = t242 + t246;
+    const real t248 = e[2] - t247;
+    const real t249 = t241 != 0 ? 0.0 : t248;
+    const real t250 = H[2] * t249;
+    const real t251 = t237 + t250;
+    const real t252 = t39 + t37;
+    const real t253 = t34 + t252;
+    const real t254 = t31 + t253;
+    const real t255 = 1e-26 * t254;
+    const real t256 = t255 < t31;
+    const real t257 = 1.0 / U[11];
+    const real t258 = t248 * t257;
+    const real t259 = t241 != 0 ? t258 : 0.0;
+    const real t260 = U[12] * t259;
+    const real t261 = U[3] * t232;
+    const real t262 = U[8] * t245;
+    const real t263 = t261 + t262;
+    const real t264 = t260 + t263;
+    const real t265 = e[3] - t264;
+    const real t266 = t256 != 0 ? 0.0 : t265;
+    const real t267 = H[3] * t266;
+    const real t268 = t251 + t267;
+    const real t269 = t40 + t36;
+    const real t270 = t33 + t269;
+    const real t271 = t30 + t270;
+    const real t272 = t28 + t271;
+    const real t273 = 1e-26 * t272;
+    const real t274 = t273 < t28;
+    const real t275 = 1.0 / U[15];
+    const real t276 = t265 * t275;
+    const real t277 = t256 != 0 ? t276 : 0.0;
+    const real t278 = U[16] * t277;
+    const real t279 = U[13] * t259;
+    const real t280 = U[4] * t232;
+    const real t281 = U[9] * t245;
+    const real t282 = t280 + t281;
+    const real t283 = t279 + t282;
+    const real t284 = t278 + t283;
+    const real t285 = e[4] - t284;
+    const real t286 = t274 != 0 ? 0.0 : t285;
+    const real t287 = H[4] * t286;
+    const real t288 = t268 + t287;
+    const real t289 = t38 + t35;
+    const real t290 = t32 + t289;
+    const real t291 = t29 + t290;
+    const real t292 = t27 + t291;
+    const real t293 = t26 + t292;
+    const real t294 = 1e-26 * t293;
+    const real t295 = t294 < t26;
+    const real t296 = 1.0 / U[18];
+    const real t297 = t285 * t296;
+    const real t298 = t274 != 0 ? t297 : 0.0;
+    const real t299 = U[19] * t298;
+    const real t300 = U[17] * t277;
+    const real t301 = U[14] * t259;
+    const real t302 = U[5] * t232;
+    const real t303 = U[10] * t245;
+    const real t304 = t302 + t303;
+    const real t305 = t301 + t304;
+    const real t306 = t300 + t305;
+    const real t307 = t299 + t306;
+    const real t308 = e[5] - t307;
+    const real t309 = t295 != 0 ? 0.0 : t308;
+    const real t310 = H[5] * t309;
+    const real t311 = t288 + t310;
+    const real t312 = tau[0] - t311;
+    const real t313 = t312 * t136;
+    const real t314 = d[0] + t232;
+    const real t315 = t314 * t134;
+    const real t316 = d[1] + t245;
+    const real t317 = t316 * t143;
+    const real t318 = d[2] + t259;
+    const real t319 = t318 * t155;
+    const real t320 = d[3] + t277;
+    const real t321 = t320 * t170;
+    const real t322 = d[4] + t298;
+    const real t323 = t322 * t188;
+    const real t324 = 1.0 / U[20];
+    const real t325 = t308 * t324;
+    const real t326 = t295 != 0 ? t325 : 0.0;
+    const real t327 = d[5] + t326;
+    const real t328 = t327 * t209;
+    const real t329 = t328 * t211;
+    const real t330 = t323 + t329;
+    const real t331 = t330 * t190;
+    const real t332 = t321 + t331;
+    const real t333 = t332 * t172;
+    const real t334 = t319 + t333;
+    const real t335 = t334 * t157;
+    const real t336 = t317 + t335;
+    const real t337 = t336 * t145;
+    const real t338 = t315 + t337;
+    const real t339 = t313 - t338;
+    const real t340 = t136 * t339;
+    g[0] = t340;
+    const real t341 = U[0] * t145;
+    const real t342 = -t341;
+    const real t343 = t342 < 0.0;
+    const real t344 = t343 != 0 ? (-1.0) : 1.0;
+    const real t345 = t341 * t344;
+    const real t346 = -t345;
+    V[0] = t346;
+    const real t347 = t144 * t134;
+    const real t348 = U[1] * t145;
+    const real t349 = t347 - t348;
+    const real t350 = t349 * t344;
+    V[1] = t350;
+    const real t351 = t159 * t134;
+    const real t352 = U[2] * t145;
+    const real t353 = t351 - t352;
+    const real t354 = t353 * t344;
+    V[2] = t354;
+    const real t355 = t176 * t134;
+    const real t356 = U[3] * t145;
+    const real t357 = t355 - t356;
+    const real t358 = t357 * t344;
+    V[3] = t358;
+    const real t359 = t196 * t134;
+    const real t360 = U[4] * t145;
+    const real t361 = t359 - t360;
+    const real t362 = t361 * t344;
+    V[4] = t362;
+    const real t363 = t219 * t134;
+    const real t364 = U[5] * t145;
+    const real t365 = t363 - t364;
+    const real t366 = t365 * t344;
+    V[5] = t366;
+    const real t367 = U[6] * t157;
+    const real t368 = -t367;
+    const real t369 = t368 < 0.0;
+    const real t370 = t369 != 0 ? (-1.0) : 1.0;
+    const real t371 = t367 * t370;
+    const real t372 = -t371;
+    V[6] = t372;
+    const real t373 = t156 * t143;
+    const real t374 = U[7] * t157;
+    const real t375 = t373 - t374;
+    const real t376 = t375 * t370;
+    V[7] = t376;
+    const real t377 = t174 * t143;
+    const real t378 = U[8] * t157;
+    const real t379 = t377 - t378;
+    const real t380 = t379 * t370;
+    V[8] = t380;
+    const real t381 = t194 * t143;
+    const real t382 = U[9] * t157;
+    const real t383 = t381 - t382;
+    const real t384 = t383 * t370;
+    V[9] = t384;
+    const real t385 = t217 * t143;
+    const real t386 = U[10] * t157;
+    const real t387 = t385 - t386;
+    const real t388 = t387 * t370;
+    V[10] = t388;
+    const real t389 = U[11] * t172;
+    const real t390 = -t389;
+    const real t391 = t390 < 0.0;
+    const real t392 = t391 != 0 ? (-1.0) : 1.0;
+    const real t393 = t389 * t392;
+    const real t394 = -t393;
+    V[11] = t394;
+    const real t395 = t171 * t155;
+    const real t396 = U[12] * t172;
+    const real t397 = t395 - t396;
+    const real t398 = t397 * t392;
+    V[12] = t398;
+    const real t399 = t192 * t155;
+    const real t400 = U[13] * t172;
+    const real t401 = t399 - t400;
+    const real t402 = t401 * t392;
+    V[13] = t402;
+    const real t403 = t215 * t155;
+    const real t404 = U[14] * t172;
+    const real t405 = t403 - t404;
+    const real t406 = t405 * t392;
+    V[14] = t406;
+    const real t407 = U[15] * t190;
+    const real t408 = -t407;
+    const real t409 = t408 < 0.0;
+    const real t410 = t409 != 0 ? (-1.0) : 1.0;
+    const real t411 = t407 * t410;
+    const real t412 = -t411;
+    V[15] = t412;
+    const real t413 = t189 * t170;
+    const real t414 = U[16] * t190;
+    const real t415 = t413 - t414;
+    const real t416 = t415 * t410;
+    V[16] = t416;
+    const real t417 = t213 * t170;
+    const real t418 = U[17] * t190;
+    const real t419 = t417 - t418;
+    const real t420 = t419 * t410;
+    V[17] = t420;
+    const real t421 = U[18] * t211;
+    const real t422 = -t421;
+    const real t423 = t422 < 0.0;
+    const real t424 = t423 != 0 ? (-1.0) : 1.0;
+    const real t425 = t421 * t424;
+    const real t426 = -t425;
+    V[18] = t426;
+    const real t427 = t210 * t188;
+    const real t428 = U[19] * t211;
+    const real t429 = t427 - t428;
+    const real t430 = t429 * t424;
+    V[19] = t430;
+    const real t431 = t109 * t207;
+    const real t432 = U[20] * t431;
+    const real t433 = -t432;
+    const real t434 = t433 < 0.0;
+    const real t435 = t434 != 0 ? (-1.0) : 1.0;
+    const real t436 = t432 * t435;
+    const real t437 = -t436;
+    V[20] = t437;
+    const real t438 = t336 * t134;
+    const real t439 = t314 * t145;
+    const real t440 = t438 - t439;
+    const real t441 = t440 * t344;
+    d_V[0] = t441;
+    const real t442 = t334 * t143;
+    const real t443 = t316 * t157;
+    const real t444 = t442 - t443;
+    const real t445 = t444 * t370;
+    d_V[1] = t445;
+    const real t446 = t332 * t155;
+    const real t447 = t318 * t172;
+    const real t448 = t446 - t447;
+    const real t449 = t448 * t392;
+    d_V[2] = t449;
+    const real t450 = t330 * t170;
+    const real t451 = t320 * t190;
+    const real t452 = t450 - t451;
+    const real t453 = t452 * t410;
+    d_V[3] = t453;
+    const real t454 = t328 * t188;
+    const real t455 = t322 * t211;
+    const real t456 = t454 - t455;
+    const real t457 = t456 * t424;
+    d_V[4] = t457;
+    const real t458 = t327 * t431;
+    const real t459 = t458 * t435;
+    const real t460 = -t459;
+    d_V[5] = t460;
+    const real t461 = t312 * t137;
+    const real t462 = t225 + t461;
+    e_Q[0] = t462;
+    const real t463 = t312 * t148;
+    const real t464 = t235 + t463;
+    e_Q[1] = t464;
+    const real t465 = t312 * t162;
+    const real t466 = t249 + t465;
+    e_Q[2] = t466;
+    const real t467 = t312 * t179;
+    const real t468 = t266 + t467;
+    e_Q[3] = t468;
+    const real t469 = t312 * t199;
+    const real t470 = t286 + t469;
+    e_Q[4] = t470;
+    const real t471 = t312 * t222;
+    const real t472 = t309 + t471;
+    e_Q[5] = t472;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_qr_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_qr_eliminate_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
+    {"U", 21, "", 0, 0},
+    {"d", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_qr_eliminate_outputs[] = {
+    {"G", 6, "", 0, 0},
+    {"g", 1, "", 0, 0},
+    {"V", 21, "", 0, 0},
+    {"d_V", 6, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic1_qr_eliminate_guards[] = {
+    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
 /* motion of Q across a hinge with 1 speeds
@@ -4511,6 +5085,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "qr_eliminate",
+        .function = (void (*)(void))mstmm_sweep_generic1_qr_eliminate,
+        .call = mstmm_sweep_generic1_qr_eliminate_call,
+        .n_inputs = 7,
+        .n_outputs = 5,
+        .inputs = mstmm_sweep_generic1_qr_eliminate_inputs,
+        .outputs = mstmm_sweep_generic1_qr_eliminate_outputs,
+        .ir_hash = "35ccb9bc7b54544bfd75cf6e1f158443e83d19957f949779e6b7f0f4902bd753",
+        .n_guards = 2,
+        .guards = mstmm_sweep_generic1_qr_eliminate_guards,
+    },
+    {
         .name = "tangent_carrier",
         .function = (void (*)(void))mstmm_sweep_generic1_tangent_carrier,
         .call = mstmm_sweep_generic1_tangent_carrier_call,
@@ -4672,7 +5258,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "1dd52e582793fff4b2500b4b2719cc9f17237adc7923c4e029d5309620e1c167",
+    .hash = "f9ba62ce1421853b3aa75f56145790671a04320580e10225a11e2324c0c89f72",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4682,6 +5268,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 21,
+    .n_kernels = 22,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -36,6 +36,10 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q);
 int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
     const real *restrict v, const real *restrict w, const real *restrict c,
     const real *restrict motion, real *restrict Q);
@@ -2675,6 +2679,925 @@ static const mstmm_port mstmm_sweep_generic2_answer_inputs[] = {
 static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
     {"udot", 2, "", 0, 0},
     {"delta", 6, "", 0, 0},
+};
+
+/* rows behind a hinge with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
+ * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
+ * in  U[21] upper triangle, row by row: S = U^T U
+ * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) efforts on the free coordinates
+ * out G[2][6] udot = g - G a_Q
+ * out g[2] udot = g - G a_Q
+ * out V[21] upper triangle of what is behind the hinge
+ * out d_V[6] load that its rows take
+ * out e_Q[6] (N, N*m) load that they do not take
+ */
+int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
+    const real *restrict floor_, const real *restrict U, const real *restrict d,
+    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
+    real *restrict V, real *restrict d_V, real *restrict e_Q)
+{
+    const real t0 = H[4] * H[4];
+    const real t1 = H[0] * H[0];
+    const real t2 = H[2] * H[2];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = 0.0 < floor_[0];
+    const real t6 = U[11] * U[11];
+    const real t7 = U[7] * U[7];
+    const real t8 = U[6] * U[6];
+    const real t9 = U[2] * U[2];
+    const real t10 = U[0] * U[0];
+    const real t11 = U[1] * U[1];
+    const real t12 = t10 + t11;
+    const real t13 = t9 + t12;
+    const real t14 = t8 + t13;
+    const real t15 = t7 + t14;
+    const real t16 = t6 + t15;
+    const real t17 = ((real)1 / (real)300000000000000) * t16;
+    const real t18 = t5 != 0 ? floor_[0] : t17;
+    const real t19 = t4 * t18;
+    const real t20 = H[10] * H[10];
+    const real t21 = H[6] * H[6];
+    const real t22 = H[8] * H[8];
+    const real t23 = t21 + t22;
+    const real t24 = t20 + t23;
+    const real t25 = 0.0 < floor_[1];
+    const real t26 = U[20] * U[20];
+    const real t27 = U[19] * U[19];
+    const real t28 = U[18] * U[18];
+    const real t29 = U[17] * U[17];
+    const real t30 = U[16] * U[16];
+    const real t31 = U[15] * U[15];
+    const real t32 = U[14] * U[14];
+    const real t33 = U[13] * U[13];
+    const real t34 = U[12] * U[12];
+    const real t35 = U[10] * U[10];
+    const real t36 = U[9] * U[9];
+    const real t37 = U[8] * U[8];
+    const real t38 = U[5] * U[5];
+    const real t39 = U[3] * U[3];
+    const real t40 = U[4] * U[4];
+    const real t41 = t39 + t40;
+    const real t42 = t38 + t41;
+    const real t43 = t37 + t42;
+    const real t44 = t36 + t43;
+    const real t45 = t35 + t44;
+    const real t46 = t34 + t45;
+    const real t47 = t33 + t46;
+    const real t48 = t32 + t47;
+    const real t49 = t31 + t48;
+    const real t50 = t30 + t49;
+    const real t51 = t29 + t50;
+    const real t52 = t28 + t51;
+    const real t53 = t27 + t52;
+    const real t54 = t26 + t53;
+    const real t55 = ((real)1 / (real)300000000000000) * t54;
+    const real t56 = t25 != 0 ? floor_[1] : t55;
+    const real t57 = t24 * t56;
+    const real t58 = t19 + t57;
+    const real t59 = H[10] * U[20];
+    const real t60 = t59 * t59;
+    const real t61 = H[8] * U[18];
+    const real t62 = H[10] * U[19];
+    const real t63 = t61 + t62;
+    const real t64 = t63 * t63;
+    const real t65 = H[6] * U[15];
+    const real t66 = H[8] * U[16];
+    const real t67 = t65 + t66;
+    const real t68 = H[10] * U[17];
+    const real t69 = t67 + t68;
+    const real t70 = t69 * t69;
+    const real t71 = H[4] * U[11];
+    const real t72 = H[6] * U[12];
+    const real t73 = t71 + t72;
+    const real t74 = H[8] * U[13];
+    const real t75 = t73 + t74;
+    const real t76 = H[10] * U[14];
+    const real t77 = t75 + t76;
+    const real t78 = t77 * t77;
+    const real t79 = H[2] * U[6];
+    const real t80 = H[4] * U[7];
+    const real t81 = t79 + t80;
+    const real t82 = H[6] * U[8];
+    const real t83 = t81 + t82;
+    const real t84 = H[8] * U[9];
+    const real t85 = t83 + t84;
+    const real t86 = H[10] * U[10];
+    const real t87 = t85 + t86;
+    const real t88 = t87 * t87;
+    const real t89 = H[0] * U[0];
+    const real t90 = H[2] * U[1];
+    const real t91 = t89 + t90;
+    const real t92 = H[4] * U[2];
+    const real t93 = t91 + t92;
+    const real t94 = H[6] * U[3];
+    const real t95 = t93 + t94;
+    const real t96 = H[8] * U[4];
+    const real t97 = t95 + t96;
+    const real t98 = H[10] * U[5];
+    const real t99 = t97 + t98;
+    const real t100 = t99 * t99;
+    const real t101 = J[0] + t100;
+    const real t102 = t88 + t101;
+    const real t103 = t78 + t102;
+    const real t104 = t70 + t103;
+    const real t105 = t64 + t104;
+    const real t106 = t60 + t105;
+    const real t107 = t58 < t106;
+    if (!(t107 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+    const real t108 = H[5] * H[5];
+    const real t109 = H[1] * H[1];
+    const real t110 = H[3] * H[3];
+    const real t111 = t109 + t110;
+    const real t112 = t108 + t111;
+    const real t113 = t18 * t112;
+    const real t114 = H[11] * H[11];
+    const real t115 = H[7] * H[7];
+    const real t116 = H[9] * H[9];
+    const real t117 = t115 + t116;
+    const real t118 = t114 + t117;
+    const real t119 = t56 * t118;
+    const real t120 = t113 + t119;
+    const real t121 = H[11] * U[20];
+    const real t122 = t121 * t121;
+    const real t123 = H[9] * U[18];
+    const real t124 = H[11] * U[19];
+    const real t125 = t123 + t124;
+    const real t126 = t125 * t125;
+    const real t127 = H[7] * U[15];
+    const real t128 = H[9] * U[16];
+    const real t129 = t127 + t128;
+    const real t130 = H[11] * U[17];
+    const real t131 = t129 + t130;
+    const real t132 = t131 * t131;
+    const real t133 = H[5] * U[11];
+    const real t134 = H[7] * U[12];
+    const real t135 = t133 + t134;
+    const real t136 = H[9] * U[13];
+    const real t137 = t135 + t136;
+    const real t138 = H[11] * U[14];
+    const real t139 = t137 + t138;
+    const real t140 = t139 * t139;
+    const real t141 = H[3] * U[6];
+    const real t142 = H[5] * U[7];
+    const real t143 = t141 + t142;
+    const real t144 = H[7] * U[8];
+    const real t145 = t143 + t144;
+    const real t146 = H[9] * U[9];
+    const real t147 = t145 + t146;
+    const real t148 = H[11] * U[10];
+    const real t149 = t147 + t148;
+    const real t150 = t149 * t149;
+    const real t151 = H[1] * U[0];
+    const real t152 = H[3] * U[1];
+    const real t153 = t151 + t152;
+    const real t154 = H[5] * U[2];
+    const real t155 = t153 + t154;
+    const real t156 = H[7] * U[3];
+    const real t157 = t155 + t156;
+    const real t158 = H[9] * U[4];
+    const real t159 = t157 + t158;
+    const real t160 = H[11] * U[5];
+    const real t161 = t159 + t160;
+    const real t162 = t161 * t161;
+    const real t163 = J[1] + t162;
+    const real t164 = t150 + t163;
+    const real t165 = t140 + t164;
+    const real t166 = t132 + t165;
+    const real t167 = t126 + t166;
+    const real t168 = t122 + t167;
+    const real t169 = t120 < t168;
+    if (!(t169 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+    const real t170 = 1e-26 * t106;
+    const real t171 = sqrt(J[0]);
+    const real t172 = t171 * t171;
+    const real t173 = t60 + t172;
+    const real t174 = sqrt(t173);
+    const real t175 = t174 * t174;
+    const real t176 = t64 + t175;
+    const real t177 = sqrt(t176);
+    const real t178 = t177 * t177;
+    const real t179 = t70 + t178;
+    const real t180 = sqrt(t179);
+    const real t181 = t180 * t180;
+    const real t182 = t78 + t181;
+    const real t183 = sqrt(t182);
+    const real t184 = t183 * t183;
+    const real t185 = t88 + t184;
+    const real t186 = sqrt(t185);
+    const real t187 = t186 * t186;
+    const real t188 = t100 + t187;
+    const real t189 = sqrt(t188);
+    const real t190 = t189 * t189;
+    const real t191 = t170 < t190;
+    if (!(t191 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t192 = 1e-26 * t168;
+    const real t193 = 0.0 < t186;
+    const real t194 = t193 != 0 ? t186 : 1.0;
+    const real t195 = 1.0 / t194;
+    const real t196 = t87 * t195;
+    const real t197 = t193 != 0 ? t196 : 1.0;
+    const real t198 = t149 * t197;
+    const real t199 = 0.0 < t183;
+    const real t200 = t199 != 0 ? t183 : 1.0;
+    const real t201 = 1.0 / t200;
+    const real t202 = t77 * t201;
+    const real t203 = t199 != 0 ? t202 : 1.0;
+    const real t204 = t139 * t203;
+    const real t205 = 0.0 < t180;
+    const real t206 = t205 != 0 ? t180 : 1.0;
+    const real t207 = 1.0 / t206;
+    const real t208 = t69 * t207;
+    const real t209 = t205 != 0 ? t208 : 1.0;
+    const real t210 = t131 * t209;
+    const real t211 = 0.0 < t177;
+    const real t212 = t211 != 0 ? t177 : 1.0;
+    const real t213 = 1.0 / t212;
+    const real t214 = t63 * t213;
+    const real t215 = t211 != 0 ? t214 : 1.0;
+    const real t216 = t125 * t215;
+    const real t217 = 0.0 < t174;
+    const real t218 = t217 != 0 ? t174 : 1.0;
+    const real t219 = 1.0 / t218;
+    const real t220 = t59 * t219;
+    const real t221 = t217 != 0 ? t220 : 1.0;
+    const real t222 = t121 * t221;
+    const real t223 = t174 * t213;
+    const real t224 = t222 * t223;
+    const real t225 = t216 + t224;
+    const real t226 = t177 * t207;
+    const real t227 = t225 * t226;
+    const real t228 = t210 + t227;
+    const real t229 = t180 * t201;
+    const real t230 = t228 * t229;
+    const real t231 = t204 + t230;
+    const real t232 = t183 * t195;
+    const real t233 = t231 * t232;
+    const real t234 = t198 + t233;
+    const real t235 = 0.0 < t189;
+    const real t236 = t235 != 0 ? t189 : 1.0;
+    const real t237 = 1.0 / t236;
+    const real t238 = t99 * t237;
+    const real t239 = t235 != 0 ? t238 : 1.0;
+    const real t240 = t234 * t239;
+    const real t241 = t186 * t237;
+    const real t242 = t161 * t241;
+    const real t243 = t240 - t242;
+    const real t244 = t243 * t243;
+    const real t245 = t231 * t197;
+    const real t246 = t149 * t232;
+    const real t247 = t245 - t246;
+    const real t248 = t247 * t247;
+    const real t249 = t228 * t203;
+    const real t250 = t139 * t229;
+    const real t251 = t249 - t250;
+    const real t252 = t251 * t251;
+    const real t253 = t225 * t209;
+    const real t254 = t131 * t226;
+    const real t255 = t253 - t254;
+    const real t256 = t255 * t255;
+    const real t257 = t222 * t215;
+    const real t258 = t125 * t223;
+    const real t259 = t257 - t258;
+    const real t260 = t259 * t259;
+    const real t261 = t171 * t219;
+    const real t262 = t121 * t261;
+    const real t263 = t262 * t262;
+    const real t264 = sqrt(J[1]);
+    const real t265 = t264 * t264;
+    const real t266 = t263 + t265;
+    const real t267 = sqrt(t266);
+    const real t268 = t267 * t267;
+    const real t269 = t260 + t268;
+    const real t270 = sqrt(t269);
+    const real t271 = t270 * t270;
+    const real t272 = t256 + t271;
+    const real t273 = sqrt(t272);
+    const real t274 = t273 * t273;
+    const real t275 = t252 + t274;
+    const real t276 = sqrt(t275);
+    const real t277 = t276 * t276;
+    const real t278 = t248 + t277;
+    const real t279 = sqrt(t278);
+    const real t280 = t279 * t279;
+    const real t281 = t244 + t280;
+    const real t282 = sqrt(t281);
+    const real t283 = t282 * t282;
+    const real t284 = t192 < t283;
+    if (!(t284 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t285 = U[0] * t239;
+    const real t286 = 1.0 / t189;
+    const real t287 = t285 * t286;
+    const real t288 = t161 * t239;
+    const real t289 = t234 * t241;
+    const real t290 = t288 + t289;
+    const real t291 = t290 * t286;
+    const real t292 = U[0] * t241;
+    const real t293 = 0.0 < t282;
+    const real t294 = t293 != 0 ? t282 : 1.0;
+    const real t295 = 1.0 / t294;
+    const real t296 = t243 * t295;
+    const real t297 = t293 != 0 ? t296 : 1.0;
+    const real t298 = t292 * t297;
+    const real t299 = 1.0 / t282;
+    const real t300 = t298 * t299;
+    const real t301 = t291 * t300;
+    const real t302 = t287 + t301;
+    G[0] = t302;
+    const real t303 = U[1] * t239;
+    const real t304 = U[6] * t197;
+    const real t305 = t304 * t241;
+    const real t306 = t303 + t305;
+    const real t307 = t306 * t286;
+    const real t308 = t304 * t239;
+    const real t309 = U[1] * t241;
+    const real t310 = t308 - t309;
+    const real t311 = t310 * t297;
+    const real t312 = U[6] * t232;
+    const real t313 = 0.0 < t279;
+    const real t314 = t313 != 0 ? t279 : 1.0;
+    const real t315 = 1.0 / t314;
+    const real t316 = t247 * t315;
+    const real t317 = t313 != 0 ? t316 : 1.0;
+    const real t318 = t312 * t317;
+    const real t319 = t279 * t295;
+    const real t320 = t318 * t319;
+    const real t321 = t311 - t320;
+    const real t322 = t321 * t299;
+    const real t323 = t291 * t322;
+    const real t324 = t307 - t323;
+    G[1] = t324;
+    const real t325 = U[2] * t239;
+    const real t326 = U[7] * t197;
+    const real t327 = U[11] * t203;
+    const real t328 = t327 * t232;
+    const real t329 = t326 + t328;
+    const real t330 = t329 * t241;
+    const real t331 = t325 + t330;
+    const real t332 = t331 * t286;
+    const real t333 = t329 * t239;
+    const real t334 = U[2] * t241;
+    const real t335 = t333 - t334;
+    const real t336 = t335 * t297;
+    const real t337 = t327 * t197;
+    const real t338 = U[7] * t232;
+    const real t339 = t337 - t338;
+    const real t340 = t339 * t317;
+    const real t341 = U[11] * t229;
+    const real t342 = 0.0 < t276;
+    const real t343 = t342 != 0 ? t276 : 1.0;
+    const real t344 = 1.0 / t343;
+    const real t345 = t251 * t344;
+    const real t346 = t342 != 0 ? t345 : 1.0;
+    const real t347 = t341 * t346;
+    const real t348 = t276 * t315;
+    const real t349 = t347 * t348;
+    const real t350 = t340 - t349;
+    const real t351 = t350 * t319;
+    const real t352 = t336 + t351;
+    const real t353 = t352 * t299;
+    const real t354 = t291 * t353;
+    const real t355 = t332 - t354;
+    G[2] = t355;
+    const real t356 = U[3] * t239;
+    const real t357 = U[8] * t197;
+    const real t358 = U[12] * t203;
+    const real t359 = U[15] * t209;
+    const real t360 = t359 * t229;
+    const real t361 = t358 + t360;
+    const real t362 = t361 * t232;
+    const real t363 = t357 + t362;
+    const real t364 = t363 * t241;
+    const real t365 = t356 + t364;
+    const real t366 = t365 * t286;
+    const real t367 = t363 * t239;
+    const real t368 = U[3] * t241;
+    const real t369 = t367 - t368;
+    const real t370 = t369 * t297;
+    const real t371 = t361 * t197;
+    const real t372 = U[8] * t232;
+    const real t373 = t371 - t372;
+    const real t374 = t373 * t317;
+    const real t375 = t359 * t203;
+    const real t376 = U[12] * t229;
+    const real t377 = t375 - t376;
+    const real t378 = t377 * t346;
+    const real t379 = U[15] * t226;
+    const real t380 = 0.0 < t273;
+    const real t381 = t380 != 0 ? t273 : 1.0;
+    const real t382 = 1.0 / t381;
+    const real t383 = t255 * t382;
+    const real t384 = t380 != 0 ? t383 : 1.0;
+    const real t385 = t379 * t384;
+    const real t386 = t273 * t344;
+    const real t387 = t385 * t386;
+    const real t388 = t378 - t387;
+    const real t389 = t388 * t348;
+    const real t390 = t374 + t389;
+    const real t391 = t390 * t319;
+    const real t392 = t370 + t391;
+    const real t393 = t392 * t299;
+    const real t394 = t291 * t393;
+    const real t395 = t366 - t394;
+    G[3] = t395;
+    const real t396 = U[4] * t239;
+    const real t397 = U[9] * t197;
+    const real t398 = U[13] * t203;
+    const real t399 = U[16] * t209;
+    const real t400 = U[18] * t215;
+    const real t401 = t400 * t226;
+    const real t402 = t399 + t401;
+    const real t403 = t402 * t229;
+    const real t404 = t398 + t403;
+    const real t405 = t404 * t232;
+    const real t406 = t397 + t405;
+    const real t407 = t406 * t241;
+    const real t408 = t396 + t407;
+    const real t409 = t408 * t286;
+    const real t410 = t406 * t239;
+    const real t411 = U[4] * t241;
+    const real t412 = t410 - t411;
+    const real t413 = t412 * t297;
+    const real t414 = t404 * t197;
+    const real t415 = U[9] * t232;
+    const real t416 = t414 - t415;
+    const real t417 = t416 * t317;
+    const real t418 = t402 * t203;
+    const real t419 = U[13] * t229;
+    const real t420 = t418 - t419;
+    const real t421 = t420 * t346;
+    const real t422 = t400 * t209;
+    const real t423 = U[16] * t226;
+    const real t424 = t422 - t423;
+    const real t425 = t424 * t384;
+    const real t426 = U[18] * t223;
+    const real t427 = 0.0 < t270;
+    const real t428 = t427 != 0 ? t270 : 1.0;
+    const real t429 = 1.0 / t428;
+    const real t430 = t259 * t429;
+    const real t431 = t427 != 0 ? t430 : 1.0;
+    const real t432 = t426 * t431;
+    const real t433 = t270 * t382;
+    const real t434 = t432 * t433;
+    const real t435 = t425 - t434;
+    const real t436 = t435 * t386;
+    const real t437 = t421 + t436;
+    const real t438 = t437 * t348;
+    const real t439 = t417 + t438;
+    const real t440 = t439 * t319;
+    const real t441 = t413 + t440;
+    const real t442 = t441 * t299;
+    const real t443 = t291 * t442;
+    const real t444 = t409 - t443;
+    G[4] = t444;
+    const real t445 = U[5] * t239;
+    const real t446 = U[10] * t197;
+    const real t447 = U[14] * t203;
+    const real t448 = U[17] * t209;
+    const real t449 = U[19] * t215;
+    const real t450 = U[20] * t221;
+    const real t451 = t450 * t223;
+    const real t452 = t449 + t451;
+    const real t453 = t452 * t226;
+    const real t454 = t448 + t453;
+    const real t455 = t454 * t229;
+    const real t456 = t447 + t455;
+    const real t457 = t456 * t232;
+    const real t458 = t446 + t457;
+    const real t459 = t458 * t241;
+    const real t460 = t445 + t459;
+    const real t461 = t460 * t286;
+    const real t462 = t458 * t239;
+    const real t463 = U[5] * t241;
+    const real t464 = t462 - t463;
+    const real t465 = t464 * t297;
+    const real t466 = t456 * t197;
+    const real t467 = U[10] * t232;
+    const real t468 = t466 - t467;
+    const real t469 = t468 * t317;
+    const real t470 = t454 * t203;
+    const real t471 = U[14] * t229;
+    const real t472 = t470 - t471;
+    const real t473 = t472 * t346;
+    const real t474 = t452 * t209;
+    const real t475 = U[17] * t226;
+    const real t476 = t474 - t475;
+    const real t477 = t476 * t384;
+    const real t478 = t450 * t215;
+    const real t479 = U[19] * t223;
+    const real t480 = t478 - t479;
+    const real t481 = t480 * t431;
+    const real t482 = U[20] * t261;
+    const real t483 = 0.0 < t267;
+    const real t484 = t483 != 0 ? t267 : 1.0;
+    const real t485 = 1.0 / t484;
+    const real t486 = t262 * t485;
+    const real t487 = -t486;
+    const real t488 = t483 != 0 ? t487 : 1.0;
+    const real t489 = t482 * t488;
+    const real t490 = t267 * t429;
+    const real t491 = t489 * t490;
+    const real t492 = t481 - t491;
+    const real t493 = t492 * t433;
+    const real t494 = t477 + t493;
+    const real t495 = t494 * t386;
+    const real t496 = t473 + t495;
+    const real t497 = t496 * t348;
+    const real t498 = t469 + t497;
+    const real t499 = t498 * t319;
+    const real t500 = t465 + t499;
+    const real t501 = t500 * t299;
+    const real t502 = t291 * t501;
+    const real t503 = t461 - t502;
+    G[5] = t503;
+    const real t504 = -t300;
+    G[6] = t504;
+    G[7] = t322;
+    G[8] = t353;
+    G[9] = t393;
+    G[10] = t442;
+    G[11] = t501;
+    const real t505 = t10 * 1e-26;
+    const real t506 = t505 < t10;
+    const real t507 = t506 != 0 ? 0.0 : e[0];
+    const real t508 = H[0] * t507;
+    const real t509 = t8 + t11;
+    const real t510 = 1e-26 * t509;
+    const real t511 = t510 < t8;
+    const real t512 = 1.0 / U[0];
+    const real t513 = e[0] * t512;
+    const real t514 = t506 != 0 ? t513 : 0.0;
+    const real t515 = U[1] * t514;
+    const real t516 = e[1] - t515;
+    const real t517 = t511 != 0 ? 0.0 : t516;
+    const real t518 = H[2] * t517;
+    const real t519 = t508 + t518;
+    const real t520 = t9 + t7;
+    const real t521 = t6 + t520;
+    const real t522 = 1e-26 * t521;
+    const real t523 = t522 < t6;
+    const real t524 = U[2] * t514;
+    const real t525 = 1.0 / U[6];
+    const real t526 = t516 * t525;
+    const real t527 = t511 != 0 ? t526 : 0.0;
+    const real t528 = U[7] * t527;
+    const real t529 = t524 + t528;
+    const real t530 = e[2] - t529;
+    const real t531 = t523 != 0 ? 0.0 : t530;
+    const real t532 = H[4] * t531;
+    const real t533 = t519 + t532;
+    const real t534 = t39 + t37;
+    const real t535 = t34 + t534;
+    const real t536 = t31 + t535;
+    const real t537 = 1e-26 * t536;
+    const real t538 = t537 < t31;
+    const real t539 = 1.0 / U[11];
+    const real t540 = t530 * t539;
+    const real t541 = t523 != 0 ? t540 : 0.0;
+    const real t542 = U[12] * t541;
+    const real t543 = U[3] * t514;
+    const real t544 = U[8] * t527;
+    const real t545 = t543 + t544;
+    const real t546 = t542 + t545;
+    const real t547 = e[3] - t546;
+    const real t548 = t538 != 0 ? 0.0 : t547;
+    const real t549 = H[6] * t548;
+    const real t550 = t533 + t549;
+    const real t551 = t40 + t36;
+    const real t552 = t33 + t551;
+    const real t553 = t30 + t552;
+    const real t554 = t28 + t553;
+    const real t555 = 1e-26 * t554;
+    const real t556 = t555 < t28;
+    const real t557 = 1.0 / U[15];
+    const real t558 = t547 * t557;
+    const real t559 = t538 != 0 ? t558 : 0.0;
+    const real t560 = U[16] * t559;
+    const real t561 = U[13] * t541;
+    const real t562 = U[4] * t514;
+    const real t563 = U[9] * t527;
+    const real t564 = t562 + t563;
+    const real t565 = t561 + t564;
+    const real t566 = t560 + t565;
+    const real t567 = e[4] - t566;
+    const real t568 = t556 != 0 ? 0.0 : t567;
+    const real t569 = H[8] * t568;
+    const real t570 = t550 + t569;
+    const real t571 = t38 + t35;
+    const real t572 = t32 + t571;
+    const real t573 = t29 + t572;
+    const real t574 = t27 + t573;
+    const real t575 = t26 + t574;
+    const real t576 = 1e-26 * t575;
+    const real t577 = t576 < t26;
+    const real t578 = 1.0 / U[18];
+    const real t579 = t567 * t578;
+    const real t580 = t556 != 0 ? t579 : 0.0;
+    const real t581 = U[19] * t580;
+    const real t582 = U[17] * t559;
+    const real t583 = U[14] * t541;
+    const real t584 = U[5] * t514;
+    const real t585 = U[10] * t527;
+    const real t586 = t584 + t585;
+    const real t587 = t583 + t586;
+    const real t588 = t582 + t587;
+    const real t589 = t581 + t588;
+    const real t590 = e[5] - t589;
+    const real t591 = t577 != 0 ? 0.0 : t590;
+    const real t592 = H[10] * t591;
+    const real t593 = t570 + t592;
+    const real t594 = tau[0] - t593;
+    const real t595 = t594 * t286;
+    const real t596 = d[0] + t514;
+    const real t597 = t596 * t239;
+    const real t598 = d[1] + t527;
+    const real t599 = t598 * t197;
+    const real t600 = d[2] + t541;
+    const real t601 = t600 * t203;
+    const real t602 = d[3] + t559;
+    const real t603 = t602 * t209;
+    const real t604 = d[4] + t580;
+    const real t605 = t604 * t215;
+    const real t606 = 1.0 / U[20];
+    const real t607 = t590 * t606;
+    const real t608 = t577 != 0 ? t607 : 0.0;
+    const real t609 = d[5] + t608;
+    const real t610 = t609 * t221;
+    const real t611 = t610 * t223;
+    const real t612 = t605 + t611;
+    const real t613 = t612 * t226;
+    const real t614 = t603 + t613;
+    const real t615 = t614 * t229;
+    const real t616 = t601 + t615;
+    const real t617 = t616 * t232;
+    const real t618 = t599 + t617;
+    const real t619 = t618 * t241;
+    const real t620 = t597 + t619;
+    const real t621 = t595 - t620;
+    const real t622 = t286 * t621;
+    const real t623 = H[1] * t507;
+    const real t624 = H[3] * t517;
+    const real t625 = t623 + t624;
+    const real t626 = H[5] * t531;
+    const real t627 = t625 + t626;
+    const real t628 = H[7] * t548;
+    const real t629 = t627 + t628;
+    const real t630 = H[9] * t568;
+    const real t631 = t629 + t630;
+    const real t632 = H[11] * t591;
+    const real t633 = t631 + t632;
+    const real t634 = tau[1] - t633;
+    const real t635 = t594 * t291;
+    const real t636 = t634 - t635;
+    const real t637 = t299 * t636;
+    const real t638 = t618 * t239;
+    const real t639 = t596 * t241;
+    const real t640 = t638 - t639;
+    const real t641 = t640 * t297;
+    const real t642 = t616 * t197;
+    const real t643 = t598 * t232;
+    const real t644 = t642 - t643;
+    const real t645 = t644 * t317;
+    const real t646 = t614 * t203;
+    const real t647 = t600 * t229;
+    const real t648 = t646 - t647;
+    const real t649 = t648 * t346;
+    const real t650 = t612 * t209;
+    const real t651 = t602 * t226;
+    const real t652 = t650 - t651;
+    const real t653 = t652 * t384;
+    const real t654 = t610 * t215;
+    const real t655 = t604 * t223;
+    const real t656 = t654 - t655;
+    const real t657 = t656 * t431;
+    const real t658 = t609 * t261;
+    const real t659 = t658 * t488;
+    const real t660 = t659 * t490;
+    const real t661 = t657 - t660;
+    const real t662 = t661 * t433;
+    const real t663 = t653 + t662;
+    const real t664 = t663 * t386;
+    const real t665 = t649 + t664;
+    const real t666 = t665 * t348;
+    const real t667 = t645 + t666;
+    const real t668 = t667 * t319;
+    const real t669 = t641 + t668;
+    const real t670 = t637 - t669;
+    const real t671 = t299 * t670;
+    const real t672 = t291 * t671;
+    const real t673 = t622 - t672;
+    g[0] = t673;
+    g[1] = t671;
+    const real t674 = t292 * t319;
+    const real t675 = t674 < 0.0;
+    const real t676 = t675 != 0 ? (-1.0) : 1.0;
+    const real t677 = t674 * t676;
+    V[0] = t677;
+    const real t678 = t318 * t297;
+    const real t679 = t310 * t319;
+    const real t680 = t678 + t679;
+    const real t681 = t680 * t676;
+    const real t682 = -t681;
+    V[1] = t682;
+    const real t683 = t350 * t297;
+    const real t684 = t335 * t319;
+    const real t685 = t683 - t684;
+    const real t686 = t685 * t676;
+    V[2] = t686;
+    const real t687 = t390 * t297;
+    const real t688 = t369 * t319;
+    const real t689 = t687 - t688;
+    const real t690 = t689 * t676;
+    V[3] = t690;
+    const real t691 = t439 * t297;
+    const real t692 = t412 * t319;
+    const real t693 = t691 - t692;
+    const real t694 = t693 * t676;
+    V[4] = t694;
+    const real t695 = t498 * t297;
+    const real t696 = t464 * t319;
+    const real t697 = t695 - t696;
+    const real t698 = t697 * t676;
+    V[5] = t698;
+    const real t699 = t312 * t348;
+    const real t700 = t699 < 0.0;
+    const real t701 = t700 != 0 ? (-1.0) : 1.0;
+    const real t702 = t699 * t701;
+    V[6] = t702;
+    const real t703 = t347 * t317;
+    const real t704 = t339 * t348;
+    const real t705 = t703 + t704;
+    const real t706 = t705 * t701;
+    const real t707 = -t706;
+    V[7] = t707;
+    const real t708 = t388 * t317;
+    const real t709 = t373 * t348;
+    const real t710 = t708 - t709;
+    const real t711 = t710 * t701;
+    V[8] = t711;
+    const real t712 = t437 * t317;
+    const real t713 = t416 * t348;
+    const real t714 = t712 - t713;
+    const real t715 = t714 * t701;
+    V[9] = t715;
+    const real t716 = t496 * t317;
+    const real t717 = t468 * t348;
+    const real t718 = t716 - t717;
+    const real t719 = t718 * t701;
+    V[10] = t719;
+    const real t720 = t341 * t386;
+    const real t721 = t720 < 0.0;
+    const real t722 = t721 != 0 ? (-1.0) : 1.0;
+    const real t723 = t720 * t722;
+    V[11] = t723;
+    const real t724 = t385 * t346;
+    const real t725 = t377 * t386;
+    const real t726 = t724 + t725;
+    const real t727 = t726 * t722;
+    const real t728 = -t727;
+    V[12] = t728;
+    const real t729 = t435 * t346;
+    const real t730 = t420 * t386;
+    const real t731 = t729 - t730;
+    const real t732 = t731 * t722;
+    V[13] = t732;
+    const real t733 = t494 * t346;
+    const real t734 = t472 * t386;
+    const real t735 = t733 - t734;
+    const real t736 = t735 * t722;
+    V[14] = t736;
+    const real t737 = t379 * t433;
+    const real t738 = t737 < 0.0;
+    const real t739 = t738 != 0 ? (-1.0) : 1.0;
+    const real t740 = t737 * t739;
+    V[15] = t740;
+    const real t741 = t432 * t384;
+    const real t742 = t424 * t433;
+    const real t743 = t741 + t742;
+    const real t744 = t743 * t739;
+    const real t745 = -t744;
+    V[16] = t745;
+    const real t746 = t492 * t384;
+    const real t747 = t476 * t433;
+    const real t748 = t746 - t747;
+    const real t749 = t748 * t739;
+    V[17] = t749;
+    const real t750 = t426 * t490;
+    const real t751 = t750 < 0.0;
+    const real t752 = t751 != 0 ? (-1.0) : 1.0;
+    const real t753 = t750 * t752;
+    V[18] = t753;
+    const real t754 = t489 * t431;
+    const real t755 = t480 * t490;
+    const real t756 = t754 + t755;
+    const real t757 = t756 * t752;
+    const real t758 = -t757;
+    V[19] = t758;
+    const real t759 = t264 * t485;
+    const real t760 = t482 * t759;
+    const real t761 = t760 < 0.0;
+    const real t762 = t761 != 0 ? (-1.0) : 1.0;
+    const real t763 = t760 * t762;
+    V[20] = t763;
+    const real t764 = t667 * t297;
+    const real t765 = t640 * t319;
+    const real t766 = t764 - t765;
+    const real t767 = t766 * t676;
+    d_V[0] = t767;
+    const real t768 = t665 * t317;
+    const real t769 = t644 * t348;
+    const real t770 = t768 - t769;
+    const real t771 = t770 * t701;
+    d_V[1] = t771;
+    const real t772 = t663 * t346;
+    const real t773 = t648 * t386;
+    const real t774 = t772 - t773;
+    const real t775 = t774 * t722;
+    d_V[2] = t775;
+    const real t776 = t661 * t384;
+    const real t777 = t652 * t433;
+    const real t778 = t776 - t777;
+    const real t779 = t778 * t739;
+    d_V[3] = t779;
+    const real t780 = t659 * t431;
+    const real t781 = t656 * t490;
+    const real t782 = t780 + t781;
+    const real t783 = t782 * t752;
+    const real t784 = -t783;
+    d_V[4] = t784;
+    const real t785 = t658 * t759;
+    const real t786 = t785 * t762;
+    d_V[5] = t786;
+    const real t787 = t594 * t302;
+    const real t788 = t634 * t300;
+    const real t789 = t787 - t788;
+    const real t790 = t507 + t789;
+    e_Q[0] = t790;
+    const real t791 = t594 * t324;
+    const real t792 = t634 * t322;
+    const real t793 = t791 + t792;
+    const real t794 = t517 + t793;
+    e_Q[1] = t794;
+    const real t795 = t594 * t355;
+    const real t796 = t634 * t353;
+    const real t797 = t795 + t796;
+    const real t798 = t531 + t797;
+    e_Q[2] = t798;
+    const real t799 = t594 * t395;
+    const real t800 = t634 * t393;
+    const real t801 = t799 + t800;
+    const real t802 = t548 + t801;
+    e_Q[3] = t802;
+    const real t803 = t594 * t444;
+    const real t804 = t634 * t442;
+    const real t805 = t803 + t804;
+    const real t806 = t568 + t805;
+    e_Q[4] = t806;
+    const real t807 = t594 * t503;
+    const real t808 = t634 * t501;
+    const real t809 = t807 + t808;
+    const real t810 = t591 + t809;
+    e_Q[5] = t810;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_qr_eliminate_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_qr_eliminate_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"floor", 2, "kg, kg*m2", 0, 0},
+    {"U", 21, "", 0, 0},
+    {"d", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_qr_eliminate_outputs[] = {
+    {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0},
+    {"V", 21, "", 0, 0},
+    {"d_V", 6, "", 0, 0},
+    {"e_Q", 6, "N, N*m", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic2_qr_eliminate_guards[] = {
+    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
+    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
 };
 
 /* motion of Q across a hinge with 2 speeds
@@ -5474,6 +6397,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "qr_eliminate",
+        .function = (void (*)(void))mstmm_sweep_generic2_qr_eliminate,
+        .call = mstmm_sweep_generic2_qr_eliminate_call,
+        .n_inputs = 7,
+        .n_outputs = 5,
+        .inputs = mstmm_sweep_generic2_qr_eliminate_inputs,
+        .outputs = mstmm_sweep_generic2_qr_eliminate_outputs,
+        .ir_hash = "93eda12798f2dffc626e2d1a9536d09d843fa5879013d00446f13909283e4648",
+        .n_guards = 4,
+        .guards = mstmm_sweep_generic2_qr_eliminate_guards,
+    },
+    {
         .name = "tangent_carrier",
         .function = (void (*)(void))mstmm_sweep_generic2_tangent_carrier,
         .call = mstmm_sweep_generic2_tangent_carrier_call,
@@ -5635,7 +6570,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "88f15832bf25fa2eff89a0f691f12c7681eb0c7788dbded4808067fd3a4b69ee",
+    .hash = "838dea7e883d6179e329f9e31e1bd5f7c6ec4bd79e0dee39d9ec2ba85bd7e1e2",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5645,6 +6580,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 21,
+    .n_kernels = 22,
     .kernels = mstmm_sweep_generic2_kernels,
 };

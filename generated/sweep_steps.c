@@ -89,6 +89,16 @@ mstmm_generic_answer_kernel *const mstmm_generic_answer_table[] = {
     mstmm_sweep_generic6_answer,
 };
 
+mstmm_generic_qr_eliminate_kernel *const mstmm_generic_qr_eliminate_table[] = {
+    mstmm_sweep_generic0_qr_eliminate,
+    mstmm_sweep_generic1_qr_eliminate,
+    mstmm_sweep_generic2_qr_eliminate,
+    mstmm_sweep_generic3_qr_eliminate,
+    mstmm_sweep_generic4_qr_eliminate,
+    mstmm_sweep_generic5_qr_eliminate,
+    mstmm_sweep_generic6_qr_eliminate,
+};
+
 mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[] = {
     mstmm_sweep_generic0_forward_slope,
     mstmm_sweep_generic1_forward_slope,
@@ -769,6 +779,77 @@ int mstmm_at_condense(mstmm_state *state, int index)
             .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .S_I = parent + MSTMM_BLOCK_S,
             .e_I = parent + MSTMM_BLOCK_E);
         if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
+    }
+    return 0;
+}
+
+/* Rows of a body alone, and none of its load in them yet. */
+static int mstmm_at_qr_own(mstmm_state *state, int index)
+{
+    real U[21];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (!body->generic) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    mstmm_qr_factor(
+        .S = block + MSTMM_BLOCK_S, .U = U);
+    memcpy(block + MSTMM_BLOCK_S, U, 21 * sizeof(real));
+    memset(block + MSTMM_BLOCK_HINGE_C, 0, 6 * sizeof(real));
+    return 0;
+}
+
+/* Rows of a body, complete, carried across its hinge to the parent. */
+static int mstmm_at_qr_condense(mstmm_state *state, int index)
+{
+    real hinge_J_free[6];
+    real hinge_tau_free[6];
+    real V[21];
+    real d_V[6];
+    real e_Q[6];
+    real U[21];
+    real d[6];
+    real S[21];
+    real e_S[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state, body, columns);
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    for (int k = 0; k < speeds; k++)
+        for (int row = 0; row < 6; row++)
+            (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+    for (int k = 0; k < speeds; k++)
+        hinge_J_free[k] = body->rotor[columns[k]];
+    for (int k = 0; k < speeds; k++)
+        hinge_tau_free[k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[columns[k]];
+    code = mstmm_generic_qr_eliminate(speeds,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free,
+        .floor_ = block + MSTMM_BLOCK_FLOOR, .U = block + MSTMM_BLOCK_S,
+        .d = block + MSTMM_BLOCK_HINGE_C, .e = block + MSTMM_BLOCK_E, .tau = hinge_tau_free,
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
+        .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .V = V, .d_V = d_V, .e_Q = e_Q);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
+    if ((body->parent >= 0)) {
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        mstmm_qr_merge(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .V = V, .d_V = d_V,
+            .e_Q = e_Q, .U_P = parent + MSTMM_BLOCK_S, .d_P = parent + MSTMM_BLOCK_HINGE_C,
+            .U = U, .d = d, .e_I = parent + MSTMM_BLOCK_E);
+        memcpy(parent + MSTMM_BLOCK_S, U, 21 * sizeof(real));
+        memcpy(parent + MSTMM_BLOCK_HINGE_C, d, 6 * sizeof(real));
+    }
+    if ((state->observed || state->balance)) {
+        mstmm_qr_restored(
+            .U = block + MSTMM_BLOCK_S, .d = block + MSTMM_BLOCK_HINGE_C,
+            .e = block + MSTMM_BLOCK_E, .S = S, .e_S = e_S);
+        memcpy(block + MSTMM_BLOCK_S, S, 21 * sizeof(real));
+        memcpy(block + MSTMM_BLOCK_E, e_S, 6 * sizeof(real));
     }
     return 0;
 }
@@ -3815,6 +3896,48 @@ static int mstmm_pass_condense(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_qr_own(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_S + 21);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_pass_qr_own(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_qr_own(state, i, MSTMM_TILE);
+        const int code = mstmm_at_qr_own(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_qr_condense(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_C, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+}
+static int mstmm_pass_qr_condense(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_qr_condense(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_qr_condense(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_recover(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -4717,8 +4840,16 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_hook_links_recover(state);
         if (code) return code;
     }
-    if (!state->linked) {
+    if (!state->linked && !model->qr) {
         code = mstmm_pass_condense(state);
+        if (code) return code;
+    }
+    if (model->qr) {
+        code = mstmm_pass_qr_own(state);
+        if (code) return code;
+    }
+    if (model->qr) {
+        code = mstmm_pass_qr_condense(state);
         if (code) return code;
     }
     if (!state->linked) {

@@ -18,7 +18,7 @@ from sympy.core.relational import Relational
 from sympy.matrices.expressions.matexpr import MatrixElement
 from sympy.matrices.expressions.slice import MatrixSlice
 
-from ..language.derivation import Derivation, Factor, Quantity, Solve, Triangular
+from ..language.derivation import Derivation, Factor, Quantity, Solve, Triangle, Triangular
 
 Matrix = Any  # mpmath.matrix; one with no rows or columns is kept as a plain list of rows
 Number = Any
@@ -198,6 +198,8 @@ class _Values:
         if isinstance(e, Triangular):
             lower = self._unit_lower(e.factor)
             return self._solve(lower.T if e.transposed else lower, e.right)
+        if isinstance(e, Triangle):
+            return self._triangle(self.matrix(e.matrix), e.count)
         raise NotImplementedError(f"no direct value of {type(e).__name__}")
 
     def _product(self, e: sp.MatMul, height: int, width: int) -> Matrix:
@@ -234,6 +236,23 @@ class _Values:
                 for j in range(i):
                     factor[i, j] = root[i, j] / root[j, j]
             return factor
+
+    def _triangle(self, a: Matrix, count: int) -> Matrix:
+        """Rows of R by making the columns orthogonal one after the other; a column that depends on
+        those before it has a row of zeros."""
+        with mpmath.workdps(2 * self.digits):
+            columns = [a[:, j] for j in range(a.cols)]
+            sizes = [mpmath.norm(column) for column in columns]
+            found = mpmath.zeros(count, a.cols)
+            for k in range(count):
+                length = mpmath.norm(columns[k])
+                if length <= sizes[k] * mpmath.mpf(10) ** -self.digits:
+                    continue
+                unit = columns[k] / length
+                for j in range(k, a.cols):
+                    found[k, j] = (unit.T * columns[j])[0]
+                    columns[j] = columns[j] - unit * found[k, j]
+            return found
 
     def _unit_lower(self, factor: sp.Basic) -> sp.ImmutableDenseMatrix:
         """L as an explicit matrix: ones on the diagonal, zeros above."""

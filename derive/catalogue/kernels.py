@@ -13,7 +13,7 @@ from mstmm.ir import KernelIR
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, screw, sweep, tangent, tangent_hinge
+from ..equations import columns, frames, laws, link, qr, screw, sweep, tangent, tangent_hinge
 from ..equations import force as force_kernels
 from ..equations import tangent_placed as placed
 from ..equations.factored import eliminate_factored, recover_factored
@@ -127,6 +127,7 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("factor", columns.factor(nu), sweep.pivot_guards(nu)),
         Kernel("push", columns.push(nu)),
         Kernel("answer", columns.answer(nu)),
+        Kernel("qr_eliminate", qr.qr_eliminate(nu), qr.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),
         *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
@@ -152,6 +153,11 @@ def law_kernels() -> tuple[Kernel, ...]:
 def screw_kernels() -> tuple[Kernel, ...]:
     """Transport across axial screws."""
     return tuple(Kernel(name, derivation) for name, derivation in screw.derivations().items())
+
+
+def qr_kernels() -> tuple[Kernel, ...]:
+    """The sweep as least squares, but for the elimination of hinges."""
+    return tuple(Kernel(make.__name__, make()) for make in (qr.factor, qr.merge, qr.restored))
 
 
 def links() -> dict[str, Hinge]:
@@ -229,6 +235,7 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "frames"] = frame_kernels
     table["sweep", "laws"] = law_kernels
     table["sweep", "screw"] = screw_kernels
+    table["sweep", "qr"] = qr_kernels
     table["sweep", "modal"] = modal_kernels
     table["sweep", "tangent"] = tangent_kernels
     table["sweep", "beam"] = beam_kernels

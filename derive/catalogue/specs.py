@@ -26,6 +26,7 @@ from .kernels import (
     link_kernels,
     links,
     modal_kernels,
+    qr_kernels,
     screw_kernels,
     tangent_kernels,
 )
@@ -110,6 +111,7 @@ def shared_specs() -> list[ElementSpec]:
         plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
         plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels(), "modal")),
         plain(name="tangent", title="tangent of a step", kernels=_lowered(tangent_kernels())),
+        plain(name="qr", title="sweep as least squares", kernels=_lowered(qr_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
             plain(

@@ -18,7 +18,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde
-from .algebra import column, part, stack, symbol
+from .algebra import column, diagonal, part, stack, symbol
 from .hinge import HingeMotion
 
 #: A pivot must exceed this share of the mean inertia of the body that it moves.
@@ -278,29 +278,35 @@ def replace_rows(
 
 
 def pivot_guards(
-    nu: int, subspace: sp.MatrixBase | None = None, floor: sp.Basic = FLOOR.symbol
+    nu: int,
+    subspace: sp.MatrixBase | None = None,
+    floor: sp.Basic = FLOOR.symbol,
+    pivots: sp.MatrixBase | None = None,
+    whole: sp.Basic = S.symbol,
 ) -> tuple[tuple[sp.Basic, int, str], ...]:
     """Each diagonal entry of D against what the body's own inertia lets pass for rounding.
 
     Not against the inertia of all that hangs on it: across the plane of a long planar chain that
     grows with the cube of its length, while the pivots in the plane stay what they are.  A body
-    without inertia of its own has nothing else to be judged by.
+    without inertia of its own has nothing else to be judged by (`whole`, whose diagonal counts).
+    `pivots` is the diagonal of D where D itself is no quantity.
     """
-    pivot = symbol("D", nu, nu)
+    pivots = diagonal(symbol("D", nu, nu)) if pivots is None else pivots
     h = symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
     guards = []
     for i in range(nu):
         along = sum(h[k, i] ** 2 for k in range(3))
         about = sum(h[k, i] ** 2 for k in range(3, 6))
-        least = along * _own_or_all(floor[0, 0], 0) + about * _own_or_all(floor[1, 0], 3)
+        least = along * _own_or_all(floor[0, 0], whole, 0)
+        least += about * _own_or_all(floor[1, 0], whole, 3)
         text = f"speed {i + 1} of {nu} moves no inertia: its acceleration is undetermined"
-        guards.append((pivot[i, i] > least, 1, text))
+        guards.append((pivots[i, 0] > least, 1, text))
     return tuple(guards)
 
 
-def _own_or_all(own: sp.Expr, first: int) -> sp.Expr:
+def _own_or_all(own: sp.Expr, whole: sp.Basic, first: int) -> sp.Expr:
     """The body's own floor, or that of all that hangs on it where the body has no inertia."""
-    return sp.Piecewise((own, own > 0), (floor_of(S.symbol)[first // 3], True))
+    return sp.Piecewise((own, own > 0), (floor_of(whole)[first // 3], True))
 
 
 def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:

@@ -216,6 +216,35 @@ class Triangular(sp.MatrixExpr):
         return ((lower.T if self.transposed else lower).inv() * sp.Matrix(self.args[1]))[i, j]
 
 
+class Triangle(sp.MatrixExpr):
+    """The first `count` rows of R, where A = Q R with orthonormal Q.
+
+    R is upper triangular in the first `count` columns, with a diagonal that is nowhere negative:
+    R^T R = A^T A where A has no more rows.  Lowered to rotations of neighbouring rows, which mix
+    nothing that is known to be zero; rows of any size may stand side by side.
+    """
+
+    def __new__(cls, matrix: sp.Basic, count: int | sp.Integer) -> Triangle:
+        return super().__new__(cls, sp.sympify(matrix), sp.Integer(count))
+
+    @property
+    def matrix(self) -> sp.Basic:
+        return self.args[0]
+
+    @property
+    def count(self) -> int:
+        return int(self.args[1])
+
+    @property
+    def shape(self) -> tuple[sp.Expr, sp.Expr]:
+        return (self.args[1], self.args[0].shape[1])
+
+    def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
+        a = sp.Matrix(self.args[0])
+        q, r = a[:, : self.count].QRdecomposition()
+        return r[i, j] if j < self.count else (q.T * a)[i, j]
+
+
 def vector(name: str, length: int) -> sp.MatrixSymbol:
     """Column of `length` numbers."""
     return sp.MatrixSymbol(name, length, 1)

@@ -13,9 +13,25 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 
 from mstmm.ir import Port
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.unrolled import NodeMatrix, backward, forward, ldl, solve_by_rows, solve_symmetric
+from mstmm.ir.unrolled import (
+    NodeMatrix,
+    backward,
+    forward,
+    ldl,
+    solve_by_rows,
+    solve_symmetric,
+    triangle,
+)
 
-from ..language.derivation import Derivation, Equation, Factor, Quantity, Solve, Triangular
+from ..language.derivation import (
+    Derivation,
+    Equation,
+    Factor,
+    Quantity,
+    Solve,
+    Triangle,
+    Triangular,
+)
 from ..language.functions import FUNCTIONS
 
 
@@ -85,6 +101,7 @@ class Lowering:
             (Solve, self._solve),
             (Factor, self._factor),
             (Triangular, self._triangular),
+            (Triangle, lambda e: triangle(self.graph, self.matrix(e.matrix), e.count)),
         )
         for kind, rule in rules:
             if isinstance(expression, kind):

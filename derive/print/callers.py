@@ -22,6 +22,7 @@ DIRECT = {
     "frames": ("sweep", "frames"),
     "modal": ("sweep", "modal"),
     "tangent": ("sweep", "tangent"),
+    "qr": ("sweep", "qr"),
     "classical_body": ("classical", "body_spatial"),
     "classical_pin": ("classical", "pin_spatial"),
     "classical_ball": ("classical", "ball"),
@@ -74,6 +75,7 @@ POINTED = {
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
+    "qr_eliminate",
     "forward_slope", "effort_slope", "tangent_carrier", "tangent_column", "tangent_along",
     "tangent_steady", "tangent_turning", "tangent_rows", "tangent_reduce", "tangent_push",
     "tangent_answer", "tangent_push_known", "tangent_answer_known",

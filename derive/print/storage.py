@@ -65,6 +65,7 @@ PORT = {
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
+    "body.U": "body.S", "body.d": "hinge.c",
     # One of the two tangents is held at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
     "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",
@@ -231,6 +232,7 @@ def _stored(slot: str) -> str | None:
     owner, _, name = slot.partition(".")
     if owner in ROLES:
         inner = f"body.{'motion' if name == 'w' else name}"
+        inner = SHARED.get(inner, inner)
         return f"{owner} + MSTMM_BLOCK_{BLOCK[inner]}" if inner in BLOCK else None
     if slot in BLOCK:
         return f"block + MSTMM_BLOCK_{BLOCK[slot]}"
@@ -301,7 +303,8 @@ def size_of(slot: str) -> str:
         return "1"
     if name.startswith("law."):
         return "law->n"
-    words = SLOTS[name].size.split()
+    owner, _, own = name.partition(".")
+    words = SLOTS[f"body.{own}" if owner in ROLES else name].size.split()
     return " * ".join({"nu": "nu", "n": "n"}.get(word, word) for word in words)
 
 

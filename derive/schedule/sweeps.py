@@ -8,6 +8,7 @@ from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
 from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
 from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
+from .qr import QR_CONDENSE, QR_OWN
 from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .steps import Pass, Run, Sweep
@@ -49,7 +50,9 @@ ACCELERATIONS = Sweep(
         Run(hook="product", when="product"),
         Run(hook="links_condense", when="linked"),
         Run(hook="links_recover", when="linked"),
-        Run(whole=CONDENSE, when="!linked"),
+        Run(whole=CONDENSE, when="!linked !qr"),
+        Run(whole=QR_OWN, when="qr"),
+        Run(whole=QR_CONDENSE, when="qr"),
         Run(whole=RECOVER, when="!linked"),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(hook="product_compared", when="product"),

@@ -41,6 +41,8 @@ s | nu | prescribed part of the accelerations
 tau | nu | efforts on the speeds
 chosen | nu | accelerations that stop the bias motion along free directions
 own | 21 | S of the body alone
+U | 21 | rows of everything outboard, S = U^T U: the upper triangle
+d | 6 | load that the rows take, f = U^T (U a + d) + e
 w | 3 | angular velocity, own axes: the first of `motion`
 p | np | numbers of the body's kernels
 q | nq | coordinates of the hinge
@@ -295,5 +297,7 @@ TRAITS: dict[str, str] = {
     "posed": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
     "united": "a load is one in a right-hand side",
+    "qr": "the sweep is that of least squares",
+    "kept": "somebody reads S and e behind the sweep",
     "product": "the product of classical matrices is asked for too",
 }

@@ -17,7 +17,7 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.expressions.matexpr import MatrixElement
 from sympy.matrices.expressions.slice import MatrixSlice
 
-from ..language.derivation import Factor, Solve, Triangular
+from ..language.derivation import Factor, Solve, Triangle, Triangular
 from ..language.notation import Perp, Tilde
 from .names import ShownName, shown_name
 from .recognise import Part, recognise
@@ -241,6 +241,9 @@ class _Layout:
         inverse = Raised(lower, Word("−T" if e.transposed else "−1"))
         return Row(_spaced([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
 
+    def triangle(self, e: Triangle) -> tuple[Node, int]:
+        return Row((Word("R"), Fence("(", self.node(e.matrix), ")"))), _ATOM
+
     def cross(self, e: Tilde | Perp) -> tuple[Node, int]:
         accent = "tilde" if isinstance(e, Tilde) else "perp"
         inner = self.node(e.args[0])
@@ -368,6 +371,7 @@ _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
     (Solve, _Layout.solve),
     (Factor, _Layout.factor),
     (Triangular, _Layout.triangular),
+    (Triangle, _Layout.triangle),
     (MatrixElement, _Layout.element),
     (MatrixSlice, _Layout.slice_of),
     ((sp.MatrixSymbol, sp.Symbol), _symbol),

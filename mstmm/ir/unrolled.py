@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import pairwise
 
 from mstmm.ir.graph import Graph, Node
 
@@ -143,6 +144,43 @@ def solve_from_the_last(factors: NodeMatrix, right: list[Node]) -> list[Node]:
             found[i] = found[i] - factors[i][j] * found[j]
         found[i] = found[i] * factors[i][i]
     return found
+
+
+def triangle(graph: Graph, matrix: NodeMatrix, count: int) -> NodeMatrix:
+    """The first `count` rows of R, A = Q R, by rotations of neighbouring rows (Givens).
+
+    Column by column, the lowest row first; entries known to be zero are rotated by nothing.  The
+    diagonal is made nowhere negative.  Of a small row beside a large one the digits stay, whichever
+    is above, which reflections of whole columns do not grant (Bjoerck, Numerical Methods for Least
+    Squares Problems, 1996, ch. 4, on weighted problems).
+    """
+    rows = [list(row) for row in matrix]
+    zero, one = graph.constant(0), graph.constant(1)
+    for k in range(count):
+        there = [i for i in range(k, len(rows)) if rows[i][k].value != 0]
+        for upper, lower in reversed(list(pairwise(there))):
+            _rotate(graph, rows, upper, lower, k)
+        if there and there[0] != k:
+            rows[k], rows[there[0]] = rows[there[0]], rows[k]
+        if len(there) == 1:
+            sign = graph.select(graph.call("lt", rows[k][k], zero), -one, one)
+            rows[k] = [sign * entry for entry in rows[k]]
+    return rows[:count]
+
+
+def _rotate(graph: Graph, rows: NodeMatrix, upper: int, lower: int, k: int) -> None:
+    """Entry k of the lower row made zero, that of the upper one positive; no turn where both are
+    zero."""
+    a, b = rows[upper][k], rows[lower][k]
+    zero, one = graph.constant(0), graph.constant(1)
+    length = graph.call("sqrt", a * a + b * b)
+    there = graph.call("lt", zero, length)
+    share = 1 / graph.select(there, length, one)
+    c, s = graph.select(there, a * share, one), b * share
+    pairs = list(zip(rows[upper], rows[lower], strict=True))
+    rows[upper] = [c * x + s * y for x, y in pairs]
+    rows[lower] = [c * y - s * x for x, y in pairs]
+    rows[upper][k], rows[lower][k] = length, zero
 
 
 def _size(graph: Graph, row: list[Node]) -> Node:

@@ -70,7 +70,7 @@ SIZE = 3
 
 def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
     """Values a kernel could meet: rotations for 3 x 3, definite inertias for 21 numbers and for
-    modal mass matrices.
+    modal mass matrices, no negative inertia of rotors.
 
     Special points are zeros, no rotation, and a unit inertia.
     """
@@ -81,6 +81,8 @@ def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
     if port.shape == (3, 3):
         turn = np.eye(3) if special else np.linalg.qr(rng.normal(size=(3, 3)))[0]
         return [float(v) for v in turn.ravel()]
+    if port.name == "J" and not special:
+        return [float(v) for v in rng.uniform(0, 1, length)]
     if length == 21:
         half = np.zeros((6, 6)) if special else rng.normal(size=(6, 6))
         return [float(v) for v in (half @ half.T + np.eye(6))[np.triu_indices(6)]]

@@ -76,7 +76,8 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .memory = memory, .given = NULL, .efforts = efforts, .column = NULL,
                          .qdot = qdot, .udot = udot, .required = NULL, .answer = NULL,
                          .balance = balance, .failure = failure,
-                         .linked = !(model->needs_pose || model->product), .observed = 0,
+                         .linked = !(model->needs_pose || model->product || model->qr),
+                         .observed = 0,
                          .hinges_known = 0};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);

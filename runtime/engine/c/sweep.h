@@ -144,7 +144,8 @@ typedef struct {
     int n_bodies, nq, nu, n_memory;
     int n_flexible; /* bodies with modes */
     int n_imposed;  /* bodies with speeds that are driven or held */
-    const mstmm_product *product; /* accelerations by the plain product; NULL: Riccati sweep */
+    const mstmm_product *product; /* accelerations by the plain product; NULL: by a sweep */
+    int qr; /* the sweep is that of least squares */
     mstmm_body *bodies;
     int n_runs;
     const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
