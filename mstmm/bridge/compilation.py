@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..runtime.pack.packed import Packed
 
 ENGINES = ("auto", "fused", "looped")
-SWEEPS = ("riccati", "product")
+SWEEPS = ("riccati", "qr", "product")
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,11 @@ def compile_scene(
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
             up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
             is used, and a run or batch long enough to repay the compiler has it built.
-        sweep: "riccati" (any tree), or "product" (the plain product of classical transfer
-            matrices, chains only, guarded).
+        sweep: "riccati" (any tree), "qr" (the same as least squares: slower, but it keeps its
+            digits where heavy bodies hang behind light ones; rigid bodies, looped engine, and
+            explicit methods; `mass_matrix`, `solve` and linear models stay with the Riccati
+            sweep), or "product" (the plain product of classical transfer matrices, chains only,
+            guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
         bake: with "fused", make the scene's numbers part of the code instead of reading them at run
@@ -77,8 +80,8 @@ def compile_scene(
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
     product = accuracy if sweep == "product" else None
-    if engine == "fused" and product is not None:
-        raise SceneError('sweep = "product" has no fused code; use engine = "auto" or "looped"')
+    if engine == "fused" and sweep != "riccati":
+        raise SceneError(f'sweep = "{sweep}" has no fused code; use engine = "auto" or "looped"')
     if bake and engine != "fused":
         raise SceneError(
             "bake = True writes the numbers of the scene into its code; "
@@ -90,7 +93,7 @@ def compile_scene(
     def fusing(packed: Packed, known: Known) -> Fusion:
         return Fusion(packed, known, definitions, refused, bake, most)
 
-    model = Model(scene, elements, fusing, product)
+    model = Model(scene, elements, fusing, product, sweep == "qr")
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()

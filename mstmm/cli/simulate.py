@@ -179,8 +179,9 @@ def simulate(
     ] = False,
     sweep: Annotated[
         str,
-        typer.Option("--sweep", metavar="NAME", help="riccati, or product: the plain product of "
-                     "transfer matrices, for chains, guarded."),
+        typer.Option("--sweep", metavar="NAME", help="riccati, qr: as least squares, for heavy "
+                     "bodies behind light ones, or product: the plain product of transfer "
+                     "matrices, for chains, guarded."),
     ] = "riccati",
     engine: Annotated[
         str,

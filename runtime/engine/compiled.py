@@ -33,10 +33,11 @@ class Compiled:
         known: Known | None = None,
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
+        least_squares: bool = False,
     ) -> None:
         self.scene, self.known = scene, known
         self._fusing, self._product_accuracy = fusing, product_accuracy
-        self.looped = Engine(pack(scene, known, product_accuracy))
+        self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
 
     @property
@@ -92,7 +93,7 @@ class Compiled:
         """
         changed = type(self)(
             named_parameters.changed(self.scene, changes), self.known, self._fusing,
-            self._product_accuracy,
+            self._product_accuracy, self.packed.qr,
         )  # fmt: skip
         changed.fusion.follow(self.fusion)
         return changed

@@ -27,6 +27,8 @@ _MOST = 2000
 
 def concerns(model: Compiled) -> bool:
     """Whether masses are so unlike that digits may be lost."""
+    if model.packed.qr:
+        return False
     return len(model.scene.bodies) <= _MOST and _WORST * _unlike(model.scene) >= LOSS
 
 

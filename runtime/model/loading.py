@@ -103,7 +103,9 @@ def _rebuilt(data: Any, path: Path) -> Result:
     scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
-    model, run = Model(scene, known=elements), provenance.trajectory(data)
+    least_squares = data.attrs.get("sweep") == "qr"
+    model = Model(scene, known=elements, least_squares=least_squares)
+    run = provenance.trajectory(data)
     if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != kernels_hash(model):

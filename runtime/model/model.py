@@ -44,8 +44,9 @@ class Model(Compiled):
         known: Known | None = None,
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
+        least_squares: bool = False,
     ) -> None:
-        super().__init__(scene, known, fusing, product_accuracy)
+        super().__init__(scene, known, fusing, product_accuracy, least_squares)
         self._differentiations: dict[tuple[str, ...], Differentiation] = {}
 
     def initial_state(self) -> tuple[Array, Array]:

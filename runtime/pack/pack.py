@@ -8,10 +8,10 @@ from mstmm.scene import Scene
 
 from ..flexible.modal_body import ModalBody
 from ..kernels import prebuilt
+from . import product, qr
 from .elements import Known
 from .internal import system_of
 from .packed import Packed, resize
-from .product import attach
 from .records.model import write
 
 
@@ -20,13 +20,14 @@ def pack(
     known: Known | None = None,
     product_accuracy: float | None = None,
     *,
+    least_squares: bool = False,
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
 ) -> Packed:
     """Engine arrays of a scene; as `system_of`.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
-    may deviate from the Riccati sweep by that much.
+    may deviate from the Riccati sweep by that much; with `least_squares` from the QR sweep.
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible)
     ffi, lib = prebuilt.module()
@@ -36,6 +37,8 @@ def pack(
         scratch=written.scratch,
     )  # fmt: skip
     if product_accuracy is not None:
-        attach(packed, product_accuracy)
+        product.attach(packed, product_accuracy)
+    if least_squares:
+        qr.attach(packed)
     resize(packed, written.slots)  # tapes of events are laid out later and may need more
     return packed

@@ -23,7 +23,8 @@ class Packed(Frames):
     """A scene in internal frames, in Python and in the engine's arrays.
 
     `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
-    largest workspace of a tape, `workspace` the whole length.
+    largest workspace of a tape, `workspace` the whole length; `qr` is whether the sweep is that of
+    least squares.
     """
 
     system: System
@@ -35,6 +36,7 @@ class Packed(Frames):
     tape_slots: int = 0
     workspace: int = 0
     product: Any = None
+    qr: bool = False
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 

@@ -1,0 +1,211 @@
+"""The sweep as least squares: what it computes on any tree, and the digits that it keeps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from motions.precise import error, precise_accelerations
+from reference import newton_euler as dense
+from reference import random_scenes
+from reference.compare import drawn, fresh, worst
+from reference.jets import Array
+from reference.tree import SIZES
+from support.rod_scenes import chain, drawn_state
+
+import mstmm
+from mstmm.errors import SceneError
+
+ACCURACY = 1e-12
+TIME = 0.3
+COUNT = 8
+
+
+def compiled(scene: dict[str, Any], **options: Any) -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**scene), sweep="qr", **options)
+
+
+def riccati(scene: dict[str, Any]) -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
+
+
+# --- any tree -----------------------------------------------------------------------------------
+
+
+def compare(scene: dict[str, Any], q: Array, u: Array) -> None:
+    """Accelerations with the dense equations, loads, efforts and power with the other sweep."""
+    model, expected = compiled(scene), dense.solve(scene, q, u, TIME).udot
+    assert worst(model.accelerations(q, u, t=TIME), expected) < ACCURACY
+    here: dict[str, Any] = {"t_start": TIME, "t_end": TIME, "initial": (q, u)}
+    found, other = model.simulate(**here), riccati(scene).simulate(**here)
+    size = max(body["mass"] for body in scene["body"]) * np.abs(expected).max(initial=1.0)
+    for name in (hinge["name"] for hinge in scene["hinge"]):
+        for quantity in ("force", "moment", "effort"):
+            a, b = (np.asarray(getattr(run, quantity)(name)) for run in (found, other))
+            assert np.abs(a - b).max(initial=0.0) < 1e-11 * max(size, 1.0), (name, quantity)
+    assert worst(found.energy(), other.energy()) < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(300, 330))
+def test_random_trees(seed: int) -> None:
+    compare(*drawn(seed))
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_chains_of_one_type(kind: str, rng: np.random.Generator) -> None:
+    compare(*fresh(rng, types=(kind,), chain=True, most=5))
+
+
+@pytest.mark.parametrize("seed", range(330, 336))
+def test_driven_coordinates(seed: int) -> None:
+    types = ("pin", "cylindrical", "planar", "universal", "gimbal", "screw", "prismatic")
+    scene = random_scenes.random_scene(seed, types=types, most=5)
+    for number, hinge in enumerate(scene["hinge"]):
+        if number % 2 == 0:
+            free = ["free"] * (SIZES[hinge["type"]][1] - 1)
+            hinge["drive"] = ["0.3*sin(2*t)^2 + 0.1*exp(-t)", *free]
+    q, u = random_scenes.random_state(scene, seed)
+    dense.fill_driven(scene, q, u, TIME)
+    compare(scene, q, u)
+
+
+# --- heavy bodies behind light ones -------------------------------------------------------------
+
+HEAVY: dict[str, dict[str, Any]] = {
+    "planar pins": chain(["pin"] * COUNT),
+    "skew pins": chain(["pin"] * COUNT, 0.6),
+    "balls": chain(["ball"] * COUNT, 0.6),
+    "free root": chain(["free", *["pin"] * (COUNT - 1)], 0.6),
+}
+
+
+def with_tip(scene: dict[str, Any], ratio: float) -> dict[str, Any]:
+    """The last body so many times as heavy."""
+    *others, tip = scene["body"]
+    heavy = tip | {"mass": ratio, "inertia": [ratio * value for value in tip["inertia"]]}
+    return scene | {"body": [*others, heavy]}
+
+
+def errors(scene: dict[str, Any], rng: np.random.Generator) -> tuple[float, float]:
+    """Of least squares, and of the Riccati sweep: the middle one of five states (near one where a
+    light link's motion is almost undetermined more digits go, in whatever way)."""
+    models, found = (compiled(scene), riccati(scene)), list[list[float]]()
+    for _ in range(5):
+        q, u = drawn_state(scene, rng)
+        exact = precise_accelerations(scene, q, u)
+        found.append([error(model.accelerations(q, u), exact) for model in models])
+    assert max(mine for mine, _ in found) < 1e-9
+    mine, other = np.median(found, axis=0)
+    return float(mine), float(other)
+
+
+@pytest.mark.parametrize("power", [0, 4, 8, 12])
+@pytest.mark.parametrize("name", HEAVY)
+def test_a_heavy_tip_costs_no_digits(name: str, power: int, rng: np.random.Generator) -> None:
+    mine, other = errors(with_tip(HEAVY[name], 10.0**power), rng)
+    assert mine < 1e-13
+    assert power < 8 or other > 1e-18 * 10.0**power
+
+
+def test_masses_that_grow_along_a_chain(rng: np.random.Generator) -> None:
+    scene = chain(["pin"] * COUNT, 0.6, masses=[100.0**k for k in range(COUNT)])
+    assert errors(scene, rng)[0] < 1e-13
+
+
+def test_loads_springs_and_rotors_at_a_heavy_tip(rng: np.random.Generator) -> None:
+    """Loads as large as the tip is heavy are taken by rows as its inertia is."""
+    scene = with_tip(HEAVY["skew pins"], 1e10)
+    scene["load"] = [{"on": f"rod{COUNT - 1}.tip", "force": [0, "1e10*cos(t)", 3e9]}]
+    law = {"stiffness": [100.0], "damping": [1.0]}
+    scene["hinge"] = [hinge | {"law": law} for hinge in scene["hinge"]]
+    scene["hinge"][-1] |= {"law": {"stiffness": [1e11], "inertia": [1e9]}}
+    mine, other = errors(scene, rng)
+    assert mine < 1e-12 and other > 1e-9
+
+
+@pytest.mark.parametrize("inertia", [(0.0, 0.0, 0.0), (0.0, 1 / 12, 1 / 12)])
+@pytest.mark.parametrize("skew", [0.0, 0.6])
+def test_points_thin_rods_and_bodies_without_mass(
+    inertia: tuple[float, ...], skew: float, rng: np.random.Generator
+) -> None:
+    """Rows of singular mass matrices; the load that they cannot take goes on as it is."""
+    scene = chain(["pin"] * 5, skew, inertia=inertia)
+    if skew:  # of a straight chain in the plane the start would be undetermined
+        scene["body"][2] |= {"mass": 0.0, "inertia": [0.0, 0.0, 0.0]}
+    assert errors(scene, rng)[0] < 1e-12
+
+
+@pytest.mark.parametrize("sweep", ["riccati", "qr"])
+def test_an_undetermined_motion_is_refused(sweep: str) -> None:
+    scene = mstmm.Scene(**chain(["ball"] * 3, inertia=(0.0, 1 / 12, 1 / 12)))
+    with pytest.raises(SceneError, match="undetermined"):
+        mstmm.compile(scene, sweep=sweep)
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+
+def test_a_run_is_that_of_the_other_sweep() -> None:
+    scene = chain(["pin"] * 4, 0.6)
+    runs = [m.simulate(2.0, rtol=1e-11, atol=1e-13) for m in (compiled(scene), riccati(scene))]
+    assert all(run.success for run in runs)
+    assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-8
+
+
+def test_a_run_with_a_heavy_tip_needs_no_steps_for_rounding() -> None:
+    """What the Riccati sweep errs by from one evaluation to the next, steps take for motion."""
+    scene = with_tip(chain(["pin"] * 6, inertia=(0.1, 0.1, 0.1), gravity=(0, 0, 0)), 1e10)
+    for hinge, angle in zip(scene["hinge"], (0.5, -1.0, 0.8, 0.5, -0.7, 0.4), strict=True):
+        hinge["initial"] = {"q": [angle], "u": [0.1 * (hinge["name"] == "hinge0")]}
+    runs = [model.simulate(0.02, rtol=1e-9) for model in (compiled(scene), riccati(scene))]
+    assert all(run.success for run in runs)
+    mine, other = (run.trajectory.statistics for run in runs)
+    assert mine is not None and other is not None
+    assert 100 * mine.evaluations < other.evaluations
+    assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-9
+
+
+def test_other_numbers_and_many_states_at_once(rng: np.random.Generator) -> None:
+    scene = with_tip(chain(["pin"] * 4), 1e9)
+    changes = {f"rod3.inertia[{k}]": scene["body"][3]["inertia"][k] for k in range(3)}
+    model = compiled(chain(["pin"] * 4)).with_parameters({"rod3.mass": 1e9, **changes})
+    states = [drawn_state(scene, rng) for _ in range(3)]
+    q, u = (np.array(part) for part in zip(*states, strict=True))
+    for found, state in zip(model.accelerations(q, u), states, strict=True):
+        assert error(found, precise_accelerations(scene, *state)) < 1e-12
+
+
+# --- what it does not do ------------------------------------------------------------------------
+
+
+def test_no_fused_code_and_no_flexible_bodies() -> None:
+    scene = chain(["pin"] * 2)
+    with pytest.raises(SceneError, match='sweep = "qr" has no fused code'):
+        compiled(scene, engine="fused")
+    assert compiled(scene).engine_choice == "looped: the sweep as least squares is looped"
+    beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0}
+    bent = {
+        "gravity": [0, 0, 0], "beam": [beam | {"modes": 2}],
+        "hinge": [{"name": "root", "type": "pin", "inboard": "ground", "outboard": "blade"}],
+    }  # fmt: skip
+    with pytest.raises(SceneError, match=r'"blade" is flexible; sweep = "qr" is for rigid bodies'):
+        compiled(bent)
+    assert compiled(bent, flexibility="rigid").nu == 1
+
+
+@pytest.mark.parametrize("method", ["genalpha", "rodas4p2", "kvaerno5", "newmark"])
+def test_implicit_methods_are_refused(method: str) -> None:
+    with pytest.raises(SceneError, match='sweep = "qr" goes with explicit methods'):
+        compiled(chain(["pin"] * 2)).simulate(0.1, method, step=1e-3)
+
+
+def test_automatic_methods_stay_explicit() -> None:
+    scene = chain(["pin"] * 2)
+    scene["hinge"][1]["law"] = {"stiffness": [1e6], "damping": [1e4]}
+    run = compiled(scene).simulate(0.2, "auto", rtol=1e-6)
+    assert run.success
+    assert [stretch.method for stretch in run.trajectory.methods] == ["dop853", "dop853"]
+    assert 'sweep = "qr" goes with explicit methods' in run.trajectory.methods[-1].why
+    other = riccati(scene).simulate(0.2, "auto", rtol=1e-6).trajectory.methods
+    assert other[-1].method not in ("dop853", "dopri5")
