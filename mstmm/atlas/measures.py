@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
+from ..bridge.precise import precise, relative_error
 from ..errors import NumericalFailure
 from ..runtime.model.model import Model
 from ..runtime.result.result import Result
@@ -42,6 +43,13 @@ def correction(model: Model, states: Iterable[tuple[Array, Array]]) -> float:
         change = model.solve(q, model.inverse_dynamics(q, u, udot))
         worst = max(worst, float(np.abs(change).max() / np.abs(udot - change).max()))
     return worst
+
+
+def rounding(model: Model, states: Iterable[tuple[Array, Array]]) -> float:
+    """Error of the accelerations as a part of the largest, beside 60 digits: the worst of some
+    states (q, u)."""
+    exact = precise(model)
+    return max(relative_error(model.accelerations(q, u), exact(q, u)) for q, u in states)
 
 
 def growth(model: Model, step: float, steps: int, method: str, **options: Any) -> float:

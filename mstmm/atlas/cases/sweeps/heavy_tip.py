@@ -1,0 +1,39 @@
+"""The Riccati sweep towards ever heavier tips."""
+
+from __future__ import annotations
+
+from ...definition import Definition, Method
+from ...measures import rounding
+from ...scale import LOG
+from ...scenes import drawn_pins, model, rod
+
+RODS = 8
+
+
+def _error(ratio: float, sweep: str) -> float:
+    masses = [1.0] * (RODS - 1) + [ratio]
+    bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
+    hinges = [
+        {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
+         "inboard": f"rod{i - 1}.tip" if i else "ground"}
+        for i in range(RODS)
+    ]  # fmt: skip
+    scene = {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+    return rounding(model(scene, sweep=sweep), drawn_pins(RODS))
+
+
+CASE = Definition(
+    name="heavy-tip",
+    title="Riccati sweep: a heavy body behind light ones",
+    why="Of the inertia that a hinge carries the sweep subtracts what the hinge gives way to. Three "
+    "hinges inboard of a heavy tip in the plane nothing of its inertia is left, but its rounding "
+    "is, beside the light links'. Least squares carry rows of which both are sums of squares: "
+    "rotations mix them without a difference.",
+    parameter="mass of the last rod over that of the others", unit="", low=1.0, high=1e12,
+    scale=LOG,
+    measured="error of the accelerations, relative", limit=1e-8,
+    method=Method(f"Riccati sweep, {RODS} rods", lambda ratio: _error(ratio, "riccati")),
+    remedy=Method('least squares (sweep="qr")', lambda ratio: _error(ratio, "qr")), reach=1e20,
+    source="Bjoerck, Numerical Methods for Least Squares Problems, SIAM 1996, ch. 2 and 4 (normal "
+    "equations, weighted rows); sweep: Rui et al., Multibody System Dynamics 49, 2020",
+)  # fmt: skip

@@ -1,0 +1,46 @@
+"""Accelerations of a small scene at any number of digits, to tell what doubles lose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mpmath
+
+from ..arrays import Array
+from ..derive.audit.evaluate import evaluate
+from ..derive.fuse.scene import fuse
+from ..runtime.engine.compiled import Compiled
+from ..runtime.kernels import store
+from ..runtime.pack.structure import structure_of
+from .fusion import kernels_of
+
+#: Digits: a Riccati sweep loses as many as ratios of masses have.
+DIGITS = 60
+
+
+def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[Any]]:
+    """(q (nq,), u (nu,)) -> udot (nu,) with DIGITS digits at the time t (s): the Riccati sweep as
+    one kernel, replayed.  The scene's numbers are the doubles that the engines have."""
+    elements, definitions = store.known(store.needed(model.scene))
+    structure, numbers = structure_of(model.packed.system, elements, False)
+    kernel = fuse(structure, kernels_of(definitions)).kernels["accelerations"]
+    still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * structure.nu}
+    given = {"p": _floats(numbers), "t": [t], **still}
+
+    def accelerations(q: Array, u: Array) -> list[Any]:
+        found = evaluate(kernel, given | {"q": _floats(q), "u": _floats(u)}, DIGITS)
+        return list(found["udot"])
+
+    return accelerations
+
+
+def relative_error(found: Array, exact: Sequence[Any]) -> float:
+    """Largest difference over the largest entry."""
+    with mpmath.workdps(DIGITS):
+        gaps = [abs(mpmath.mpf(float(a)) - b) for a, b in zip(found, exact, strict=True)]
+        return float(max(gaps) / max(map(abs, exact)))
+
+
+def _floats(numbers: Array) -> list[float]:
+    return [float(x) for x in numbers]
