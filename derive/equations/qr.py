@@ -7,8 +7,8 @@ all that hangs on a body has rows as well:
     f = U^T (U a + d) + e,   S = U^T U
 
 with U upper triangular, d the load that rows can take (all of it where U is regular, as is that of
-a body with inertia of its own), and e the rest.  Across a hinge a = a_Q + H udot, and rotations make
-of the rows, with the rotors' own below them,
+a body with inertia of its own), and e the rest.  Across a hinge a = a_Q + H udot, and rotations
+make of the rows, with the rotors' own below them,
 
     [U H       U  d]       [R_u  R_a  d_u]
     [sqrt(J)   0  0]  ->   [0    V    d_V]

@@ -22,11 +22,11 @@ def attach(packed: Packed) -> None:
     packed.qr, packed.model.qr = True, 1
 
 
-def refuse_implicit(packed: Packed) -> None:
-    """SceneError: implicit methods eliminate a tangent of their own, in which the digits that this
-    sweep keeps would be lost again."""
+def refuse_steps(packed: Packed) -> None:
+    """SceneError for steps that are not made from accelerations: the tangent of an implicit method
+    and the classical matrices lose the digits again that this sweep keeps."""
     if packed.qr:
         raise SceneError(
-            'sweep = "qr" goes with explicit methods (dop853, dopri5, rk4): the tangent of '
-            'implicit ones has no such form; use one of those, or sweep = "riccati"'
+            'sweep = "qr" makes accelerations, which implicit and classical methods do not ask '
+            'for; use an explicit one (dop853, dopri5, rk4), or sweep = "riccati"'
         )

@@ -28,6 +28,7 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..pack.flexible.expansion import HELD
+from ..pack.qr import refuse_steps
 from .simulate import LARGEST, SLICE, split
 from .system import SceneSystem
 from .trajectory import Trajectory
@@ -52,6 +53,7 @@ def integrate(
     if settings.step is None:
         raise SceneError(f'method "{settings.method}" takes fixed steps: give step in s')
     scheme_of(settings.scheme)
+    refuse_steps(model.packed)
     return _Run(model, settings, tell).run(q, u)
 
 

@@ -18,7 +18,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..integrate.loop import Run
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO_EXPLICIT, get
-from ..pack.qr import refuse_implicit
+from ..pack.qr import refuse_steps
 from .fastest import Fastest
 from .stretches import Stretch, from_rows
 from .system import SceneSystem
@@ -83,7 +83,7 @@ class Choice:
         system, engine = self._system, self._system.engine
         if self._fastest is None:
             try:
-                refuse_implicit(engine.packed)
+                refuse_steps(engine.packed)
                 self._fastest = Fastest(engine, system.memory)
             except SceneError as error:
                 self.stretches.append(Stretch(run.t, AUTO_EXPLICIT, None, f"stays: {error}"))

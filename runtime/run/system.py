@@ -19,7 +19,7 @@ from ..kernels.fused import FusedLibrary
 from ..kernels.tape import c_tape
 from ..pack.layout import StateNames
 from ..pack.packed import resize
-from ..pack.qr import refuse_implicit
+from ..pack.qr import refuse_steps
 from ..pack.switches import MOST
 
 
@@ -78,7 +78,7 @@ class SceneSystem:
         engine, run = self.engine, self.run
         if self.system.implicit:
             return
-        refuse_implicit(engine.packed)
+        refuse_steps(engine.packed)
         base = Tangent(engine, self.memory)
         stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 2 * engine.nu
         work = np.zeros(engine.lib.mstmm_residual_work(engine.packed.model))

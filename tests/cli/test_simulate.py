@@ -156,6 +156,20 @@ def test_engine_is_chosen_and_named(mstmm: Command, folder: Path) -> None:
     assert "auto, fused, looped" in refused.err
 
 
+def test_the_sweep_is_chosen(mstmm: Command, folder: Path) -> None:
+    options = ("simulate", "pendulum.toml", "--t-end", "0.5", "--json")
+    angles = []
+    for sweep in ("riccati", "qr", "product"):
+        done = mstmm(*options, "--sweep", sweep)
+        assert done.code == 0, done.err
+        angles.append(json.loads(done.out)["q"]["pivot.angle"])
+    assert angles[1:] == [pytest.approx(angles[0], abs=1e-9)] * 2
+    for more in (("--sweep", "quick"), ("--sweep", "qr", "--method", "genalpha", "--step", "0.01")):
+        refused = mstmm(*options, *more)
+        assert refused.code == 2
+        assert "riccati" in refused.err and "qr" in refused.err
+
+
 def test_plot_of_quantities(mstmm: Command, folder: Path) -> None:
     options = ("--t-end", "0.5", "--plot", "a.png", "-q", "rod.tip.position", "-q", "energy")
     done = mstmm("simulate", "pendulum.toml", *options)

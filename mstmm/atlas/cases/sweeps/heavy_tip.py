@@ -25,10 +25,10 @@ def _error(ratio: float, sweep: str) -> float:
 CASE = Definition(
     name="heavy-tip",
     title="Riccati sweep: a heavy body behind light ones",
-    why="Of the inertia that a hinge carries the sweep subtracts what the hinge gives way to. Three "
-    "hinges inboard of a heavy tip in the plane nothing of its inertia is left, but its rounding "
-    "is, beside the light links'. Least squares carry rows of which both are sums of squares: "
-    "rotations mix them without a difference.",
+    why="Of the inertia that a hinge carries the sweep subtracts what the hinge gives way to. "
+    "Three hinges inboard of a heavy tip, in a plane, nothing is left of its inertia but rounding, "
+    "beside the inertia of light links. Least squares carry rows, of which both are sums of "
+    "squares: rotations mix them without a difference.",
     parameter="mass of the last rod over that of the others", unit="", low=1.0, high=1e12,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-8,
