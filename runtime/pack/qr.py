@@ -4,22 +4,64 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
     from .packed import Packed
+    from .system import BodyNumbers
+
+#: Least eigenvalue of a mass matrix with ones on its diagonal that is not rounding.
+_NEGATIVE = -1e-11
+
+_UPPER = np.triu_indices(6)
 
 
 def attach(packed: Packed) -> None:
-    """Let the packed scene use it.  SceneError for flexible bodies, whose modes it has no rows
-    for."""
+    """Let the packed scene use it.
+
+    Raises SceneError for flexible bodies, whose modes it has no rows for, and for bodies with
+    negative moments of inertia, which no row has.
+    """
+    way_out = 'use sweep = "riccati"'
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(
-            f'"{name}" is flexible; sweep = "qr" is for rigid bodies only; use sweep = "riccati", '
+            f'"{name}" is flexible; sweep = "qr" is for rigid bodies only; {way_out}, '
             'or flexibility = "rigid"'
         )
+    for number, body in enumerate(packed.system.distinct):
+        if _least(_mass_matrix(packed, body)) < _NEGATIVE:
+            place = int(np.argmax(packed.system.which == number))
+            name = packed.scene.bodies.name(packed.topology.at(place)[0])
+            raise SceneError(
+                f'body "{name}": it has a negative moment of inertia about some axis, which is no '
+                f'sum of squares; sweep = "qr" needs one; mend the inertia, or {way_out}'
+            )
     packed.qr, packed.model.qr = True, 1
+
+
+def _mass_matrix(packed: Packed, body: BodyNumbers) -> Array:
+    """(6, 6) of a body alone, about its input end."""
+    ffi, upper = packed.ffi, np.zeros(21)
+    call = ffi.cast(
+        "int (*)(const double *, double *)", packed.elements[body.body].functions["inertia"]
+    )
+    call(list(body.body_p), ffi.from_buffer("double[]", upper))
+    matrix = np.zeros((6, 6))
+    matrix[_UPPER] = upper
+    return np.asarray(matrix + np.triu(matrix, 1).T)
+
+
+def _least(matrix: Array) -> float:
+    """Least eigenvalue with rows and columns in units of their own."""
+    diagonal = np.diagonal(matrix)
+    if diagonal.min() < 0:
+        return float(diagonal.min())
+    root = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    return float(np.linalg.eigvalsh(matrix / np.outer(root, root))[0])
 
 
 def refuse_steps(packed: Packed) -> None:

@@ -197,6 +197,22 @@ def test_no_fused_code_and_no_flexible_bodies() -> None:
     assert compiled(bent, flexibility="rigid").nu == 1
 
 
+@pytest.mark.parametrize(
+    "inertia", [[-0.1, 0.1, 0.1], [0.1, 0.1, 0.1, 0.3, 0, 0], [0, 0, 0.1, 1e-3, 0, 0]]
+)
+def test_negative_moments_of_inertia_are_refused(inertia: list[float]) -> None:
+    scene = chain(["pin"] * 3, 0.4) | {"allow_unphysical_inertia": True}
+    scene["body"][1]["inertia"] = inertia
+    assert riccati(scene).nu == 3
+    with pytest.raises(SceneError, match='body "rod1": it has a negative moment of inertia'):
+        compiled(scene)
+
+
+def test_moments_that_only_break_the_triangle_are_taken(rng: np.random.Generator) -> None:
+    scene = chain(["pin"] * 3, 0.4, inertia=(0, 0, 0.1)) | {"allow_unphysical_inertia": True}
+    assert errors(scene, rng)[0] < 1e-13
+
+
 @pytest.mark.parametrize("method", ["genalpha", "rodas4p2", "kvaerno5", "dttmm-classical"])
 def test_implicit_and_classical_methods_are_refused(method: str) -> None:
     with pytest.raises(SceneError, match='sweep = "qr" makes accelerations'):
