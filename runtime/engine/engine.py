@@ -86,11 +86,16 @@ class Engine(Calls):
 
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
-        the others.  q (nq,) of one state; S is factored once, each column is O(bodies).
+        the others.  q (nq,) of one state; S is factored once, each column is O(bodies); of least
+        squares there is no factor to keep, and each column is a sweep at rest with its efforts.
         Without `memory` nothing is released."""
         engine = self.inertia_alone
-        answers = np.empty(columns.shape)
         memory = engine.start_memory() if memory is None else memory
+        if self.packed.qr:
+            n, still = len(columns), np.zeros(columns.shape)
+            many = np.tile(q, (n, 1)), still, np.tile(memory, (n, 1))
+            return engine.accelerations(0.0, *many, np.ascontiguousarray(columns))[1]
+        answers = np.empty(columns.shape)
         failure = self.ffi.new("mstmm_failure *")
         code = self.lib.mstmm_solve(
             engine.packed.model, engine.workspace(), len(columns), self.pointer(q),

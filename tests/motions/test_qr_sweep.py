@@ -179,6 +179,30 @@ def test_other_numbers_and_many_states_at_once(rng: np.random.Generator) -> None
         assert relative_error(found, exact(*state)) < 1e-10
 
 
+def test_solutions_of_the_mass_matrix(rng: np.random.Generator) -> None:
+    """M^-1 times columns is the acceleration, at rest and without weight, by efforts of laws."""
+    still = with_tip(chain(["pin"] * COUNT, 0.6, gravity=(0, 0, 0)), 1e10)
+    q, columns = rng.uniform(-1, 1, COUNT), rng.uniform(-1, 1, (COUNT, 3))
+    found, other = (model.solve(q, columns) for model in (compiled(still), riccati(still)))
+    gaps = list[tuple[float, float]]()
+    for k, column in enumerate(columns.T):
+        laws = [{"law": {"effort": repr(float(tau))}} for tau in column]
+        pushed = [hinge | law for hinge, law in zip(still["hinge"], laws, strict=True)]
+        exact = precise(riccati(still | {"hinge": pushed}))(q, np.zeros(COUNT))
+        gaps.append((relative_error(found[:, k], exact), relative_error(other[:, k], exact)))
+    mine, lost = np.median(gaps, axis=0)
+    assert mine < 1e-12 and lost > 1e-9
+
+
+@pytest.mark.parametrize("seed", range(336, 342))
+def test_solutions_on_any_tree(seed: int, rng: np.random.Generator) -> None:
+    scene = random_scenes.random_scene(seed)
+    q, _ = random_scenes.random_state(scene, seed)
+    models = compiled(scene), riccati(scene)
+    columns = rng.uniform(-1, 1, (models[0].nu, 2))
+    assert worst(models[0].solve(q, columns), models[1].solve(q, columns)) < 1e-11
+
+
 # --- what it does not do ------------------------------------------------------------------------
 
 
