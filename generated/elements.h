@@ -1341,6 +1341,8 @@ int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const re
 
 extern const mstmm_element mstmm_sweep_qr;
 int mstmm_sweep_qr_factor(const real *restrict S, real *restrict U);
+int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, real *restrict d,
+    real *restrict e);
 int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
     const real *restrict d_V, const real *restrict e_Q, const real *restrict U_P,
     const real *restrict d_P, real *restrict U, real *restrict d, real *restrict e_I);

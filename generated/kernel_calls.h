@@ -1498,6 +1498,19 @@ static inline int mstmm_qr_factor_by(struct mstmm_qr_factor to)
 }
 #define mstmm_qr_factor(...) mstmm_qr_factor_by((struct mstmm_qr_factor){__VA_ARGS__})
 
+struct mstmm_qr_bias {
+    const real *U;
+    const real *motion;
+    real *d;
+    real *e;
+};
+static inline int mstmm_qr_bias_by(struct mstmm_qr_bias to)
+{
+    return mstmm_sweep_qr_bias(
+        to.U, to.motion, to.d, to.e);
+}
+#define mstmm_qr_bias(...) mstmm_qr_bias_by((struct mstmm_qr_bias){__VA_ARGS__})
+
 struct mstmm_qr_merge {
     const real *Rc;
     const real *r;

@@ -9,6 +9,8 @@
 
 extern const mstmm_element mstmm_sweep_qr;
 int mstmm_sweep_qr_factor(const real *restrict S, real *restrict U);
+int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, real *restrict d,
+    real *restrict e);
 int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
     const real *restrict d_V, const real *restrict e_Q, const real *restrict U_P,
     const real *restrict d_P, real *restrict U, real *restrict d, real *restrict e_I);
@@ -179,6 +181,145 @@ static const mstmm_port mstmm_sweep_qr_factor_inputs[] = {
 
 static const mstmm_port mstmm_sweep_qr_factor_outputs[] = {
     {"U", 21, "", 0, 0},
+};
+
+/* loads of a rigid body alone by its rows
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
+ * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
+ * in  U[21] upper triangle, row by row: S = U^T U
+ * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * out d[6] load that rows take: f = U^T (U a + d) + e
+ * out e[6] (N, N*m) force part of f = S a + e, at P
+ */
+int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, real *restrict d,
+    real *restrict e)
+{
+    const real t0 = U[0] * motion[6];
+    const real t1 = U[1] * motion[7];
+    const real t2 = t0 + t1;
+    const real t3 = U[2] * motion[8];
+    const real t4 = t2 + t3;
+    const real t5 = U[3] * motion[3];
+    const real t6 = t4 + t5;
+    const real t7 = U[4] * motion[4];
+    const real t8 = t6 + t7;
+    const real t9 = U[5] * motion[5];
+    const real t10 = t8 + t9;
+    const real t11 = U[10] * motion[2];
+    const real t12 = U[4] * motion[0];
+    const real t13 = t11 - t12;
+    const real t14 = motion[2] * t13;
+    const real t15 = U[5] * motion[0];
+    const real t16 = U[10] * motion[1];
+    const real t17 = t15 + t16;
+    const real t18 = motion[1] * t17;
+    const real t19 = t14 + t18;
+    const real t20 = t10 - t19;
+    d[0] = t20;
+    const real t21 = U[4] * motion[1];
+    const real t22 = U[5] * motion[2];
+    const real t23 = t21 + t22;
+    const real t24 = motion[2] * t23;
+    const real t25 = motion[0] * t17;
+    const real t26 = t24 + t25;
+    const real t27 = U[6] * motion[7];
+    const real t28 = U[7] * motion[8];
+    const real t29 = t27 + t28;
+    const real t30 = U[8] * motion[3];
+    const real t31 = t29 + t30;
+    const real t32 = U[9] * motion[4];
+    const real t33 = t31 + t32;
+    const real t34 = U[10] * motion[5];
+    const real t35 = t33 + t34;
+    const real t36 = t26 + t35;
+    d[1] = t36;
+    const real t37 = motion[0] * t13;
+    const real t38 = motion[1] * t23;
+    const real t39 = t37 - t38;
+    const real t40 = U[11] * motion[8];
+    const real t41 = U[12] * motion[3];
+    const real t42 = t40 + t41;
+    const real t43 = U[13] * motion[4];
+    const real t44 = t42 + t43;
+    const real t45 = U[14] * motion[5];
+    const real t46 = t44 + t45;
+    const real t47 = t39 + t46;
+    d[2] = t47;
+    const real t48 = U[15] * motion[3];
+    const real t49 = U[16] * motion[4];
+    const real t50 = t48 + t49;
+    const real t51 = U[17] * motion[5];
+    const real t52 = t50 + t51;
+    d[3] = t52;
+    const real t53 = U[18] * motion[4];
+    const real t54 = U[19] * motion[5];
+    const real t55 = t53 + t54;
+    d[4] = t55;
+    const real t56 = U[20] * motion[5];
+    d[5] = t56;
+    e[0] = 0.0;
+    e[1] = 0.0;
+    e[2] = 0.0;
+    const real t57 = U[15] * U[17];
+    const real t58 = motion[0] * t57;
+    const real t59 = U[16] * U[17];
+    const real t60 = U[18] * U[19];
+    const real t61 = t59 + t60;
+    const real t62 = motion[1] * t61;
+    const real t63 = t58 + t62;
+    const real t64 = U[17] * U[17];
+    const real t65 = U[19] * U[19];
+    const real t66 = t64 + t65;
+    const real t67 = U[20] * U[20];
+    const real t68 = t66 + t67;
+    const real t69 = motion[2] * t68;
+    const real t70 = t63 + t69;
+    const real t71 = motion[1] * t70;
+    const real t72 = U[15] * U[16];
+    const real t73 = motion[0] * t72;
+    const real t74 = U[16] * U[16];
+    const real t75 = U[18] * U[18];
+    const real t76 = t74 + t75;
+    const real t77 = motion[1] * t76;
+    const real t78 = t73 + t77;
+    const real t79 = motion[2] * t61;
+    const real t80 = t78 + t79;
+    const real t81 = motion[2] * t80;
+    const real t82 = t71 - t81;
+    e[3] = t82;
+    const real t83 = U[15] * U[15];
+    const real t84 = motion[0] * t83;
+    const real t85 = motion[1] * t72;
+    const real t86 = t84 + t85;
+    const real t87 = motion[2] * t57;
+    const real t88 = t86 + t87;
+    const real t89 = motion[2] * t88;
+    const real t90 = motion[0] * t70;
+    const real t91 = t89 - t90;
+    e[4] = t91;
+    const real t92 = motion[0] * t80;
+    const real t93 = motion[1] * t88;
+    const real t94 = t92 - t93;
+    e[5] = t94;
+    return 0;
+}
+
+static int mstmm_sweep_qr_bias_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_qr_bias(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_qr_bias_inputs[] = {
+    {"U", 21, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_qr_bias_outputs[] = {
+    {"d", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
 };
 
 /* rows added to those of the parent
@@ -1415,6 +1556,18 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "bias",
+        .function = (void (*)(void))mstmm_sweep_qr_bias,
+        .call = mstmm_sweep_qr_bias_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_qr_bias_inputs,
+        .outputs = mstmm_sweep_qr_bias_outputs,
+        .ir_hash = "15734bffb181a3980445833fe03151aa7cd4362be9c4c7e90222d5aba525be85",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "merge",
         .function = (void (*)(void))mstmm_sweep_qr_merge,
         .call = mstmm_sweep_qr_merge_call,
@@ -1444,7 +1597,7 @@ const mstmm_element mstmm_sweep_qr = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "qr",
-    .hash = "ec10c39a977f0d6a1c67667b8a1300709881adfa0913226ce76024e07f3af0ba",
+    .hash = "b6809e32d73a303bd10880d6edd98256ec7837201f8a0589e90e3cb25b16149c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1454,6 +1607,6 @@ const mstmm_element mstmm_sweep_qr = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 3,
+    .n_kernels = 4,
     .kernels = mstmm_sweep_qr_kernels,
 };

@@ -420,6 +420,31 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     return 0;
 }
 
+/* Rows of a body alone, and in them its load at the bias motion. */
+static int mstmm_at_qr_own(mstmm_state *state, int index)
+{
+    real U[21];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    int code;
+    if (mstmm_idle(state, body)) return 0;
+    if (!body->generic) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    mstmm_qr_factor(
+        .S = block + MSTMM_BLOCK_S, .U = U);
+    memcpy(block + MSTMM_BLOCK_S, U, 21 * sizeof(real));
+    if (body->kernels->rigid) {
+        mstmm_qr_bias(
+            .U = block + MSTMM_BLOCK_S, .motion = block + MSTMM_BLOCK_MOTION,
+            .d = block + MSTMM_BLOCK_DELTA, .e = block + MSTMM_BLOCK_E);
+    } else {
+        memset(block + MSTMM_BLOCK_DELTA, 0, 6 * sizeof(real));
+    }
+    return 0;
+}
+
 /* Power of the caller's efforts. */
 static int mstmm_at_efforts_power(mstmm_state *state, int index)
 {
@@ -783,25 +808,6 @@ int mstmm_at_condense(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rows of a body alone, and none of its load in them yet. */
-static int mstmm_at_qr_own(mstmm_state *state, int index)
-{
-    real U[21];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    int code;
-    if (mstmm_idle(state, body)) return 0;
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
-    mstmm_qr_factor(
-        .S = block + MSTMM_BLOCK_S, .U = U);
-    memcpy(block + MSTMM_BLOCK_S, U, 21 * sizeof(real));
-    memset(block + MSTMM_BLOCK_HINGE_C, 0, 6 * sizeof(real));
-    return 0;
-}
-
 /* Rows of a body, complete, carried across its hinge to the parent. */
 static int mstmm_at_qr_condense(mstmm_state *state, int index)
 {
@@ -831,7 +837,7 @@ static int mstmm_at_qr_condense(mstmm_state *state, int index)
     code = mstmm_generic_qr_eliminate(speeds,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free,
         .floor_ = block + MSTMM_BLOCK_FLOOR, .U = block + MSTMM_BLOCK_S,
-        .d = block + MSTMM_BLOCK_HINGE_C, .e = block + MSTMM_BLOCK_E, .tau = hinge_tau_free,
+        .d = block + MSTMM_BLOCK_DELTA, .e = block + MSTMM_BLOCK_E, .tau = hinge_tau_free,
         .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
         .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .V = V, .d_V = d_V, .e_Q = e_Q);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
@@ -839,14 +845,14 @@ static int mstmm_at_qr_condense(mstmm_state *state, int index)
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         mstmm_qr_merge(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .V = V, .d_V = d_V,
-            .e_Q = e_Q, .U_P = parent + MSTMM_BLOCK_S, .d_P = parent + MSTMM_BLOCK_HINGE_C,
-            .U = U, .d = d, .e_I = parent + MSTMM_BLOCK_E);
+            .e_Q = e_Q, .U_P = parent + MSTMM_BLOCK_S, .d_P = parent + MSTMM_BLOCK_DELTA, .U = U,
+            .d = d, .e_I = parent + MSTMM_BLOCK_E);
         memcpy(parent + MSTMM_BLOCK_S, U, 21 * sizeof(real));
-        memcpy(parent + MSTMM_BLOCK_HINGE_C, d, 6 * sizeof(real));
+        memcpy(parent + MSTMM_BLOCK_DELTA, d, 6 * sizeof(real));
     }
     if ((state->observed || state->balance)) {
         mstmm_qr_restored(
-            .U = block + MSTMM_BLOCK_S, .d = block + MSTMM_BLOCK_HINGE_C,
+            .U = block + MSTMM_BLOCK_S, .d = block + MSTMM_BLOCK_DELTA,
             .e = block + MSTMM_BLOCK_E, .S = S, .e_S = e_S);
         memcpy(block + MSTMM_BLOCK_S, S, 21 * sizeof(real));
         memcpy(block + MSTMM_BLOCK_E, e_S, 6 * sizeof(real));
@@ -3771,6 +3777,27 @@ static int mstmm_pass_forward(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_qr_own(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_pass_qr_own(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_qr_own(state, i, MSTMM_TILE);
+        const int code = mstmm_at_qr_own(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 static int mstmm_pass_efforts_power(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -3896,27 +3923,6 @@ static int mstmm_pass_condense(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_qr_own(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_S + 21);
-    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_C + 6);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
-}
-static int mstmm_pass_qr_own(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_qr_own(state, i, MSTMM_TILE);
-        const int code = mstmm_at_qr_own(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 MSTMM_AT_ONCE void mstmm_fetch_qr_condense(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -3924,8 +3930,8 @@ MSTMM_AT_ONCE void mstmm_fetch_qr_condense(const mstmm_state *state, int index, 
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_HINGE_C, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
 static int mstmm_pass_qr_condense(mstmm_state *state)
 {
@@ -4796,6 +4802,10 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_pass_forward(state);
         if (code) return code;
     }
+    if (model->qr) {
+        code = mstmm_pass_qr_own(state);
+        if (code) return code;
+    }
     if (state->balance && state->efforts) {
         code = mstmm_pass_efforts_power(state);
         if (code) return code;
@@ -4842,10 +4852,6 @@ int mstmm_run_accelerations(mstmm_state *state)
     }
     if (!state->linked && !model->qr) {
         code = mstmm_pass_condense(state);
-        if (code) return code;
-    }
-    if (model->qr) {
-        code = mstmm_pass_qr_own(state);
         if (code) return code;
     }
     if (model->qr) {

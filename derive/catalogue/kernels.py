@@ -157,7 +157,9 @@ def screw_kernels() -> tuple[Kernel, ...]:
 
 def qr_kernels() -> tuple[Kernel, ...]:
     """The sweep as least squares, but for the elimination of hinges."""
-    return tuple(Kernel(make.__name__, make()) for make in (qr.factor, qr.merge, qr.restored))
+    return tuple(
+        Kernel(make.__name__, make()) for make in (qr.factor, qr.bias, qr.merge, qr.restored)
+    )
 
 
 def links() -> dict[str, Hinge]:

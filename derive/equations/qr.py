@@ -24,9 +24,10 @@ from __future__ import annotations
 import sympy as sp
 
 from ..language.derivation import Derivation, Equation, Quantity, Triangle, Triangular, tilde
-from .algebra import column, symbol
+from .algebra import column, part, stack, symbol
 from .sweep import (
     FLOOR,
+    MOTION,
     PARENT_E,
     SHIFT,
     SOURCES,
@@ -104,6 +105,37 @@ def factor() -> Derivation:
     equations.append(Equation("U", ROWS.symbol, _numbers(whole)))
     return Derivation(
         "qr", "rows of a body alone", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
+    )
+
+
+def bias() -> Derivation:
+    """d and e of a rigid body alone, by its rows instead of by its load.
+
+    Its load e_B = S [rdd + w x (w x r_C); wd] + [0; w x J_C w] is a difference of what a long arm
+    r_C makes large where the inertia J_C about the mass centre counts; its rows are sqrt(m) times
+    the acceleration of the centre, and U_a times the angular one, J_C = U_a^T U_a.
+    """
+    u, motion = triangular(ROWS.symbol), MOTION.symbol
+    w, wd, rdd = (part(motion, k) for k in (0, 3, 6))
+    arm = sp.ImmutableDenseMatrix([u[1, 5], -u[0, 5], u[0, 4]])
+    inner = sp.ImmutableDenseMatrix(3, 3, lambda i, j: u[3 + i, 3 + j])
+    accelerations, turning = symbol("a_B", 6), symbol("b", 6)
+    own, spun = symbol("U_a", 3, 3), symbol("h", 3)
+    spin = tilde(w)
+    return Derivation(
+        "qr",
+        "loads of a rigid body alone by its rows",
+        (ROWS, MOTION),
+        (TAKEN, E),
+        (
+            Equation("bias acceleration", accelerations, stack(rdd, wd)),
+            Equation("w x (w x r_C) sqrt(m)", turning, stack(spin * (spin * arm), sp.zeros(3, 1))),
+            Equation("d", TAKEN.symbol, u * accelerations + turning),
+            Equation("rows of J_C", own, inner),
+            Equation("J_C w", spun, own.T * (own * w)),
+            Equation("w x J_C w", E.symbol, stack(sp.zeros(3, 1), spin * spun)),
+        ),
+        sources=SOURCES_QR,
     )
 
 

@@ -21,8 +21,8 @@ _TRAITS = {
     "moving": "!body->section && speeds", "product": "model->product",
     "shifted": "state->tangents->shifted", "coordinate": "law->kind == 0",
     "united": "state->tangents->unit",
-    "effort": "force->effort", "qr": "model->qr", "hung": "(body->parent >= 0)",
-    "kept": "(state->observed || state->balance)",
+    "effort": "force->effort", "qr": "model->qr", "rigid": "body->kernels->rigid",
+    "hung": "(body->parent >= 0)", "kept": "(state->observed || state->balance)",
 }  # fmt: skip
 
 

@@ -65,7 +65,7 @@ PORT = {
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
-    "body.U": "body.S", "body.d": "hinge.c",
+    "body.U": "body.S", "body.d": "body.delta",
     # One of the two tangents is held at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
     "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",

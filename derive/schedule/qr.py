@@ -1,8 +1,8 @@
 """The sweep as least squares, in place of `condense`: rows U, d and loads e from tips to root.
 
-It keeps digits where heavy bodies hang behind light ones.  Rows lie where S does; whoever reads S
-and e behind the sweep finds them made of the rows again.  The way back is that of the other sweep,
-by the same gains.
+It keeps digits where heavy bodies hang behind light ones.  Rows lie where S does, and what they
+take where deviations will; whoever reads S and e behind the sweep finds them made of the rows
+again.  The way back is that of the other sweep, by the same gains.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from .riccati import FREE, FREE_EFFORTS
 from .steps import TIPS_TO_ROOT, Copy, Do, Pass, call
 
 QR_OWN = Pass(
-    "qr_own", "body", "Rows of a body alone, and none of its load in them yet.",
+    "qr_own", "body", "Rows of a body alone, and in them its load at the bias motion.",
     (
         Do(whole=HINGE_MOTION, when="own"),
         call("qr.factor", S="body.S", U="local.U"),
         Copy(to="body.U", source="local.U"),
-        Copy(to="body.d"),
+        call("qr.bias", when="rigid", U="body.U", motion="body.motion", d="body.d", e="body.e"),
+        Copy(to="body.d", when="!rigid"),
     ),
     skip="idle",
 )  # fmt: skip

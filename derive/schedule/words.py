@@ -298,6 +298,7 @@ TRAITS: dict[str, str] = {
     "shifted": "some increments of a right-hand side are known",
     "united": "a load is one in a right-hand side",
     "qr": "the sweep is that of least squares",
+    "rigid": "the body is the built-in rigid one",
     "kept": "somebody reads S and e behind the sweep",
     "product": "the product of classical matrices is asked for too",
 }

@@ -12,7 +12,8 @@ import sympy as sp
 from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.audit.evaluate_equations import evaluate_equations
 from mstmm.derive.audit.samples import rotation
-from mstmm.derive.catalogue.kernels import generic_kernels, qr_kernels
+from mstmm.derive.catalogue.kernels import generic_kernels, kernels_of, qr_kernels
+from mstmm.derive.elements.body_rigid import RigidBody
 from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Triangle
 from mstmm.derive.lower.kernel import lower
 from mstmm.ir.replay import GuardFailure
@@ -128,6 +129,26 @@ def test_rows_of_a_body_are_a_factor(
         U = triangular(evaluate(STEPS["factor"], {"S": given}, digits)["U"])
         gap = U.T * U - exact
         assert max(abs(x) for x in gap) <= 4e-15 * max(abs(x) for x in exact)
+
+
+def test_loads_of_a_body_by_its_rows() -> None:
+    """Together they are the load that the body's own equations give, short arm or long."""
+    kernels = {kernel.name: kernel.ir() for kernel in kernels_of(RigidBody())}
+    numbers = random.Random(4)
+    with mpmath.workdps(DIGITS):
+        for moments in ([0.3, 0.4, 0.5], [1e-9, 2e-9, 2e-9], [0.0, 0.0, 0.1]):
+            mass, center = 2.0, [mpmath.mpf(x) for x in some(3, numbers)]
+            inertia = mass_matrix(mass, center, moments)[3:, 3:]
+            tensor = [inertia[i, j] for i in range(3) for j in range(i, 3)]
+            p = [mpmath.mpf(mass), *(mass * x for x in center), *tensor]
+            motion = some(9, numbers)
+            S = evaluate(kernels["inertia"], {"p": p}, DIGITS)["S"]
+            load = evaluate(kernels["bias_load"], {"p": p, "motion": motion}, DIGITS)["e"]
+            U = evaluate(STEPS["factor"], {"S": S}, DIGITS)["U"]
+            own = evaluate(STEPS["bias"], {"U": U, "motion": motion}, DIGITS)
+            found = restored(U, own["d"], own["e"])["e_S"]
+            gaps = [abs(a - b) for a, b in zip(found, load, strict=True)]
+            assert max(gaps) < (1e-30 if min(moments) > 0 else 1e-13)  # rounding added to zeros
 
 
 # --- a hinge ------------------------------------------------------------------------------------

@@ -326,6 +326,8 @@ def test_users_body_is_held_anywhere(tmp_path: Path, rng: np.random.Generator) -
     q, u = rng.uniform(-1, 1, (20, models[0].nq)), rng.uniform(-2, 2, (20, models[0].nu))
     one, two = (model.accelerations(q, u) for model in models)
     assert np.abs(one - two).max() < 1e-11 * np.abs(one).max()
+    by_rows = mstmm.compile(models[1].scene, sweep="qr").accelerations(q, u)
+    assert np.abs(one - by_rows).max() < 1e-11 * np.abs(one).max()
     energies = []
     for model in models:
         q0 = np.array([0.2, 1, 0, 0, 0, 0.3, -0.4])

@@ -48,6 +48,7 @@ typedef struct {
     void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
     const mstmm_tape *tape;       /* hinge kernel without a compiler, else NULL */
     const mstmm_tape *slope_tape; /* and its derivative */
+    int rigid;                    /* the body is the built-in rigid one */
 } mstmm_kernels;
 
 /* One body with its inboard hinge, in depth-first order. */

@@ -112,6 +112,7 @@ class BodyRecords:
             setattr(made, name, hinge.functions.get(name, none))
         for name in _BODY:
             setattr(made, name, rigid[name])
+        made.rigid = int(of_body[1] == RIGID)
         for name in _BODY_SLOPES:
             setattr(made, name, rigid.get(name, none))
         if hinge.tape is not None:
