@@ -36,7 +36,7 @@ def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[An
 
 
 def relative_error(found: Array, exact: Sequence[Any]) -> float:
-    """Largest difference over the largest entry."""
+    """Largest difference over the largest entry, which is not zero."""
     with mpmath.workdps(DIGITS):
         gaps = [abs(mpmath.mpf(float(a)) - b) for a, b in zip(found, exact, strict=True)]
         return float(max(gaps) / max(map(abs, exact)))

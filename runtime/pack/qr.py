@@ -23,7 +23,7 @@ def attach(packed: Packed) -> None:
     """Let the packed scene use it.
 
     Raises SceneError for flexible bodies, whose modes it has no rows for, and for bodies with
-    negative moments of inertia, which no row has.
+    negative moments of inertia, which no rows have.
     """
     way_out = 'use sweep = "riccati"'
     if packed.flexible:
@@ -37,8 +37,9 @@ def attach(packed: Packed) -> None:
             place = int(np.argmax(packed.system.which == number))
             name = packed.scene.bodies.name(packed.topology.at(place)[0])
             raise SceneError(
-                f'body "{name}": it has a negative moment of inertia about some axis, which is no '
-                f'sum of squares; sweep = "qr" needs one; mend the inertia, or {way_out}'
+                f'body "{name}": its mass matrix is no sum of squares, as sweep = "qr" needs it (a '
+                "negative moment of inertia about some axis, or a mass centre too far away for its "
+                f"digits); mend the body, or {way_out}"
             )
     packed.qr, packed.model.qr = True, 1
 
