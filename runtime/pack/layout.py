@@ -210,6 +210,39 @@ class Layout:
         """First index in q of every unit quaternion (w, x, y, z)."""
         return _joined([group.quaternions() for group in self.groups])
 
+    @cached_property
+    def q_by_unit(self) -> dict[str, Integers]:
+        """Unit -> entries of q that have it, those of quaternions left out."""
+        found: dict[str, list[Integers]] = {}
+        for group in self.groups:
+            places = group.q_places()
+            for j, hinge in enumerate(group.hinges[: group.count]):
+                first, turn = places[j :: len(group.hinges)], hinge.quaternion
+                for k, unit in enumerate(hinge.q_units):
+                    if turn is None or not turn <= k < turn + 4:
+                        found.setdefault(unit, []).append(first + k)
+        return self._with_modes(found, "q")
+
+    @cached_property
+    def u_by_unit(self) -> dict[str, Integers]:
+        """Unit -> entries of u that have it."""
+        found: dict[str, list[Integers]] = {}
+        for group in self.groups:
+            places = group.u_places()
+            for j, hinge in enumerate(group.hinges[: group.count]):
+                first = places[j :: len(group.hinges)]
+                for k, unit in enumerate(hinge.u_units):
+                    found.setdefault(unit, []).append(first + k)
+        return self._with_modes(found, "u")
+
+    def _with_modes(self, found: dict[str, list[Integers]], kind: str) -> dict[str, Integers]:
+        """The entries found of hinges joined with those of flexible bodies."""
+        for body in self.modal.values():
+            start, units = (body.q, body.q_units) if kind == "q" else (body.u, body.u_units)
+            for k, unit in enumerate(units, start):
+                found.setdefault(unit, []).append(np.array([k]))
+        return {unit: np.sort(np.concatenate(parts)) for unit, parts in found.items()}
+
 
 def _joined(parts: list[Integers]) -> Integers:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)

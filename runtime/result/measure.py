@@ -62,8 +62,8 @@ class Coordinates(Measure):
         return result.q
 
     def scale_by(self, numbers: Array) -> None:
-        moved = excursions(self._layout, numbers)
-        self._sizes = {unit: moved[unit] or 1.0 for unit in moved if unit != "rad"}
+        moved = excursions(self._layout, numbers, but="rad")
+        self._sizes = {unit: size or 1.0 for unit, size in moved.items()}
 
     def apart(self, a: Array, b: Array) -> Array:
         found = np.zeros(len(a))

@@ -186,25 +186,18 @@ def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str
     yield from found.items()
 
 
-def differences(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
-    """(unit, largest difference (n,)) of one coordinate of a hinge, or of all that repeat it; of
-    every modal coordinate."""
-    for group in layout.groups:
-        places = group.q_places() if kind == "q" else group.u_places()
-        for j, hinge in enumerate(group.hinges[: group.count]):
-            first = places[j :: len(group.hinges)]
-            units = hinge.q_units if kind == "q" else hinge.u_units
-            turn = hinge.quaternion if kind == "q" else None
-            for k, unit in enumerate(units):
-                if turn is None or not turn <= k < turn + 4:
-                    yield unit, np.abs(a[:, first + k] - b[:, first + k]).max(axis=1)
-            if turn is not None:
-                entries = first[:, None] + turn + np.arange(4)
-                yield "rad", rotation_between(a[:, entries], b[:, entries]).max(axis=1)
-    for body in layout.modal.values():
-        start, units = (body.q, body.q_units) if kind == "q" else (body.u, body.u_units)
-        for k, unit in enumerate(units, start):
-            yield unit, np.abs(a[:, k] - b[:, k])
+def differences(
+    layout: Layout, a: Array, b: Array, kind: str, but: str = ""
+) -> Iterator[tuple[str, Array]]:
+    """(unit, largest difference (n,) of any coordinate of it), rotations apart from other angles;
+    none of the unit `but`."""
+    for unit, places in (layout.q_by_unit if kind == "q" else layout.u_by_unit).items():
+        if unit != but:
+            yield unit, np.abs(a[:, places] - b[:, places]).max(axis=1)
+    quaternions = layout.quaternions
+    if kind == "q" and but != "rad" and len(quaternions):
+        entries = quaternions[:, None] + np.arange(4)
+        yield "rad", rotation_between(a[:, entries], b[:, entries]).max(axis=1)
 
 
 def rotation_between(a: Array, b: Array) -> Array:
@@ -213,10 +206,10 @@ def rotation_between(a: Array, b: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
 
 
-def excursions(layout: Layout, q: Array) -> dict[str, float]:
-    """Unit -> largest excursion from the first sample of any coordinate of that unit."""
+def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:
+    """Unit, other than `but` -> largest excursion from the first sample of any coordinate of it."""
     found: dict[str, float] = {}
-    for unit, difference in differences(layout, q, q[:1], "q"):
+    for unit, difference in differences(layout, q, q[:1], "q", but):
         if len(difference):
             found[unit] = max(found.get(unit, 0.0), float(difference.max()))
     return found

@@ -31,16 +31,24 @@ Operator = Callable[[Array], Array]
 def may_be_fast(scene: Scene, rate: float) -> bool:
     """Whether springs and dampers are stiff enough, beside the smallest inertia, for a motion of
     that |lambda| (1/s); only if they are is it worth while to compute it."""
+    return fastest_possible(scene) > rate
+
+
+def fastest_possible(scene: Scene) -> float:
+    """|lambda| (1/s) of the stiffest spring or damper beside the smallest inertia; 0 without any,
+    inf for inertia of nothing."""
     laws = [table.law for table in (*scene.hinge, *(x for c in scene.chain for x in c.hinge))]
     stiffest = max([k for law in laws for k in law.stiffness], default=0.0)
     stiffest = max([stiffest, *(spring.law.stiffness for spring in scene.spring)])
     damped = max([c for law in laws for c in law.damping], default=0.0)
     damped = max([damped, *(spring.law.damping for spring in scene.spring)])
     if not (stiffest > 0 or damped > 0):
-        return False
+        return 0.0
     tables = (*scene.body, *(table for chain in scene.chain for table in chain.body))
     least = min((min(body.mass, max(body.inertia)) for body in tables), default=0.0)
-    return stiffest > rate * rate * least or damped > rate * least
+    if not least > 0:
+        return math.inf
+    return max(math.sqrt(max(stiffest, 0.0) / least), damped / least)
 
 
 class Fastest:

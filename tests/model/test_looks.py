@@ -72,10 +72,27 @@ def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
 def test_runs_that_end_elsewhere_have_no_estimate() -> None:
     found = [Look(1e-3, True, math.inf, None), Look(1e-5, True, 0.0, None)]
     assert estimate(found) == math.inf
-    assert next_rtol(found, 1e-6, explicit=True) == pytest.approx(1e-8)
+    assert next_rtol(found, 1e-6, explicit=True) == pytest.approx(1e-7)
 
 
-def test_an_explicit_run_after_implicit_ones_is_judged_by_a_looser_one() -> None:
-    found = [Look(1e-4, False, 0.2, 1e-4), Look(1e-8, True, 0.0, 1e-8)]
-    assert estimate(found) == pytest.approx(1.5 * 0.2 * 1e-4**0.8)
-    assert next_rtol(found, 1e-7, explicit=True) == pytest.approx(5e-7)
+def test_an_explicit_run_after_implicit_ones_begins_anew() -> None:
+    implicit = [Look(1e-4, False, 0.05, 1e-4)]
+    first = next_rtol(implicit, 1e-7, explicit=True)
+    assert first == first_rtol(1e-7, explicit=True)
+    found = [*implicit, Look(first, True, 0.0, 1e-2)]
+    assert estimate(found) == pytest.approx(0.05)
+    assert next_rtol(found, 1e-7, explicit=True) == pytest.approx(first * 1e-5 ** (1 / 0.9))
+
+
+def test_local_errors_where_stability_sets_the_steps_count_for_less() -> None:
+    free, held = (next_rtol([Look(3e-3, True, 0.0, 1e-1, h)], 1e-3, True) for h in (False, True))
+    assert free < held < 3e-3
+
+
+def test_with_stops_errors_are_trusted_to_fall_less() -> None:
+    smooth, rough = (
+        estimate([Look(1e-3, True, 0.1, 1e-3, False, r), Look(1e-6, True, 0.0, 1e-6, False, r)])
+        for r in (False, True)
+    )
+    assert smooth is not None and rough is not None
+    assert rough > 1.5 * smooth

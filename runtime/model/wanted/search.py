@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
+from ...host.interruptible import interruptible
 from ...integrate.reached import Attempt, ReachedError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
@@ -26,8 +27,8 @@ from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
 from .asked import Asked
-from .family import Family, explicit, is_explicit
-from .looks import Look, estimate, first_rtol, fresh_rtol, hopeless, next_rtol
+from .family import Family, has_stops, held_back, is_explicit
+from .looks import Look, estimate, first_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
@@ -52,11 +53,7 @@ class _Made:
     run: Trajectory
     numbers: Array
     cpu_s: float
-
-    @property
-    def order(self) -> tuple[bool, float]:
-        """Runs by an explicit method come behind others, which they follow in time, too."""
-        return is_explicit(self.run), -self.run.settings.rtol
+    explicit: bool
 
 
 class Search:
@@ -73,23 +70,36 @@ class Search:
         self._settings = replace(settings, output_times=_looked_at(settings))
         self._family = Family(model, settings, wanted.error, q, u)
         self._measure: Measure | None = None if wanted.of else Coordinates(model)
+        self._rough = has_stops(model)
         self._made: list[_Made] = []  # the one to keep is the last
         self._looks: list[Look] = []
         self._failed: list[Attempt] = []
         self._notes: list[str] = []
 
     def result(self) -> Result:
-        """The run that is kept, with what is known of its error."""
-        method = self._family.first()
-        rtol = first_rtol(self._wanted.error, explicit(method))
+        """The run that is kept, with what is known of its error.
+
+        Ctrl-C ends the run that is going on; between two of them there is none to be returned.
+        """
+        with interruptible() as interrupted:
+            found = self._found_by(interrupted)
+        if interrupted[0] and found.trajectory.status is not None:
+            raise KeyboardInterrupt
+        return found
+
+    def _found_by(self, interrupted: Sequence[bool]) -> Result:
+        """Run after run, until one is good enough, nothing helps, or `interrupted` is set."""
+        kind = self._family.begins_explicit
+        rtol = first_rtol(self._wanted.error, kind)
+        method = self._family.method(kind, rtol, ())
         while True:
             lost = self._run(method, rtol)
-            if lost is not None and lost.status is not None and self._family.rescues(method):
+            if lost is not None and self._family.rescues(lost):
                 method = AUTO
                 continue
             if lost is not None and (not self._made or lost.status is None):
                 return self._lost(lost)
-            why = self._settled(lost)
+            why = "a signal came" if interrupted[0] else self._settled(lost)
             if why is not None:
                 return self._kept(why)
             method, rtol = self._next()
@@ -99,37 +109,49 @@ class Search:
     def _run(self, method: str, rtol: float) -> Trajectory | None:
         """Make one run; returned where it did not reach its end."""
         rtol, atol = _short(rtol), _short(_ATOL * rtol)
-        settings = replace(self._settings, rtol=rtol, atol=atol, method=method)
+        most = self._settings.max_steps if self._made else self._family.most_steps(method)
+        settings = replace(self._settings, rtol=rtol, atol=atol, method=method, max_steps=most)
         watch = Watch(self._told(), settings)
         begin = time.process_time()
         run = first_run(self._model, settings, self._q, self._u, watch)
         spent = time.process_time() - begin
         self._notes += [note for note in watch.notes if note not in self._notes]
-        run = self._seen.given(run, self._q, self._u)
         if not run.success:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
-        result = result_of(self._model, run)
-        if self._measure is None:
-            self._measure = Quantities(result, self._wanted.of)
-        self._made.append(_Made(run, self._measure.read(result), spent))
-        self._made.sort(key=lambda one: one.order)
-        self._measure.scale_by(self._made[-1].numbers)
-        self._looks = [self._look(one) for one in self._made]
+        self._made.append(_Made(run, self._numbers(run), spent, is_explicit(run)))
+        self._look()
         return None
 
-    def _look(self, one: _Made) -> Look:
-        """A run compared with the tightest one."""
-        assert self._measure is not None
-        tightest, way = self._made[-1].numbers, 0.0
-        n = min(len(one.numbers), len(tightest))
-        if not n or abs(len(one.numbers) - len(tightest)) > 1:
-            way = math.inf
-        elif one is not self._made[-1]:
-            way = float(self._measure.apart(one.numbers[:n], tightest[:n]).max()) / self._size
-        counted = one.run.statistics
+    def _numbers(self, run: Trajectory) -> Array:
+        """What is compared, of a run: of coordinates no result has to be made."""
+        if not self._wanted.of:
+            return run.q
+        result = result_of(self._model, self._seen.given(run, self._q, self._u))
+        if self._measure is None:
+            self._measure = Quantities(result, self._wanted.of)
+        return self._measure.read(result)
+
+    def _look(self) -> None:
+        """Look at the last run, the tightest one so far, and at how far the one before is from it:
+        that much are earlier ones, too."""
+        last = self._made[-1]
+        if self._looks:
+            self._looks[-1] = replace(self._looks[-1], apart=self._apart(self._made[-2], last))
+        counted = last.run.statistics
         summed = None if counted is None else counted.sum_local_error
-        return Look(one.run.settings.rtol, is_explicit(one.run), way, summed)
+        rtol, held = last.run.settings.rtol, held_back(last.run)
+        self._looks.append(Look(rtol, last.explicit, 0.0, summed, held, self._rough))
+
+    def _apart(self, one: _Made, tightest: _Made) -> float:
+        """How far a run is from the tightest one, in the size of the motion."""
+        assert self._measure is not None
+        n = min(len(one.numbers), len(tightest.numbers))
+        if not n or abs(len(one.numbers) - len(tightest.numbers)) > 1:
+            return math.inf
+        self._measure.scale_by(tightest.numbers)
+        way = self._measure.apart(one.numbers[:n], tightest.numbers[:n]).max()
+        return float(way) / self._size
 
     def _told(self) -> Progress | None:
         """Progress of the next run: each takes half of what is left."""
@@ -170,10 +192,10 @@ class Search:
         part, kind = self._wanted.error / self._size, self._looks[-1].explicit
         rtol = next_rtol(self._looks, part, kind)
         made = [one.run for one in self._made]
-        method = self._family.method(rtol, fresh_rtol(part), made)
-        if explicit(method) != kind:
-            rtol = next_rtol(self._looks, part, not kind)
-        return method, rtol
+        if self._family.next_is_explicit(rtol, part, made) != kind:
+            kind = not kind
+            rtol = next_rtol(self._looks, part, kind)
+        return self._family.method(kind, rtol, made), rtol
 
     # --- results --------------------------------------------------------------------------------
 
@@ -226,14 +248,16 @@ class Search:
         )  # fmt: skip
 
     def _as_asked(self, run: Trajectory) -> Trajectory:
-        """The run at the samples that the user asked for."""
-        if self._times is None or self._times == self._settings.output_times:
+        """The run with what was seen before it, at the samples that the user asked for."""
+        run = self._seen.given(run, self._q, self._u)
+        times, most = self._times or self._settings.output_times, self._settings.max_steps
+        if (times, most) == (run.settings.output_times, run.settings.max_steps):
             return run
-        keep = np.isin(run.t, self._times)
+        keep = np.isin(run.t, times)
         return replace(
             run, t=run.t[keep], q=run.q[keep], u=run.u[keep], memory=run.memory[keep],
             work=run.work[keep], event=run.event[keep],
-            settings=replace(run.settings, output_times=self._times),
+            settings=replace(run.settings, output_times=times, max_steps=most),
         )  # fmt: skip
 
 
