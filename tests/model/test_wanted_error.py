@@ -16,7 +16,7 @@ from scipy.special import ellipj, ellipk
 import mstmm
 from mstmm.runtime.integrate.loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.model.wanted import search
+from mstmm.runtime.model.wanted import family, search
 from mstmm.runtime.result.output.provenance import attributes
 from mstmm.runtime.run import execution
 
@@ -211,6 +211,18 @@ def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.Monkey
     assert known is not None and known.met
     assert [one.method for one in known.runs if one.failure] == ["rodas4p2"]
     assert {one.method for one in known.runs if not one.failure} == {"auto"}
+
+
+def test_a_first_run_that_takes_too_many_steps_is_given_up_to_auto(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(family, "_PILOT", 10)
+    run = pendulums(2, 2.0).simulate(4.0, error=1e-5)
+    known = run.error_estimate
+    assert known is not None and known.met
+    assert [one.method for one in known.runs if one.failure] == ["dopri5"]
+    assert {one.method for one in known.runs if not one.failure} == {"auto"}
+    assert run.settings.max_steps == 0
 
 
 def test_a_run_of_no_length() -> None:

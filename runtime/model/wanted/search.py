@@ -1,9 +1,10 @@
 """`simulate(error=...)`: the runs by which a wanted error is reached, and what is known of it.
 
-A first run is loose: it shows whether the motion is stiff and what local errors add up to.  The
-next ones come at the tolerances that `looks` makes of what is known, until the estimate of the
-tightest one is what was wanted, or nothing better can be had.  The tightest one is kept.  Nothing
-depends on a clock, so that all of it repeats itself to the last bit.
+A first run is loose and cheap: it shows whether the motion is stiff and what local errors add up
+to, and by how far it is from the next one, the error of that.  The next ones come at the tolerances
+that `looks` makes of what is known, until the estimate of the tightest one is what was wanted, or
+nothing better can be had.  The tightest one is kept.  Nothing depends on a clock, so that all of it
+repeats itself to the last bit.
 """
 
 from __future__ import annotations
@@ -253,6 +254,7 @@ class Search:
         times, most = self._times or self._settings.output_times, self._settings.max_steps
         if (times, most) == (run.settings.output_times, run.settings.max_steps):
             return run
+        assert times is not None  # what is looked at, if nothing else
         keep = np.isin(run.t, times)
         return replace(
             run, t=run.t[keep], q=run.q[keep], u=run.u[keep], memory=run.memory[keep],
