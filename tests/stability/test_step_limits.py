@@ -7,6 +7,8 @@ import pytest
 from support.rod_scenes import ROD, chain
 
 import mstmm
+from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.run.stability import check_step
 
 #: RK4 is stable for h w below 2 sqrt 2 on the imaginary axis, for h |lambda| below 2.785 on the
 #: real one: |1 + z + z^2/2 + z^3/6 + z^4/24| = 1.
@@ -49,13 +51,30 @@ def test_limit_of_a_damped_spring(stiffness: float, ratio: float) -> None:
     assert growth(model, 1.05 * REAL / fastest) > 1e3
 
 
-@pytest.mark.parametrize(("part", "warns"), [(0.5, False), (0.95, True), (1.05, True)])
+@pytest.mark.parametrize(("part", "warns"), [(0.5, False), (0.95, False), (1.05, True)])
 def test_a_step_near_the_limit_brings_a_warning(part: float, warns: bool) -> None:
     model = rod(1e6, 0.0)
     step = part * IMAGINARY / np.sqrt(1e6 / MU)
     result = model.simulate(20 * step, "rk4", step=step)
     named = [text for text in result.warnings if "hinge0" in text and "too long" in text]
     assert bool(named) == warns
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.2, 1.0, 3.0])
+@pytest.mark.parametrize("method", ["rk4", "dopri5", "dop853", "pirk13"])
+def test_every_method_is_judged_by_its_own_limit_in_the_direction_of_the_motion(
+    method: str, ratio: float
+) -> None:
+    """The run itself says where it grows: by 1.1 at least, or not."""
+    rate, t_end = np.sqrt(1e4 / MU), 4.0
+    model = rod(1e4, 2 * ratio * rate * MU)
+    q, u = model.initial_state()
+    some = check_step(model.looped, Settings(t_end, method=method, step=1e-3), q, u)
+    assert some is not None
+    for part, warns in (0.97, False), (1.03, True):
+        run = model.simulate(t_end, method, part * some.stable_step)
+        assert ("step-stability" in {risk.name for risk in run.risks}) == warns
+        assert (np.abs(run.q[-20:, 0]).max() > 1.1 * np.abs(q[0])) == warns
 
 
 @pytest.mark.parametrize("stiff", [0, 1, 2])
