@@ -15,8 +15,6 @@ from ..scene import Scene
 if TYPE_CHECKING:
     from ..derive.catalogue.registry import Element
     from ..runtime.model.model import Model
-    from ..runtime.pack.elements import Known
-    from ..runtime.pack.packed import Packed
 
 ENGINES = ("auto", "fused", "looped")
 SWEEPS = ("riccati", "qr", "product")
@@ -72,7 +70,7 @@ def compile_scene(
     from ..runtime.kernels import store
     from ..runtime.model.model import Model
     from ..runtime.pack.flexible.rigidified import with_level
-    from .fusion import MOST_ASKED, MOST_BODIES, Fusion
+    from .fusion import MOST_ASKED, MOST_BODIES, Fuser
 
     scene = with_level(scene, flexibility)
 
@@ -89,10 +87,9 @@ def compile_scene(
     refused = "asked for" if engine == "looped" else ""
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
-    def fusing(packed: Packed, known: Known) -> Fusion:
-        return Fusion(packed, known, definitions, refused, bake, most)
-
-    model = Model(scene, elements, fusing, product, sweep == "qr")
+    model = Model(
+        scene, elements, Fuser(definitions, refused, bake, most), product, sweep == "qr"
+    )
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()

@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
@@ -237,6 +238,19 @@ class Fusion:
         from ..derive.fuse.implicit import fuse_implicit
 
         return fuse_implicit(structure, kernels_of(self._definitions))
+
+
+@dataclass(frozen=True)
+class Fuser:
+    """How scenes are fused, kept with a model that may be pickled: see `Fusion`."""
+
+    definitions: Mapping[Key, ElementSpec]
+    obstacle: str
+    bake: bool
+    most: int
+
+    def __call__(self, packed: Packed, known: Known) -> Fusion:
+        return Fusion(packed, known, self.definitions, self.obstacle, self.bake, self.most)
 
 
 def modes_at(structure: Structure) -> list[int]:

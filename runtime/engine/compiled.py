@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Self
+from typing import Any, Self
 
 from mstmm.scene import Scene
 
 from ..flexible.modal_body import ModalBody
+from ..kernels import store
 from ..pack import parameters as named_parameters
 from ..pack.elements import Known
 from ..pack.layout import Layout
@@ -39,6 +40,11 @@ class Compiled:
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled are the scene and what was asked; compiled code is looked for again."""
+        asked = (self._fusing, self._product_accuracy, self.fusion.library is not None)
+        return _again, (type(self), self.scene, *asked)
 
     @property
     def packed(self) -> Packed:
@@ -97,3 +103,19 @@ class Compiled:
         )  # fmt: skip
         changed.fusion.follow(self.fusion)
         return changed
+
+
+def _again(
+    kind: type[Compiled],
+    scene: Scene,
+    fusing: Callable[[Packed, Known], Fusing] | None,
+    product_accuracy: float | None,
+    fused: bool,
+) -> Compiled:
+    """What was pickled; with the fused code that it had where that is in the cache here."""
+    known, definitions = store.known(store.needed(scene))
+    scene.check_types(definitions)
+    made = kind(scene, known, fusing, product_accuracy)
+    if fused:
+        made.fusion.find()
+    return made

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,10 @@ class Record(FlexibleResults, ABC):
         self.settings: Settings = run.settings
         self._observed = Observed(model, run)
         self._quantities = Quantities(self._observed, self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled are the model and the run; what follows from them is computed again."""
+        return type(self), (self.model, self.trajectory, self._error, self._step)
 
     @property
     def success(self) -> bool:

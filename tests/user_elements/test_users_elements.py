@@ -6,6 +6,7 @@ folder; every motion is compared with something that shares nothing with it.
 
 from __future__ import annotations
 
+import pickle
 import shutil
 import time
 from collections.abc import Callable
@@ -102,6 +103,14 @@ def wobble_motion(turn: sp.Symbol, tilt: sp.Symbol) -> tuple[sp.Matrix, sp.Matri
     about_z = sp.Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     about_x = sp.Matrix([[1, 0, 0], [0, sp.cos(b), -sp.sin(b)], [0, sp.sin(b), sp.cos(b)]])
     return about_z * about_x, sp.Matrix([0.2 * c, 0.2 * s, 0.05 * turn * sp.cos(tilt)])
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_a_model_with_such_a_hinge_can_be_pickled(name: str, compiled: Make) -> None:
+    compiled(name)
+    model = mstmm.compile(started(name))
+    again, (q, u) = pickle.loads(pickle.dumps(model)), model.initial_state()
+    np.testing.assert_array_equal(again.accelerations(q, u), model.accelerations(q, u))
 
 
 @pytest.mark.parametrize(("name", "motion"), [("knee", knee_motion), ("wobble", wobble_motion)])

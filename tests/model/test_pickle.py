@@ -1,0 +1,56 @@
+"""Models and results can be pickled and copied: as the scene and the run that they come from."""
+
+from __future__ import annotations
+
+import pickle
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.result_scenes import pins
+
+import mstmm
+
+#: A beam at a hub; as a one-way body its results are of their own kind.
+BLADE = mstmm.Scene(
+    gravity=(0, -9.81, 0),
+    beam=[{"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 100.0,
+           "modes": {"y": 2}}],
+    hinge=[{"name": "hub", "type": "fixed", "inboard": "ground", "outboard": "blade"}],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused", "auto"])
+def test_a_result_comes_back_with_all_that_follows_from_it(engine: str) -> None:
+    run = mstmm.compile(pins(2, [1.0, 0.3]), engine=engine).simulate(1.0, rtol=1e-5, certify=True)
+    for again in pickle.loads(pickle.dumps(run)), deepcopy(run):
+        np.testing.assert_array_equal(again.q, run.q)
+        np.testing.assert_array_equal(again.acceleration("rod1"), run.acceleration("rod1"))
+        assert again.risks == run.risks and str(again.certificate) == str(run.certificate)
+        assert again.model.engine == run.model.engine
+        np.testing.assert_array_equal(again.model.simulate(1.0, rtol=1e-5).q, run.q)
+
+
+def test_a_fixed_step_is_judged_as_before() -> None:
+    run = mstmm.compile(pins(1, [1.0], damping=100.0)).simulate(1.0, "rk4", 0.02)
+    again = pickle.loads(pickle.dumps(run))
+    assert "step-stability" in {risk.name for risk in run.risks} and again.risks == run.risks
+
+
+def test_a_one_way_result_and_a_loaded_one(tmp_path: Path) -> None:
+    pytest.importorskip("h5netcdf")
+    run = mstmm.compile(BLADE, flexibility="one-way").simulate(0.5, output_times=[0.1, 0.5])
+    loaded: Any = mstmm.load_result(run.save(tmp_path / "run.nc"))
+    for again in pickle.loads(pickle.dumps(run)), pickle.loads(pickle.dumps(loaded)):
+        assert type(again) is type(run)
+        np.testing.assert_array_equal(again.deflection("blade", "tip"), run.deflection("blade", "tip"))
+
+
+def test_a_model_keeps_its_numbers_and_what_was_asked() -> None:
+    model = mstmm.compile(pins(2, [1.0, 0.3]), sweep="product").with_parameters({"rod0.mass": 2.0})
+    again = pickle.loads(pickle.dumps(model))
+    assert again.parameters == model.parameters and again.engine_choice == model.engine_choice
+    q, u = model.initial_state()
+    np.testing.assert_array_equal(again.accelerations(q, u), model.accelerations(q, u))
