@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from numbers import Real
 from typing import Any
 
 #: What a run may do about its risks.
 ON_RISK = ("warn", "refuse", "ignore")
+
+#: The element of what concerns a run as a whole.
+RUN = "the run"
 
 
 @dataclass(frozen=True)
@@ -20,10 +24,11 @@ class Risk:
 
     Attributes:
         name: of the kind, such as "step-stability".
-        element: what it is about, such as 'hinge "elbow"'; "" for the run as a whole.
+        element: what it is about, such as 'hinge "elbow"'; RUN for the run as a whole.
         means: what was seen and what follows from it, a sentence without its end.
-        remedy: what to do about it; "" where nothing is known that helps.
+        remedy: what to do about it.
         figure, limit: what was looked at, and from where on it is a risk; None without a number.
+        unit: of both; "1" for ratios.
         doubt: it speaks against the numbers; else it is only worth knowing.
         before: it was seen before the run, in the scene and its start.
     """
@@ -31,14 +36,21 @@ class Risk:
     name: str
     element: str
     means: str
-    remedy: str = ""
+    remedy: str
     figure: float | None = None
     limit: float | None = None
+    unit: str = "1"
     doubt: bool = True
     before: bool = False
 
+    def __post_init__(self) -> None:
+        for name in ("figure", "limit"):  # plain numbers, whatever they were computed by
+            value = getattr(self, name)
+            if isinstance(value, Real):
+                object.__setattr__(self, name, float(value))
+
     def __str__(self) -> str:
-        return f"{self.means}; {self.remedy}" if self.remedy else self.means
+        return f"{self.means}; {self.remedy}"
 
 
 def sentences(risks: Iterable[Risk]) -> tuple[str, ...]:
@@ -55,7 +67,7 @@ def from_rows(rows: Iterable[Mapping[str, Any]]) -> tuple[Risk, ...]:
     """What `to_rows` gave.  TypeError where that is something else."""
     found = tuple(Risk(**row) for row in rows)
     for risk in found:
-        words = (risk.name, risk.element, risk.means, risk.remedy)
+        words = (risk.name, risk.element, risk.means, risk.remedy, risk.unit)
         numbers = (risk.figure, risk.limit)
         if not all(isinstance(word, str) for word in words) or not all(
             x is None or isinstance(x, (int, float)) for x in (*numbers, risk.doubt, risk.before)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from mstmm.risk import to_rows
@@ -132,10 +132,10 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
 def _certificate(result: Result) -> dict[str, Any]:
     """The certificate as plain numbers; the estimated error per unit."""
     certificate = result.certificate
-    data = {key: value for key, value in vars(certificate).items() if key != "error"}
+    told = ("error", "reached", "models", "known", "control")  # in other rows
+    data = {f.name: getattr(certificate, f.name) for f in fields(certificate) if f.name not in told}
     plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
-    for told in ("reached", "models", "known"):  # the error, and the risks, stand by themselves
-        plain.pop(told)
+    plain["risks"] = to_rows(certificate.risks)
     plain["momentum"] = [vars(drift) for drift in certificate.momentum]
     plain["flexible"] = [vars(body) for body in certificate.flexible]
     error = certificate.error

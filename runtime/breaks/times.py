@@ -54,7 +54,8 @@ class TimeMap:
             "narrow-load", self.narrowest,
             f"the fixed step of {step:g} s is too long for {self.narrowest}, which near "
             f"t = {at:.6g} s asks for steps of {shortest:.2g} s: what it does may be missed",
-            f"take a step below {shortest:.2g} s, or leave step out", step, shortest, before=True,
+            f"take a step below {shortest:.2g} s, or leave step out", step, shortest, "s",
+            before=True,
         )  # fmt: skip
 
 

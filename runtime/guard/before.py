@@ -51,16 +51,17 @@ class Later:
 
 @dataclass(frozen=True)
 class Start:
-    """What is known of a run at its start: the fixed step against the fastest motion, and risks;
-    whether its user wants to be told of those."""
+    """What is known of a run of a model at its start: the fixed step against the fastest motion,
+    and risks; whether its user wants to be told of those."""
 
+    model: Compiled
     step: StepCheck | None
     risks: Iterable[Risk]
     told: bool = True
 
     def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
-        """The run from (nq,), (nu,) with what was known of it."""
-        risks = Later(lambda: (*self.risks, *run.risks))
+        """The run from (nq,), (nu,) with what was known of it, and what its steps tell."""
+        risks = Later(lambda: (*self.risks, *run.risks, *fast.held_back(self.model, run)))
         return replace(run, start=(q, u), risks=risks, told=self.told)
 
 
@@ -75,8 +76,9 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
         _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
     guards, known = _concerned[model], (*own, *foreseen(model.packed, settings))
     if not guards:
-        return Start(step, known)
+        return Start(model, step, known)
     return Start(
+        model,
         step,
         Later(lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u)))),
     )

@@ -77,8 +77,16 @@ class ReachedError:
         return Risk(
             "wanted-error", self.of,
             f"the error of {self.of} asked for, {_with(self.asked, self.unit)}, is not reached: "
-            f"the estimate is {reached}, because {self.why}", "", self.estimate, self.asked,
+            f"the estimate is {reached}, because {self.why}", self._remedy, self.estimate,
+            self.asked, self.unit,
         )  # fmt: skip
+
+    @property
+    def _remedy(self) -> str:
+        shorter = "simulate a shorter time"
+        if self.estimate is None:
+            return shorter
+        return f"ask for {_with(self.estimate, self.unit)} or more, or {shorter}"
 
     @property
     def warning(self) -> str:

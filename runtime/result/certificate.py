@@ -11,12 +11,13 @@ from ..integrate.reached import ReachedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate
 from ..run.stability import StepCheck
 from .conditioning import LARGEST, PivotLoss, SingularDistance
+from .control import Control
 from .evidence import Drift, Give
 from .flexible import certify
 from .flexible import risks as flexible_risks
 from .flexible.certify import Flexibility
-from .risks import of_balances, of_numbers, of_quaternions, of_speed, ordered
-from .verdict import ACCURACY, DRIFT, Verdict
+from .risks import of_balances, of_numbers, of_quaternions, ordered
+from .verdict import ACCURACY, Verdict
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Certificate:
         pivot: the worst loss of digits in the sweep: about 1e-16 times its ratio.
         singular: the closest approach to coordinates that fail (gimbal).
         step: the fixed step against the fastest motion at the start; None for adaptive runs.
+        later: the same at the first sample for which it is too long; None where there is none.
         stability_limited: the method's stability, not its accuracy, set many of the steps; not told
             of runs that chose their methods themselves.
         sum_of_local_errors: in the mixed units of q and u; NOT the error of the result, which may
@@ -45,6 +47,7 @@ class Certificate:
         models: where models of the scene are outside their range whatever the run.
         known: of the scene and its start before the run, and what the run itself has seen.
         reached: of the error that was asked for (error=...); None where none was.
+        control: of the steps, which says how well balances can be expected to be kept.
     """
 
     energy: Drift
@@ -58,6 +61,8 @@ class Certificate:
     error: ErrorEstimate | None
     finite: bool
     end: str
+    control: Control
+    later: StepCheck | None = None
     too_large: bool = False
     samples: int = 2
     flexible: tuple[Flexibility, ...] = ()
@@ -67,9 +72,10 @@ class Certificate:
     known: tuple[Risk, ...] = ()
     reached: ReachedError | None = None
 
-    def verdict(self, accuracy: float = ACCURACY, balance: float = DRIFT) -> Verdict:
+    def verdict(self, accuracy: float = ACCURACY, balance: float | None = None) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
-        angles as a part of how far they went) and `balance` (relative, of energy and momentum)."""
+        angles as a part of how far they went) and `balance` (relative, of energy and momentum; None
+        for what the run's own tolerance or step leaves)."""
         return _verdict(self, accuracy, balance)
 
     @property
@@ -77,27 +83,20 @@ class Certificate:
         """True where balances, error and models were looked at and all stay within bounds."""
         return self.verdict().trusted
 
-    @property
-    def drift(self) -> float:
-        """Relative drift of energy and momentum beyond which they count as not kept: no less than
-        the error that was asked for, where that is in parts or rad."""
-        if self.reached is None or self.reached.unit not in ("1", "rad"):
-            return DRIFT
-        return max(DRIFT, self.reached.asked)
-
     @cached_property
     def risks(self) -> tuple[Risk, ...]:
         """What asks for attention, doubts first; empty for a clean run."""
         pivot, locked = self.pivot, self.singular
         if pivot and locked and locked.risk and pivot.hinge == locked.hinge:
             pivot = None  # it vanishes where the coordinates fail
-        looked_at = (pivot, locked, self.step)
+        early = self.step is not None and self.step.risk is not None
+        looked_at = (pivot, locked, self.step if early else self.later)
         return ordered((
             *of_numbers(self.finite, self.reached), *self.known,
-            *of_balances((self.energy, *self.momentum), self.drift),
+            *of_balances((self.energy, *self.momentum), self.control),
             *of_quaternions(self.quaternion_residual),
             *(x.risk for x in looked_at if x is not None and x.risk is not None),
-            *flexible_risks.risks(self.flexible), *self.models, *of_speed(self.stability_limited),
+            *flexible_risks.risks(self.flexible), *self.models,
         ))  # fmt: skip
 
     @property
@@ -150,13 +149,14 @@ class Certificate:
 # --- verdict --------------------------------------------------------------------------------------
 
 
-def _verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:
+def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     """The verdict within bounds: `accuracy` of the error in rad, of coordinates that are no angles
     as a part of how far they went; `balance` of energy and momentum, relative."""
+    kept = c.control.bound if balance is None else balance
     against = list(c.failures) + [
-        f"{d.name} changes by {d}, more than the {balance:g} asked for"
+        f"{d.name} changes by {d}, more than the {kept:g} asked for"
         for d in (c.energy, *c.momentum)
-        if balance < d.relative <= c.drift and c.drift == DRIFT
+        if kept < d.relative <= c.control.bound
     ]
     missing = []
     if c.samples < 2:
@@ -169,7 +169,6 @@ def _verdict(c: Certificate, accuracy: float, balance: float) -> Verdict:
     words = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
     if c.reached is not None:
         words = f"the error of {c.reached.of} as asked for"
-    kept = max(balance, c.drift) if c.drift > DRIFT else balance
     return Verdict(
         tuple(dict.fromkeys(against)), tuple(missing), f"{words}, balances within {kept:g}"
     )  # fmt: skip
@@ -189,7 +188,11 @@ def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
 
 
 def _until(error: ErrorEstimate) -> str:
-    return "" if error.horizon is None else f" (predictable until {error.horizon:.4g} s)"
+    if error.horizon is None:
+        return ""
+    if error.nowhere:
+        return " (not predictable beyond its start)"
+    return f" (predictable until {error.horizon:.4g} s)"
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -202,19 +205,23 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
         covered = [("what this covers", _covered(c))]
         missing = [("error", "not estimated (certify=True makes a second run)")]
         return rows + covered if rows else missing
-    until = "" if error.horizon is None else f" up to t = {error.horizon:.6g} s"
+    within = error.horizon is not None and not error.nowhere
+    until = f" up to t = {error.horizon:.6g} s" if within else ""
     for kind in ("q", "u"):
-        at_all = "; " + _values(error.whole(kind)) + " over the whole run" if until else ""
-        values = _values(error.largest(kind))
+        at_all = "; " + _values(error.whole(kind)) + " over the whole run" if within else ""
+        values = _values(error.largest(kind) if within else error.whole(kind))
         if values:
             about = f" (from a second run, {error.reference})" if kind == "q" else ""
             rows.append((f"error of {kind}, at most", f"{values}{until}{at_all}{about}"))
     rows.append(("what this covers", _covered(c)))
     if error.horizon is not None:
+        since = (
+            f"t = {error.horizon:.6g} s: later" if within else "the start: from the first sample on"
+        )
         rows.append((
             "predictable until",
-            f"t = {error.horizon:.6g} s: later the two runs differ by more than {ANGLE:g} rad or "
-            f"{PART:.0%} of the motion, and errors have no meaning",
+            f"{since} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of the motion, "
+            "and errors have no meaning",
         ))  # fmt: skip
     if error.tenfold is not None:
         rows.append(("growth of errors", f"tenfold every {error.tenfold:.3g} s"))

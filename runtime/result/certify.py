@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..run.error_estimate import ErrorEstimate
-from ..run.stability import StepCheck
+from ..run.stability import StepCheck, check_later
 from . import gives
 from .balances import energy, momentum
 from .certificate import Certificate
 from .conditioning import LARGEST, pivot_loss, singular_distance
+from .control import control
 from .flexible import certify
 from .narrow import passed_over
 from .record import Record
@@ -25,6 +26,7 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         pivot=pivot_loss(result.model, run),
         singular=singular_distance(result.model, run),
         step=step,
+        later=check_later(result.model.looped, run),
         stability_limited=(
             statistics is not None and statistics.stability_limited and not run.methods
         ),
@@ -32,6 +34,7 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         error=error,
         finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
         end=result.message,
+        control=control(run.settings, run.reached),
         too_large=len(result.model.scene.bodies) > LARGEST,
         samples=len(result.t),
         flexible=certify.flexibilities(result._flexible),

@@ -90,6 +90,7 @@ class SingularDistance:
                 "gimbal", f'hinge "{self.hinge}"',
                 f"{near}, and its angles change there by {self.turned:.2g} rad within a step",
                 "use a ball hinge, or a method that chooses its steps", self.turned, TURNED,
+                "rad",
             )  # fmt: skip
         return None
 

@@ -49,12 +49,13 @@ _NAMES = 100
 @dataclass(frozen=True)
 class _Path:
     """A coordinate along a run: its values (n,) at the start, the samples and the end; between two
-    of them the smallest and the largest, and how far a step went at most, (n - 1,)."""
+    of them the smallest and the largest, and how far a step went at most, (n - 1,); its unit."""
 
     ends: Array
     least: Array
     most: Array
     moved: Array
+    unit: str
 
 
 def passed_over(model: Compiled, run: Trajectory) -> tuple[Risk, ...]:
@@ -72,7 +73,7 @@ def _seen(model: Compiled, run: Trajectory) -> tuple[Risk, ...]:
     for what, view, path in islice(_of_motion(model, run), _NAMES):
         place = _first(view, path, _ends_are_steps(run))
         if place is not None:
-            found.setdefault(what, _risk(what, view.variable, *place))
+            found.setdefault(what, _risk(what, view.variable, path.unit, *place))
     return tuple(found.values())
 
 
@@ -93,13 +94,13 @@ def _every_step(model: Compiled, run: Trajectory) -> Trajectory | None:
     return replace(again, start=(q, u)) if again.success else None
 
 
-def _risk(what: str, name: str, place: float, way: float, longest: float) -> Risk:
+def _risk(what: str, name: str, unit: str, place: float, way: float, longest: float) -> Risk:
     return Risk(
         "narrow-load", what,
         f"{what} does something near {name} = {place:.6g}, narrower than {longest:.2g}, that steps "
         f"of up to {way:.2g} there have passed over",
         f"write it within where({name} > a, where({name} < b, ..., 0), 0) with a and b close "
-        "around it, where steps end, or give max_step", way, float(longest),
+        "around it, where steps end, or give max_step", way, longest, unit,
     )  # fmt: skip
 
 
@@ -162,7 +163,7 @@ def _path(
     if slots.straight:
         between = _cubic(np.diff(t), ends, u[:, slots.u + index])
     way = np.abs(np.diff(between, axis=0)).sum(axis=0)
-    return _Path(ends, between.min(axis=0), between.max(axis=0), parts * way)
+    return _Path(ends, between.min(axis=0), between.max(axis=0), parts * way, slots.q_units[index])
 
 
 def _cubic(h: Array, ends: Array, rates: Array) -> Array:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from mstmm.risk import Risk
+from mstmm.risk import RUN, Risk
 
 from ..integrate.reached import ReachedError
+from .control import Control
 from .evidence import Drift
 
 #: Distance of a quaternion's length from 1 that is a risk.
@@ -24,25 +25,28 @@ def ordered(found: Iterable[Risk]) -> tuple[Risk, ...]:
 def of_numbers(finite: bool, reached: ReachedError | None) -> Iterator[Risk]:
     """Numbers that are none, and a wanted error that was not reached."""
     if not finite:
-        yield Risk("not-finite", "", "the states hold numbers that are not finite")
+        yield Risk(
+            "not-finite", RUN, "the states hold numbers that are not finite",
+            "take smaller steps or tolerances, or look for what goes to infinity",
+        )  # fmt: skip
     if reached is not None and reached.risk is not None:
         yield reached.risk
 
 
-def of_balances(drifts: Sequence[Drift], limit: float) -> Iterator[Risk]:
-    """What is not known of energy and momentum, and what is not kept to a relative `limit`."""
+def of_balances(drifts: Sequence[Drift], control: Control) -> Iterator[Risk]:
+    """What is not known of energy and momentum, and what is not kept as the steps let expect."""
     for drift in drifts:
         if not drift.known:
             yield Risk(
                 _kind(drift), drift.name,
                 f"{drift.name} cannot be balanced: it is beyond what numbers hold, or no sample "
-                "gives it",
+                "gives it", "take smaller steps or tolerances, or look for what goes to infinity",
             )  # fmt: skip
     for drift in drifts:
-        if drift.relative > limit:
+        if drift.relative > control.bound:
             yield Risk(
                 _kind(drift), drift.name, f"{drift.name} is not kept: it changes by {drift}",
-                "the tolerance or the step is too coarse", drift.relative, limit,
+                control.finer(drift.relative), drift.relative, control.bound,
             )  # fmt: skip
 
 
@@ -50,7 +54,7 @@ def of_quaternions(residual: float) -> Iterator[Risk]:
     """Quaternions that were far from length 1 before they were settled."""
     if residual > LENGTH:
         yield Risk(
-            "quaternion-length", "",
+            "quaternion-length", RUN,
             f"quaternions were {residual:.1e} off their length 1 between the steps: attitudes err "
             "by about as much", "take smaller tolerances, or a method of the package", residual,
             LENGTH,
@@ -59,14 +63,3 @@ def of_quaternions(residual: float) -> Iterator[Risk]:
 
 def _kind(drift: Drift) -> str:
     return "energy-drift" if drift.unit == "J" else "momentum-drift"
-
-
-def of_speed(stability_limited: bool) -> Iterator[Risk]:
-    """Advice for a run whose steps stability has set."""
-    if stability_limited:
-        yield Risk(
-            "stiff", "",
-            "many steps were as long as the stability of the explicit method allows: the scene is "
-            'stiff for it (method = "auto" or "rodas4p2" may be faster), or the fixed step is too '
-            "long", doubt=False,
-        )  # fmt: skip

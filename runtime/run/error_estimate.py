@@ -87,6 +87,11 @@ class ErrorEstimate:
     reference: str
     moved: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def nowhere(self) -> bool:
+        """Whether the runs part at the first sample already behind the start, if not there."""
+        return self.horizon is not None and self.horizon <= self.t[0]
+
     def whole(self, kind: str = "q") -> dict[str, float]:
         """Unit -> largest difference of the two runs, as an error, whatever the horizon."""
         values: dict[str, Array] = getattr(self, kind)

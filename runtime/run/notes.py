@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.risk import Risk
+from mstmm.risk import RUN, Risk
 
 from ..integrate.steppers import get
 from ..pack.switches import MOST
@@ -34,7 +34,7 @@ def foreseen(packed: Packed, settings: Settings) -> tuple[Risk, ...]:
     count = len(packed.watched.switches)
     if count > MOST:
         found.append(Risk(
-            "switches", "",
+            "switches", RUN,
             f"more than {MOST} conditions depend on the motion; those behind the first {MOST} do "
             "not end a step where they switch", "give max_step so that none is passed over",
             count, MOST, before=True,
@@ -55,9 +55,10 @@ def unresolved(run: Trajectory) -> tuple[Risk, ...]:
     if settings.step > settings.t_end - settings.t_start:
         span = settings.t_end - settings.t_start
         return (Risk(
-            "step-accuracy", "",
+            "step-accuracy", RUN,
             f"step = {settings.step:.4g} s is longer than the run, which is one step then",
-            f"take one below {span:.4g} s", settings.step, span, before=True,
+            f"take one below {span:.4g} s", settings.step, span, "s",
+            before=True,
         ),)  # fmt: skip
     if error is None or len(run.t) < 3:
         return ()
@@ -67,7 +68,7 @@ def unresolved(run: Trajectory) -> tuple[Risk, ...]:
         return ()
     shorter = settings.step * (_SURE * _PART * way / error) ** (1 / tableau.error_order)
     return (Risk(
-        "step-accuracy", "",
+        "step-accuracy", RUN,
         f"step = {settings.step:.4g} s is too long for the motion: by their own estimate its steps "
         f"err by {error / way:.0%} of the way that is covered",
         f"take a step below {shorter:.2g} s, or leave step out", error / way, _PART,

@@ -19,6 +19,7 @@ def test_a_doubtful_result_is_saved_and_then_refused(mstmm: Command, folder: Pat
     data = json.loads(mstmm(*COARSE, "--step", "0.2", "--on-risk", "refuse", "--json").out)
     assert [row["name"] for row in data["risks"]] == ["energy-drift"]
     assert data["risks"][0]["figure"] > data["risks"][0]["limit"]
+    assert data["certificate"]["risks"] == data["risks"]
     assert data["error"]["exit_code"] == 4 and "energy-drift" in data["error"]["message"]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.risk import Risk, from_rows, sentences, to_rows
+from mstmm.risk import RUN, Risk, from_rows, sentences, to_rows
 from mstmm.runtime.result.risks import ordered
 
 #: A fixed step at which the fastest motion is followed badly but stays bounded.
@@ -33,22 +32,40 @@ def swinging() -> mstmm.Model:
 def test_a_row_reads_as_a_sentence_and_comes_back_from_plain_data() -> None:
     risk = Risk("gimbal", 'hinge "a"', "it is near", "use a ball", 1e-4, 1e-3)
     assert str(risk) == "it is near; use a ball"
-    assert str(replace(risk, remedy="")) == "it is near"
     assert from_rows(to_rows([risk])) == (risk,)
     assert sentences([risk, risk]) == ("it is near; use a ball",)
+
+
+def test_numbers_of_rows_are_plain() -> None:
+    risk = Risk("a", RUN, "b", "c", np.float64(1.5), np.float32(1.0), "rad")  # type: ignore[arg-type]
+    assert type(risk.figure) is float and type(risk.limit) is float
+    run = swinging().simulate(5.0, method="genalpha", step=0.3)
+    assert {risk.name for risk in run.risks} == {"step-accuracy", "energy-drift"}
+    for risk in run.risks:
+        assert type(risk.figure) is float and type(risk.limit) is float
+        assert risk.element and risk.remedy and risk.unit == "1"
+
+
+def test_what_a_body_s_model_lacks_has_its_way_out_apart() -> None:
+    beam = {"name": "boom", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1e3,
+            "basis": "static+fixed-interface", "modes": {"y": 1}}  # fmt: skip
+    hold = {"name": "hold", "type": "fixed", "inboard": "ground", "outboard": "boom"}
+    scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[beam], hinge=[hold])
+    (risk,) = (r for r in mstmm.compile(scene).simulate(0.1).risks if r.name == "body-model")
+    assert risk.remedy == "give 2 or more" and "cannot carry" in risk.means
 
 
 @pytest.mark.parametrize("wrong", [{"name": 1}, {"figure": "much"}, {"colour": "red"}])
 def test_rows_of_another_kind_are_not_taken(wrong: dict[str, Any]) -> None:
     with pytest.raises(TypeError):
-        from_rows([{"name": "a", "element": "", "means": "b"} | wrong])
+        from_rows([{"name": "a", "element": "", "means": "b", "remedy": "c"} | wrong])
 
 
 def test_what_the_run_has_seen_stands_for_what_was_seen_before() -> None:
-    early = Risk("pivot-loss", 'hinge "a"', "soon", before=True)
-    other = Risk("pivot-loss", 'hinge "b"', "soon", before=True)
-    late = Risk("pivot-loss", 'hinge "a"', "now")
-    advice = Risk("stiff", "", "slow", doubt=False)
+    early = Risk("pivot-loss", 'hinge "a"', "soon", "mend it", before=True)
+    other = Risk("pivot-loss", 'hinge "b"', "soon", "mend it", before=True)
+    late = Risk("pivot-loss", 'hinge "a"', "now", "mend it")
+    advice = Risk("stiff", RUN, "slow", "be patient", doubt=False)
     assert ordered([advice, early, other, late, late]) == (other, late, advice)
 
 

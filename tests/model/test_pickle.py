@@ -24,8 +24,10 @@ BLADE = mstmm.Scene(
 
 @pytest.mark.parametrize("engine", ["looped", "fused", "auto"])
 def test_a_result_comes_back_with_all_that_follows_from_it(engine: str) -> None:
-    run = mstmm.compile(pins(2, [1.0, 0.3]), engine=engine).simulate(1.0, rtol=1e-5, certify=True)
-    for again in pickle.loads(pickle.dumps(run)), deepcopy(run):
+    model = mstmm.compile(pins(2, [1.0, 0.3]), engine=engine)
+    run = model.simulate(1.0, rtol=1e-5, certify=True)
+    again: Any
+    for again in (pickle.loads(pickle.dumps(run)), deepcopy(run)):
         np.testing.assert_array_equal(again.q, run.q)
         np.testing.assert_array_equal(again.acceleration("rod1"), run.acceleration("rod1"))
         assert again.risks == run.risks and str(again.certificate) == str(run.certificate)
@@ -45,7 +47,9 @@ def test_a_one_way_result_and_a_loaded_one(tmp_path: Path) -> None:
     loaded: Any = mstmm.load_result(run.save(tmp_path / "run.nc"))
     for again in pickle.loads(pickle.dumps(run)), pickle.loads(pickle.dumps(loaded)):
         assert type(again) is type(run)
-        np.testing.assert_array_equal(again.deflection("blade", "tip"), run.deflection("blade", "tip"))
+        np.testing.assert_array_equal(
+            again.deflection("blade", "tip"), run.deflection("blade", "tip")
+        )
 
 
 def test_a_model_keeps_its_numbers_and_what_was_asked() -> None:

@@ -13,7 +13,7 @@ from support.rod_scenes import chain, drawn_state, precise_accelerations
 import mstmm
 from mstmm.runtime.result.certificate import Certificate
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run.stability import fastest
+from mstmm.runtime.run.motions import fastest
 
 
 def free_pair(**space: object) -> mstmm.Scene:
@@ -246,12 +246,12 @@ def test_the_fastest_motion_of_a_pin_with_a_law(
 
 
 def test_the_fastest_motion_of_a_long_chain_is_found_without_a_dense_matrix() -> None:
-    from mstmm.runtime.run import stability
+    from mstmm.runtime.run import motions
 
     engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4)).looped
     y = np.concatenate([np.tile([0.05, -0.1], 45), np.zeros(90)])
     dense = np.linalg.eigvals(
-        stability._differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180)) / 1e-6
+        motions._differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180)) / 1e-6
     )
     value, _ = fastest(engine, 0.0, y, engine.start_memory())
     assert abs(value) == pytest.approx(np.abs(dense).max(), rel=0.05)

@@ -75,6 +75,16 @@ def test_a_chaotic_run_is_not_trusted_past_its_horizon() -> None:
     assert "over the whole run" in str(run.certificate)
 
 
+def test_a_run_that_is_wrong_from_its_first_sample_on_has_no_time_up_to_which_it_is_right() -> None:
+    run = mstmm.compile(pins(1, [1.5])).simulate(5.0, method="genalpha", step=0.4, certify=True)
+    text, error = str(run.certificate), run.certificate.error
+    assert error is not None and error.horizon == 0.0
+    assert "t = 0 s" not in text and "over the whole run" not in text
+    assert "the start: from the first sample on the two runs differ" in text
+    assert f"{error.whole()['rad']:.1e} rad (from a second run" in text
+    assert "(not predictable beyond its start)" in str(run.certificate.verdict())
+
+
 def test_a_failed_run_is_not_trusted_and_says_why_first() -> None:
     run = mstmm.compile(motor("1/(0.5 - t)")).simulate(1.0, certify=True)
     assert not run.success

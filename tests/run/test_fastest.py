@@ -14,7 +14,7 @@ from support.result_scenes import pins
 import mstmm
 from benchmarks.stiff.cases import CASES
 from mstmm.runtime.run.fastest import Fastest
-from mstmm.runtime.run.stability import fastest
+from mstmm.runtime.run.motions import fastest
 
 TREES, STIFF = 200, 300.0
 

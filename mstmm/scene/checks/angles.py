@@ -58,5 +58,5 @@ def _of_angles(what: str, values: tuple[float, ...], at: int | None = None) -> I
                 "degrees", what.partition(": ")[0],
                 f"{what}: {value:.6g} rad is {abs(value) / (2 * math.pi):.3g} turns",
                 f"if degrees were meant, write {math.radians(value):.6g}", abs(value), 2 * math.pi,
-                doubt=False, before=True,
+                "rad", doubt=False, before=True,
             )  # fmt: skip

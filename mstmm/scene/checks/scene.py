@@ -172,14 +172,17 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
             means = f"{name}: inertia: {excess}; accepted as asked"
-            found.append(Risk("inertia", name, means, doubt=False, before=True))
+            remedy = "correct it unless it stands for something else than a body"
+            found.append(Risk("inertia", name, means, remedy, doubt=False, before=True))
         dusty += [(name, x) for k, x in enumerate(body.inertia[:3])
                   if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
     if dusty:
         name, entry = dusty[0]
         more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
         means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}"
-        found.append(Risk("inertia", name, means, figure=entry, doubt=False, before=True))
+        found.append(Risk(
+            "inertia", name, means, "write 0 for it", entry, 0.0, "kg*m2", doubt=False, before=True,
+        ))  # fmt: skip
     return (*found, *notes(scene), *flexible_bodies.risks(scene))
 
 

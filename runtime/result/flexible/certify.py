@@ -56,7 +56,7 @@ class Flexibility:
             outermost fibres; None where it has no length.
         sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
             where it has all shapes.
-        said: what is known of the body's model before it moves, one sentence each.
+        said: what is known of the body's model before it moves, and a way out, one sentence each.
         one_way: it responds to a rigid run, linearly, and is no part of it.
     """
 

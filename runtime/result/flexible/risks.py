@@ -18,7 +18,11 @@ SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.
 
 def risks(found: Sequence[Flexibility]) -> list[Risk]:
     """What speaks against the model, one row per kind, of the worst body of each."""
-    rows = [Risk("body-model", f'"{one.name}"', text) for one in found for text in one.said]
+    rows = []
+    for one in found:
+        for text in one.said:
+            means, _, remedy = text.partition("; ")
+            rows.append(Risk("body-model", f'"{one.name}"', means, remedy))
     worst_first = sorted(found, key=lambda one: -max(one.slope, one.spin_ratio, one.load_ratio))
     for kind in (_linear, _steep, _turned, _strained, _missed, _buckled, _aside, _sheared):
         seen = [risk for one in worst_first if (risk := kind(one)) is not None]
@@ -80,6 +84,7 @@ def _turned(one: Flexibility) -> Risk | None:
         "turn", f'"{one.name}"',
         f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
         "model has no meaning beyond 1.5 rad", "split the body into welded parts", one.turn, TURN,
+        "rad",
     )  # fmt: skip
 
 

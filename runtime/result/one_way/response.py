@@ -18,7 +18,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
-from mstmm.risk import Risk
+from mstmm.risk import RUN, Risk
 from mstmm.scene import split
 
 from ...flexible.kernel_inputs import moments_of
@@ -88,7 +88,7 @@ class OneWay:
         if self.cost.error <= 10 * TOLERANCE:
             return ()
         return (Risk(
-            "one-way-loads", "",
+            "one-way-loads", RUN,
             f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
             f"cells (steps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
             self.cost.error, 10 * TOLERANCE,

@@ -1,0 +1,81 @@
+"""Motions of a scene at a state: eigenvalues of the Jacobian of its right-hand side.
+
+The Jacobian is taken by central differences.  For a hinge with stiffness k, damping c and effective
+inertia mu the fastest motion is about c/mu + sqrt(k/mu).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+from ..engine.engine import Engine
+
+Complex = NDArray[np.complex128]
+
+#: States with more components than this get their fastest motion from a Krylov method.
+DENSE = 160
+
+
+def fastest(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Complex]:
+    """(lambda, eigenvector (nq + nu)) of the fastest motion at a state that does not just grow."""
+    values, vectors = motions(engine, t, y, memory)
+    k = int(np.abs(values).argmax())
+    return complex(values[k]), vectors[:, k]
+
+
+def motions(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex, Complex]:
+    """(lambda (k,), eigenvectors (nq + nu, k)) of the motions at a state, 0 for those that just
+    grow and without what others grow; of large scenes the fastest one alone."""
+    n = len(y)
+    sizes = np.maximum(1e-6, 1e-6 * np.abs(y))
+    if n <= DENSE:
+        values, vectors = np.linalg.eig(_differences(engine, t, y, memory, np.diag(sizes)) / sizes)
+    else:
+        values, vectors = _krylov(engine, t, y, memory)
+    grows = values.real > np.abs(values.imag)  # by itself, not by the method
+    kept = np.minimum(values.real, 0.0) + 1j * values.imag
+    return np.where(grows, 0.0, kept).astype(np.complex128), vectors
+
+
+def _differences(engine: Engine, t: float, y: Array, memory: Array, moves: Array) -> Array:
+    """Central differences (n, k) of the right-hand side along the columns of `moves` (n, k)."""
+    rates = _rates(engine, t, np.concatenate([y + moves.T, y - moves.T]), memory)
+    half = len(rates) // 2
+    return np.asarray((rates[:half] - rates[half:]).T / 2)
+
+
+def _rates(engine: Engine, t: float, states: Array, memory: Array) -> Array:
+    """Right-hand sides (k, n) of states (k, n)."""
+    q, u = (np.ascontiguousarray(x) for x in np.split(states, [engine.nq], axis=1))
+    return np.hstack(engine.accelerations(t, q, u, np.tile(memory, (len(states), 1))))
+
+
+def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex, Complex]:
+    """The fastest motion alone, from products of the Jacobian with vectors."""
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
+
+    n, rest = len(y), _rates(engine, t, y[None], memory)[0]
+
+    def product(vector: Any) -> Array:
+        size = float(np.linalg.norm(vector)) or 1.0
+        move = 1e-6 * np.sqrt(n) * np.asarray(vector, dtype=float).reshape(1, n) / size
+        change = _rates(engine, t, y + move, memory)[0] - rest  # a hundredth is all that is asked
+        return np.asarray(change * size / (1e-6 * np.sqrt(n)))
+
+    operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    nothing = np.zeros(1, dtype=np.complex128), start[:, None].astype(np.complex128)
+    try:
+        values, vectors = eigs(
+            operator, k=1, which="LM", tol=1e-2, maxiter=40, v0=start, ncv=min(n, 12)
+        )
+    except ArpackNoConvergence as error:
+        values, vectors = error.eigenvalues, error.eigenvectors
+    except ArpackError:  # a motion without any rate: nothing that a step could be too long for
+        return nothing
+    return (values, vectors) if len(values) else nothing
