@@ -50,8 +50,9 @@ class Flexibility:
             it is not known.
         coupling: share chi of the inertia at its hinge that the mode with the most energy holds,
             and this mode.
-        shear: error of the highest bending frequency without shear (and rotary inertia), None where
-            the section's radius of gyration is not known.
+        shear: largest error of a bending frequency without shear (and rotary inertia), times the
+            share of the energy that its shape holds; None where the section's radius of gyration is
+            not known.
         strain: largest strain of its axis and, where the radius of gyration is known, of its
             outermost fibres; None where it has no length.
         sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
@@ -128,7 +129,7 @@ def _one(
         slope, e.largest_turn(bent_all), first, e.cross_spin(motion) / first if first > 0 else 0.0,
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         tail if slope > _STRAIGHT else None, _leading(motion, coupling),
-        e.shear_error(body, line), e.largest_strain(bent_all), aside, body.warnings,
+        e.shear_error(motion, line), e.largest_strain(bent_all), aside, body.warnings,
         name in flexible.one_way,
     )  # fmt: skip
 

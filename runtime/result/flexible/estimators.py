@@ -197,19 +197,20 @@ def _stretch_of_lines(motion: Motion) -> float | None:
     return max(found, default=None)
 
 
-def shear_error(body: ModalBody, line: float | None = None) -> float | None:
-    """Relative error of the highest bending frequency of a beam for want of shear (and of rotary
-    inertia where the model has none); None where the section's radius of gyration is not known.
+def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
+    """(n,) relative error of the frequency of each bending shape of a beam for want of shear (and
+    of rotary inertia where the model has none), 0 of others; None where the section's radius of
+    gyration is not known.
 
-    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the highest
-    shape in 1/m, r the radius of gyration in m; the 1 is rotary inertia.  `line` (m) is the length
-    of the beams that are welded in line with it: as many shapes are judged on all of that.
+    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the shape in
+    1/m, r the radius of gyration in m; the 1 is rotary inertia.  `line` (m) is the length of the
+    beams that are welded in line with it: as many shapes are judged on all of that.
     """
     shapes = body.shapes
     if shapes is None:
         return None
     x, weights = shapes.rule()
-    worst = None
+    errors, known = np.zeros(body.n), False
     for plane, about in (("y", 2), ("z", 1)):
         bent = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
         gyration = float(np.max(gyration_radii(shapes, x)[about]))
@@ -220,11 +221,23 @@ def shear_error(body: ModalBody, line: float | None = None) -> float | None:
             values_at(shapes, x).curvature[:, about],
         )
         squares = (weights @ bending[:, bent] ** 2) / (weights @ phi[:, bent] ** 2)
-        wave = np.sqrt(np.max(squares))  # int phi''^2 / int phi^2 = beta^4
+        wave = np.sqrt(squares)  # int phi''^2 / int phi^2 = beta^4
         wave *= (shapes.length / line) ** 2 if line else 1.0
-        error = 0.5 * wave * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
-        worst = max(worst or 0.0, float(error))
-    return worst
+        errors[bent] = 0.5 * wave * gyration**2 * (_SHEAR + float(not shapes.data.rotary))
+        known = True
+    return errors if known else None
+
+
+def shear_error(motion: Motion, line: float | None = None) -> float | None:
+    """The largest of them, each times the share of the body's energy that its shape holds where it
+    holds most: what does not move errs by nothing."""
+    errors = shear_errors(motion.body, line)
+    if errors is None or not len(motion.t):
+        return errors if errors is None else 0.0
+    held = modal_energy(motion)
+    most = float(held.sum(axis=1).max())
+    shares = np.clip(held.max(axis=0) / most, 0.0, 1.0) if most > 0 else np.zeros(motion.body.n)
+    return float(np.max(shares * errors))
 
 
 #: E / (k G) of a rectangular section, nu = 0.3, k = 5/6.

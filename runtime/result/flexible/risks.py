@@ -126,7 +126,7 @@ def _sheared(one: Flexibility) -> Risk | None:
         return None
     return Risk(
         "shear", f'"{one.name}"',
-        f'the highest bending shape of "{one.name}" is too short for a beam without shear: its '
-        f"frequency errs by about {min(one.shear, 1.0):.0%}",
-        "take fewer modes or an elastic body", one.shear, SHEAR,
+        f'shapes by which "{one.name}" bends are too short for a beam without shear: their '
+        f"frequencies err by about {min(one.shear, 1.0):.0%}, by the share that they have",
+        "take an elastic body", one.shear, SHEAR,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from scipy.integrate import solve_bvp
 from support.models import model_of
 
 import mstmm
-from mstmm.runtime.result.flexible.estimators import shear_error
+from mstmm.runtime.result.flexible.estimators import shear_errors
 from mstmm.runtime.result.result import Result
 
 ENDS = {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 0.5]}}
@@ -177,9 +177,12 @@ def test_shapes_of_welded_beams_are_judged_on_the_line() -> None:
     """As many shapes on four times the length have a sixteenth of the error."""
     alone = mstmm.compile(welded(1, 1.0)).flexible["part0"]
     by_hand = 0.5 * 4.694091**2 * 0.1**2 / 12 * (3.12 + 1)  # beta L of the second shape: 4.694
-    assert shear_error(alone) == pytest.approx(by_hand, rel=1e-5)
+    errors = shear_errors(alone)
+    assert errors is not None and errors.max() == pytest.approx(by_hand, rel=1e-5)
     model = mstmm.compile(welded(4, 4.0))
-    part = shear_error(model.flexible["part0"])
-    assert part is not None
-    found = model.simulate(1e-3).certificate.flexible[0].shear
-    assert found == pytest.approx(part / 16, rel=1e-9)
+    part = shear_errors(model.flexible["part0"])
+    on_line = shear_errors(model.flexible["part0"], 4.0)
+    assert part is not None and on_line is not None
+    assert on_line == pytest.approx(part / 16, rel=1e-9)
+    moved = model.simulate(1e-3).certificate.flexible[0].shear
+    assert moved is not None and moved <= on_line.max() * (1 + 1e-12)
