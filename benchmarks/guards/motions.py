@@ -8,7 +8,7 @@ import numpy as np
 
 from mstmm.atlas.measures import correction
 from mstmm.atlas.scenes import rod, spinning_top
-from mstmm.runtime.run.motions import fastest
+from mstmm.runtime.engine.motions import fastest
 
 from .trials import Scene, Trial, judged, model, off, tried
 

@@ -87,9 +87,7 @@ def compile_scene(
     refused = "asked for" if engine == "looped" else ""
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
-    model = Model(
-        scene, elements, Fuser(definitions, refused, bake, most), product, sweep == "qr"
-    )
+    model = Model(scene, elements, Fuser(definitions, refused, bake, most), product, sweep == "qr")
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()

@@ -43,8 +43,8 @@ class Compiled:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the scene and what was asked; compiled code is looked for again."""
-        asked = (self._fusing, self._product_accuracy, self.fusion.library is not None)
-        return _again, (type(self), self.scene, *asked)
+        asked = (self._fusing, self._product_accuracy, self.packed.qr)
+        return _again, (type(self), self.scene, asked, self.fusion.library is not None)
 
     @property
     def packed(self) -> Packed:
@@ -108,14 +108,13 @@ class Compiled:
 def _again(
     kind: type[Compiled],
     scene: Scene,
-    fusing: Callable[[Packed, Known], Fusing] | None,
-    product_accuracy: float | None,
+    asked: tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool],
     fused: bool,
 ) -> Compiled:
     """What was pickled; with the fused code that it had where that is in the cache here."""
     known, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
-    made = kind(scene, known, fusing, product_accuracy)
+    made = kind(scene, known, *asked)
     if fused:
         made.fusion.find()
     return made

@@ -15,7 +15,7 @@ from mstmm.risk import RUN, Risk
 from ..integrate.steppers import AUTO, get
 from ..run import classical, second_opinion
 from ..run.fastest import Fastest, may_be_fast
-from ..run.implicit_pays import Cheaper, cheaper
+from .implicit_pays import Cheaper, cheaper
 from .shapes import squares
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk
 
 from ..engine.engine import Engine
+from ..engine.motions import DENSE, Complex, motions
 from ..integrate.steppers import get
 from . import classical, second_opinion
-from .motions import DENSE, Complex, motions
 from .system import SceneSystem
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from support.result_scenes import motor, pins, rod, tree
 from support.rod_scenes import chain, drawn_state, precise_accelerations
 
 import mstmm
+from mstmm.runtime.engine.motions import fastest
 from mstmm.runtime.result.certificate import Certificate
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run.motions import fastest
 
 
 def free_pair(**space: object) -> mstmm.Scene:
@@ -246,7 +246,7 @@ def test_the_fastest_motion_of_a_pin_with_a_law(
 
 
 def test_the_fastest_motion_of_a_long_chain_is_found_without_a_dense_matrix() -> None:
-    from mstmm.runtime.run import motions
+    from mstmm.runtime.engine import motions
 
     engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4)).looped
     y = np.concatenate([np.tile([0.05, -0.1], 45), np.zeros(90)])

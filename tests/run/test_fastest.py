@@ -13,8 +13,8 @@ from support.result_scenes import pins
 
 import mstmm
 from benchmarks.stiff.cases import CASES
+from mstmm.runtime.engine.motions import fastest
 from mstmm.runtime.run.fastest import Fastest
-from mstmm.runtime.run.motions import fastest
 
 TREES, STIFF = 200, 300.0
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 
-from ..engine.engine import Engine
+from .engine import Engine
 
 Complex = NDArray[np.complex128]
 

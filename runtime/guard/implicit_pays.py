@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 
-from .execution import Watch, first_run
-from .method_choice import implicit_method
+from ..run.execution import Watch, first_run
+from ..run.method_choice import implicit_method
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
