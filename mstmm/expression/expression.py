@@ -1,4 +1,4 @@
-"""Expressions of scene files: numbers, names, + - * / ^, comparisons, `pi` and a few functions.
+"""Expressions of scene files: numbers, names, + - * / ^, comparisons, `pi`, `deg`, a few functions.
 
 `parse` turns text into a frozen `Expression`; `Expression.build` puts it into a
 `mstmm.ir.graph.Graph`, from where it reaches the tape, C, and its exact derivatives like every
@@ -7,7 +7,7 @@ derived equation.  Nothing is ever evaluated as Python.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
@@ -27,7 +27,7 @@ _Line = tuple[Fraction, Fraction]
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.  Two are equal when their texts are.
+    """A parsed expression.  Two are equal when their texts and their constants are.
 
     `names` are the names it refers to, each once, in the order of the text; `terms` is the flat
     syntax tree (arguments before the operation), `root` the number of the outermost term.
@@ -37,6 +37,8 @@ class Expression:
     names: tuple[Name, ...] = field(compare=False)
     terms: tuple[Term, ...] = field(compare=False, repr=False)
     root: int = field(compare=False, repr=False)
+    #: The named constants in it and their numbers, which the terms hold.
+    constants: tuple[tuple[str, float], ...] = field(default=(), kw_only=True)
 
     # --- what it depends on -------------------------------------------------------------------
 
@@ -79,7 +81,9 @@ class Expression:
         needed = self._needed(root)
         names = _distinct(t.name for i, t in enumerate(self.terms) if i in needed and t.name)
         # `text` was stripped before parsing, so that positions point into it.
-        return Expression(self.text[term.start : term.end], names, self.terms, root)
+        return Expression(
+            self.text[term.start : term.end], names, self.terms, root, constants=self.constants
+        )
 
     @property
     def needed(self) -> frozenset[int]:
@@ -150,13 +154,14 @@ class Expression:
         return found
 
 
-def parse(text: str, where: str = "") -> Expression:
-    """Parse `text`; `where` (file, element, key) begins every message.
+def parse(text: str, where: str = "", constants: Mapping[str, float] | None = None) -> Expression:
+    """Parse `text`; `where` (file, element, key) begins every message, `constants` are numbers that
+    have names.
 
     Raises ExpressionError with the position marked and one way out.
     """
     try:
-        return _parse(_checked(text))
+        return _parse(_checked(text), tuple((constants or {}).items()))
     except ExpressionError as error:
         raise ExpressionError(f"{where}: {error}" if where else str(error)) from None
 
@@ -181,11 +186,12 @@ def number(value: float) -> Expression:
 
 
 @lru_cache(maxsize=4096)
-def _parse(text: str) -> Expression:
-    parser = Parser(text)
+def _parse(text: str, constants: tuple[tuple[str, float], ...] = ()) -> Expression:
+    parser = Parser(text, dict(constants))
     root = parser.run()
     names = _distinct(term.name for term in parser.terms if term.name is not None)
-    return Expression(text, names, tuple(parser.terms), root)
+    used = tuple(parser.used.items())
+    return Expression(text, names, tuple(parser.terms), root, constants=used)
 
 
 def _distinct(names: object) -> tuple[Name, ...]:

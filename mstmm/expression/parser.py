@@ -5,9 +5,12 @@
     product    := factor {("*" | "/") factor}
     factor     := ("-" | "+") factor | power
     power      := atom ["^" factor]                      (right associative: 2^3^2 = 2^9)
-    atom       := number | "pi" | name | function "(" comparison {"," comparison} ")" | "(" .. ")"
+    atom       := number | "pi" | "deg" | name | "(" .. ")"
+                  | function "(" comparison {"," comparison} ")"
     name       := word [place] {"." word} ["[" whole number "]"]
     place      := "[" (whole number | "last") "]"        (of a chain's member, as in rope[3].tip.x)
+
+`deg` is pi/180; a name may stand for a constant, whose number is taken then.
 
 An operator stack (shunting yard) replaces the call stack, so that no text can overflow it.
 """
@@ -17,7 +20,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -152,10 +155,15 @@ class _Pending:
 
 
 class Parser:
-    """Parses one text; `terms` and `root` are the outcome of `run`."""
+    """Parses one text; `terms` and `root` are the outcome of `run`.
 
-    def __init__(self, text: str) -> None:
+    `constants` are the numbers of names; `used` are those of them that the text has.
+    """
+
+    def __init__(self, text: str, constants: Mapping[str, float] | None = None) -> None:
         self.text = text
+        self.used: dict[str, float] = {}
+        self._constants = {} if constants is None else constants
         self.terms: list[Term] = []
         self._operands: list[tuple[int, int, int]] = []  # term, start and end with parentheses
         self._waiting: list[_Pending] = []
@@ -230,6 +238,17 @@ class Parser:
             return True, follows + 1
         if token == "pi":
             self._push(Term("pi", (), start, end, constant=math.pi), start, end)
+            return False, end
+        if token == "deg":
+            self._push(Term("pi", (), start, end, constant=math.pi), start, end)
+            self.terms.append(Term("number", (), start, end, Fraction(180), 180.0))
+            self._make("div", (len(self.terms) - 2, len(self.terms) - 1), start, start, end)
+            self._operands[-1] = (len(self.terms) - 1, start, end)
+            return False, end
+        if token in self._constants:
+            value = self.used[token] = float(self._constants[token])
+            exact = _limited(Fraction(repr(value)), value)
+            self._push(Term("number", (), start, end, exact, value), start, end)
             return False, end
         if token in FUNCTIONS:
             raise self.error(f"the function {token} needs its argument in parentheses", end)

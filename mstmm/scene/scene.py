@@ -18,10 +18,12 @@ from ..risk import Risk, sentences
 from .checks import flexible, types
 from .checks import scene as checks
 from .files.write import to_toml
+from .rules import written
 from .rules.messages import TABLES, report, scene_error
 from .rules.values import Refused
 from .tables.all import SceneTables
 from .tables.beam_keys import ROOT
+from .tables.constants import evaluated
 
 #: What messages call the scene that is being read.
 _source: ContextVar[str] = ContextVar("source", default="scene")
@@ -30,9 +32,9 @@ _source: ContextVar[str] = ContextVar("source", default="scene")
 class Scene(SceneTables):
     """Everything a simulation needs to know, SI units and radians, frozen.
 
-    `gravity` in m/s^2, inertial axes.  Lists keep the order of the file: hinge coordinates appear
-    in q and u in the order of `hinge`, then those of the chains in the order of `chain`, then the
-    modal coordinates in the order of `beam` and of `elastic`.
+    `gravity` in m/s^2, inertial axes; `constants` are numbers by their names.  Lists keep the order
+    of the file: hinge coordinates appear in q and u in the order of `hinge`, then those of the
+    chains in the order of `chain`, then the modal coordinates in the order of `beam` and `elastic`.
     """
 
     model_config = ConfigDict(title="mstmm scene")
@@ -40,7 +42,13 @@ class Scene(SceneTables):
     def __init__(self, /, **data: Any) -> None:
         """Validate; SceneError names every problem (at most ten lines)."""
         try:
-            super().__init__(**data)
+            constants = evaluated(data.get("constants", {}))
+        except Refused as refused:
+            found = [(("constants", *place), message) for place, message in refused.problems]
+            raise report(found, data, _source.get()) from None
+        try:
+            with written.known(constants):
+                super().__init__(**data)
         except ValidationError as error:
             raise scene_error(error, type(self), data, _source.get()) from None
 

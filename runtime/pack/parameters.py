@@ -1,4 +1,4 @@
-"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]".
+"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]", "constants.k".
 
 Whole numbers (members of a chain, shapes of a beam, nodes of a mesh) are no parameters: they decide
 the length of q and u.
@@ -14,16 +14,22 @@ from typing import Any
 
 from mstmm.arrays import by_name, real
 from mstmm.errors import SceneError
+from mstmm.expression.drive import motion_at
 from mstmm.scene import Scene
 from mstmm.scene.checks.types import inherit
+from mstmm.scene.files.write import to_toml
+from mstmm.scene.rules.text import to_expression
+from mstmm.scene.rules.written import known
+from mstmm.scene.tables.constants import evaluated
 
 TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
-def _data(scene: Scene) -> dict[str, Any]:
-    """The scene as a file has it, without the ends that every beam has of itself."""
-    data = tomllib.loads(scene.to_toml())
+def _data(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
+    """The scene as a file has it, without the ends that every beam has of itself; `evaluated`, with
+    numbers alone for what is written as expressions of named constants."""
+    data = tomllib.loads(to_toml(scene, evaluated))
     for beam in data.get("beam", []):
         for name in ("root", "tip"):
             if not any(beam["ends"][name].get("orientation", ())):
@@ -50,8 +56,9 @@ def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
 
 def read(scene: Scene) -> dict[str, float]:
     """Every number by its name, in the scene's order."""
-    data = _data(scene)
-    found = dict(_numbers("gravity", data["gravity"]))
+    data = _data(scene, evaluated=True)
+    found = dict(_numbers("constants", data.get("constants", {})))
+    found.update(_numbers("gravity", data["gravity"]))
     for name, element in _named(data):
         found.update(_numbers(name, element))
     return found
@@ -66,18 +73,30 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     refuses.
     """
     data = _data(scene)
-    known: dict[str, float] | None = None
+    there: dict[str, float] | None = None
     for path, given in by_name("parameters", changes).items():
         value = real(f'parameter "{path}"', given)
         if not _set(data, path, value):
-            known = known or read(scene)
-            raise _unknown(path, known)
+            there = there or read(scene)
+            raise _unknown(path, there)
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
+    _begin_driven(data)
     found = Scene.from_data(data)
     inherit(found, scene)
     return found
+
+
+def _begin_driven(data: dict[str, Any]) -> None:
+    """Start values of driven coordinates follow the drives, which may have changed."""
+    with known(evaluated(data.get("constants", {}))):
+        for table in data.get("hinge", []):
+            start = table.get("initial", {})
+            for k, drive in enumerate(table.get("drive", ())):
+                if drive != "free" and start:
+                    q, u, _ = motion_at(to_expression(drive, "a drive"), 0.0)
+                    start["q"][k], start["u"][k] = q, u
 
 
 def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
@@ -85,13 +104,13 @@ def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
 
     Raises SceneError for a name that the scene does not have.
     """
-    known = read(scene)
-    alone = {name.replace("[0]", ""): name for name in known}
+    there = read(scene)
+    alone = {name.replace("[0]", ""): name for name in there}
     found = []
     for name in names:
-        full = name if name in known else alone.get(name, "")
-        if not full or (full != name and full.replace("[0]", "[1]") in known):
-            raise _unknown(name, known)
+        full = name if name in there else alone.get(name, "")
+        if not full or (full != name and full.replace("[0]", "[1]") in there):
+            raise _unknown(name, there)
         found.append(full)
     return found
 
@@ -109,7 +128,7 @@ def _set(data: dict[str, Any], path: str, value: float) -> bool:
 
 
 def _owners(data: dict[str, Any], parts: list[str]) -> list[Any]:
-    if parts[0].startswith("gravity"):
+    if parts[0].startswith("gravity") or (parts[0] == "constants" and len(parts) > 1):
         return [data]
     name = parts.pop(0)
     return [element for owner, element in _named(data) if owner == name]

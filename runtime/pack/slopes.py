@@ -45,7 +45,7 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     moves is a place in p.  Raises SceneError for a name that the scene does not have, and for the
     numbers of flexible bodies.
     """
-    _refuse_flexible(scene, parameters.resolved(scene, names))
+    _refuse_folded(scene, parameters.resolved(scene, names))
     seeded, moving = _seeded(scene, names)
     # without aligning: frames that are chosen by cases have no slopes
     plain, frames = system_of(scene, known, align=False)
@@ -61,10 +61,17 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     return structure, values, moved
 
 
-def _refuse_flexible(scene: Scene, names: Sequence[str]) -> None:
-    """Numbers that go into the shapes of flexible bodies, by quadrature and eigenvalues."""
+def _refuse_folded(scene: Scene, names: Sequence[str]) -> None:
+    """Named constants, and numbers that go into the shapes of flexible bodies, by quadrature and
+    eigenvalues."""
     flexible = {body.name for body in (*scene.beam, *scene.elastic)}
     for name in names:
+        if name.startswith("constants."):
+            raise SceneError(
+                f'parameter "{name}": named constants go into numbers and expressions before they '
+                "reach the kernels, and have no exact derivative; take a difference of two models "
+                "(with_parameters)"
+            )
         owner, _, rest = name.partition(".")
         spread = rest.startswith(("force_per_length", "span"))
         if owner in flexible or spread:

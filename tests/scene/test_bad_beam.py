@@ -139,7 +139,7 @@ BAD: list[tuple[Data, str]] = [
     (bladed(ends={"mid": [5, 0.1, 0]}), "expected a place on the axis of the beam, found [5, 0.1"),
     (bladed(ends={"mid": {"position": [1, 2]}}), "ends.mid.position: expected three numbers in m"),
     (bladed(ends={"tip": 9.0}), 'expected 10 m, where every beam has its end "tip", found 9'),
-    (bladed(ends={"mid": "middle"}), "ends.mid: expected a table, found 'middle'"),
+    (bladed(ends={"mid": "middle"}), "ends.mid.position[0]: expected a number in m, found"),
     (bladed(ends={"mid": True}), "ends.mid: expected a table, found true"),
     (bladed(ends={"a.b": 3.0}), "expected the name of an end, found 'a.b'"),
     (bladed(ends=[5.0]), "ends: expected a table such as { mid = 5.0 }, found [5]"),

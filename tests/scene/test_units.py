@@ -22,7 +22,6 @@ from scene.scenes import one
         ("1e3 mm", "write 1"),
         ("120 rpm", "write 12.5663706144"),
         ("3 bananas", "write the number alone, without quotes, in SI units and rad"),
-        ("pi/6", "no expression is taken here: write 0.523598775598"),
         ("30", "found '30'; write the number without quotes"),
     ],
 )

@@ -6,24 +6,27 @@ from typing import TYPE_CHECKING, Any
 
 from ...ir.facts import builtin_hinges
 from ..rules.messages import TABLES
+from ..rules.units import is_number
+from ..rules.written import Written
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
 
-def to_toml(scene: SceneTables) -> str:
-    """TOML text that loads back to an equal scene."""
+def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
+    """TOML text that loads back to an equal scene; `evaluated`, numbers that are written as
+    expressions of named constants are numbers alone."""
     data = scene.model_dump(by_alias=True)
     lines = [
-        f"{key} = {_value(value)}"
+        f"{key} = {_value(value, evaluated)}"
         for key, value in data.items()
-        if not isinstance(value, tuple) or key == "gravity"
+        if (not isinstance(value, tuple) or key == "gravity") and value != {}
     ]
     for table in TABLES:
         for element in data[table]:
-            lines += ["", f"[[{table}]]", f"name = {_value(element['name'])}"]
+            lines += ["", f"[[{table}]]", f"name = {_value(element['name'], evaluated)}"]
             lines += [
-                f"{key} = {_value(value)}"
+                f"{key} = {_value(value, evaluated)}"
                 for key, value in element.items()
                 if key != "name" and _is_written(table, element, key, value)
             ]
@@ -38,9 +41,13 @@ def _is_written(table: str, element: dict[str, Any], key: str, value: Any) -> bo
     return not (key == "axis" and facts is not None and facts.frame == "plane")  # it is the normal
 
 
-def _value(value: Any) -> str:
+def _value(value: Any, evaluated: bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, Written):
+        if evaluated:
+            return repr(float(value))
+        return value.text if is_number(value.text) else _string(value.text)
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, int):
@@ -48,9 +55,9 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return _string(value)
     if isinstance(value, dict):
-        inside = ", ".join(f"{k} = {_value(v)}" for k, v in value.items() if _is_said(v))
+        inside = ", ".join(f"{k} = {_value(v, evaluated)}" for k, v in value.items() if _is_said(v))
         return "{ " + inside + " }" if inside else "{}"
-    return "[" + ", ".join(_value(v) for v in value) + "]"
+    return "[" + ", ".join(_value(v, evaluated) for v in value) + "]"
 
 
 def _is_said(value: Any) -> bool:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...errors import ExpressionError
-from ...expression.expression import Expression, number, parse
+from ...expression.expression import Expression, number
+from . import written
 from .units import with_unit
 from .values import (
     BODY,
@@ -138,7 +139,7 @@ def parameters() -> Rule:
         keys = list(value)
         return dict(zip(keys, collect(keys, expected, one), strict=True))
 
-    schema = {"type": "object", "additionalProperties": {"type": "number"}}
+    schema = {"type": "object", "additionalProperties": {"type": ["number", "string"]}}
     return Rule(expected, check, schema)
 
 
@@ -153,7 +154,7 @@ def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
     if not isinstance(value, str):
         return number(finite(value, expected, *place))
     try:
-        return parse(value)
+        return written.expression_of(value)
     except ExpressionError as error:
         raise refuse(f"{error}{with_unit(value)}", *place) from None
 
@@ -230,7 +231,7 @@ def condition(expected: str, time: bool = False) -> Rule:
     def check(value: Any) -> Expression:
         value = plain(value)
         if time and isinstance(value, (int, float)) and not isinstance(value, bool):
-            return parse(f"t >= {finite(value, expected)!r}")
+            return written.expression_of(f"t >= {finite(value, expected)!r}")
         if not isinstance(value, (str, Expression)):
             raise refuse(f"expected {expected}, found {found(value)}")
         result = to_expression(value, expected)

@@ -1,12 +1,9 @@
-"""Units that the format does not have: what to write in place of "30 deg" or a bare 90."""
+"""Units that the format does not have: what to write in place of "30 deg"."""
 
 from __future__ import annotations
 
 import math
 import re
-
-from ...errors import ExpressionError
-from ...expression.expression import parse
 
 #: What people write behind a number -> its size in SI units and rad.
 _UNITS = {
@@ -26,8 +23,7 @@ def instead(text: str) -> str:
     """The way out for a text that stands where a number is expected, as '; write ...'."""
     match = _QUANTITY.fullmatch(text)
     if match is None:
-        value = _constant(text)
-        return "" if value is None else f"; no expression is taken here: write {value:.12g}"
+        return ""
     if not match[2]:
         return "; write the number without quotes"
     return with_unit(text) or "; write the number alone, without quotes, in SI units and rad"
@@ -42,9 +38,7 @@ def with_unit(text: str) -> str:
     return f"; units are not written, all are SI and rad: write {value:.12g}"
 
 
-def _constant(text: str) -> float | None:
-    """The value of an expression without names, such as "pi/6"."""
-    try:
-        return parse(text).constant
-    except ExpressionError:
-        return None
+def is_number(text: str) -> bool:
+    """Whether the text is a number alone, which is written without quotes."""
+    match = _QUANTITY.fullmatch(text)
+    return match is not None and not match[2]

@@ -1,8 +1,8 @@
 """What one value of a scene may be: strict, finite, and with a message that says what was expected.
 
 A `Rule` annotates a pydantic field: it checks and normalises the value as it comes from TOML, JSON
-or Python, and publishes the accepted form in the JSON Schema.  Numbers are never taken from text
-or truth values.
+or Python, and publishes the accepted form in the JSON Schema.  Numbers are never taken from
+truth values, and from text where it is an expression of constants ("pi/6", "2*half").
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaH
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
+from ...errors import ExpressionError
 from ...numbers.rotations import norm, unit
-from .units import instead
+from . import written
+from .units import instead, is_number, with_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
@@ -154,9 +156,12 @@ def plain(value: Any) -> Any:
 
 def finite(value: Any, expected: str, *place: str | int) -> float:
     """A finite number, or Refused."""
+    if isinstance(value, str):
+        return _of_text(value, expected, *place)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        hint = instead(value) if isinstance(value, str) else ""
-        raise refuse(f"expected {expected}, found {found(value)}{hint}", *place)
+        raise refuse(f"expected {expected}, found {found(value)}", *place)
+    if isinstance(value, written.Written):
+        return value
     try:
         result = float(value)
     except OverflowError:
@@ -166,8 +171,31 @@ def finite(value: Any, expected: str, *place: str | int) -> float:
     return result
 
 
+def _of_text(text: str, expected: str, *place: str | int) -> float:
+    """The number of a constant expression, or Refused."""
+    hint, calculates = instead(text), bool(set(text) & _OPERATORS)
+    if not is_number(text):
+        try:
+            result = written.as_number(text)
+        except ExpressionError as error:
+            hint = with_unit(text) or (f"; {error}" if calculates else hint)
+        else:
+            if result is not None:
+                return result
+            hint = written.unknown(text) if calculates or written.constants() else hint
+    raise refuse(f"expected {expected}, found {found(text)}{hint}", *place)
+
+
+#: What makes a text an expression rather than a word.
+_OPERATORS = frozenset("+-*/^()")
+
+
 def _unit(name: str) -> str:
     return f" in {name}" if name else ""
+
+
+#: A number, or the text of a constant expression.
+NUMBER = {"type": ["number", "string"]}
 
 
 def number(of: str = "", minimum: float | None = None, above: float | None = None) -> Rule:
@@ -175,7 +203,7 @@ def number(of: str = "", minimum: float | None = None, above: float | None = Non
     bound = f", {minimum:g} or more" if minimum is not None else ""
     bound += f", more than {above:g}" if above is not None else ""
     expected = f"a number{_unit(of)}{bound}"
-    schema: dict[str, Any] = {"type": "number"}
+    schema: dict[str, Any] = dict(NUMBER)
     schema |= {} if minimum is None else {"minimum": minimum}
     schema |= {} if above is None else {"exclusiveMinimum": above}
 
@@ -261,7 +289,7 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str 
             raise refuse(f"expected {expected}, found {counted(len(entries))}")
         return collect(entries, expected, one)
 
-    item: dict[str, Any] = {"type": "number"} | ({} if minimum is None else {"minimum": minimum})
+    item: dict[str, Any] = dict(NUMBER) | ({} if minimum is None else {"minimum": minimum})
     array: dict[str, Any] = {"type": "array", "items": item}
     if not lengths:
         return Rule(expected, check, {"anyOf": [item, array]})
@@ -324,4 +352,4 @@ def quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[
             f"expected {expected}, found a quaternion of zero length; no rotation is [1, 0, 0, 0]",
             *place,
         )
-    return unit(q)
+    return written.alike(unit(q), q)

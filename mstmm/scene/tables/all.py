@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from ...numbers.rotations import Vector
 from ..rules import text as texts
 from ..rules import values as rules
@@ -12,6 +14,7 @@ from ..rules.values import Table
 from .beam import Beam
 from .body import Body
 from .chain import Chain
+from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
 from .loads import Event, Load, Spring
@@ -31,6 +34,7 @@ class SceneTables(Table):
     schema_version: Annotated[int, rules.Rule("1", _version, {"const": 1})] = 1
     gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
     allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
+    constants: Annotated[dict[str, float], named_numbers()] = Field(default_factory=dict)
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     chain: tuple[Chain, ...] = ()

@@ -113,7 +113,7 @@ def _pair(of: str) -> rules.Rule:
                 raise refuse(f"expected {expected}, more than 0, found {found(entry)}", *place)
         return (values[0], values[-1])
 
-    number = {"type": "number", "exclusiveMinimum": 0}
+    number = {"type": ["number", "string"], "exclusiveMinimum": 0}
     pair = {"type": "array", "items": number, "minItems": 1, "maxItems": 2}
     return rules.Rule(expected, check, {"anyOf": [number, pair]})
 
@@ -154,12 +154,12 @@ def _as_end(value: Any) -> Any:
     value = plain(value)
     if isinstance(value, dict):
         position = plain(value.get("position"))
-        if isinstance(position, (int, float)) and not isinstance(position, bool):
+        if isinstance(position, (int, float, str)) and not isinstance(position, bool):
             return {**value, "position": [position, 0.0, 0.0]}
         return value
     if isinstance(value, (list, tuple)):
         return {"position": value}
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    if isinstance(value, (int, float, str)) and not isinstance(value, bool):
         return {"position": [value, 0.0, 0.0]}
     return value
 
@@ -180,7 +180,10 @@ class BeamKeys(FlexibleTable, SectionTable):
         Shorthand(
             "ends by name: x in m, or a table with position and orientation",
             _as_ends,
-            {"type": "object", "additionalProperties": {"type": ["number", "array", "object"]}},
+            {
+                "type": "object",
+                "additionalProperties": {"type": ["number", "string", "array", "object"]},
+            },
         ),
     ] = Field(default_factory=dict)
 

@@ -62,7 +62,7 @@ def table_of_numbers(expected: str, columns: int = 0) -> Rule:
         row = rules.numbers(f"rows of {width} numbers", width or 1)
         return tuple(_row(row, one, i) for i, one in enumerate(rows))
 
-    inner = {"type": "array", "items": {"type": "number"}}
+    inner = {"type": "array", "items": {"type": ["number", "string"]}}
     return Rule(expected, check, {"type": "array", "items": inner})
 
 

@@ -52,7 +52,7 @@ def _as_damping(value: Any) -> Any:
 DAMPING = Shorthand(
     "a modal damping ratio, a list of them, one per shape, or a table { ratio, stiffness }",
     _as_damping,
-    {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]},
+    {"anyOf": [rules.NUMBER, {"type": "array", "items": rules.NUMBER}]},
 )
 
 

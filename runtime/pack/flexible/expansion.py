@@ -202,7 +202,11 @@ class _Expansion:
 
 
 def _times(entry: Expression, length: float) -> Expression:
-    return entry if entry.is_zero else parse(f"{length!r} * ({entry.text})")
+    return (
+        entry
+        if entry.is_zero
+        else parse(f"{length!r} * ({entry.text})", constants=dict(entry.constants))
+    )
 
 
 __all__ = ["Expanded", "Passage", "expand"]

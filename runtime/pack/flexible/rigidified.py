@@ -191,7 +191,11 @@ def _middle(load: Load, length: float) -> float:
 
 
 def _times(entry: Expression, length: float) -> Expression:
-    return entry if entry.is_zero else parse(f"{length!r} * ({entry.text})")
+    return (
+        entry
+        if entry.is_zero
+        else parse(f"{length!r} * ({entry.text})", constants=dict(entry.constants))
+    )
 
 
 def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:

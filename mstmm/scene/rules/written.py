@@ -1,0 +1,85 @@
+"""Numbers that a scene writes as constant expressions: "pi/6", "30*deg", "2*half"."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+from ...expression.expression import Expression, parse
+
+#: The named constants of the scene that is being read.
+_CONSTANTS: ContextVar[Mapping[str, float] | None] = ContextVar("constants", default=None)
+
+
+@contextmanager
+def known(constants: Mapping[str, float]) -> Iterator[None]:
+    """Texts that are read meanwhile may name these constants."""
+    token = _CONSTANTS.set(constants)
+    try:
+        yield
+    finally:
+        _CONSTANTS.reset(token)
+
+
+def constants() -> Mapping[str, float]:
+    """The named constants of the scene that is being read."""
+    return _CONSTANTS.get() or {}
+
+
+def expression_of(text: str) -> Expression:
+    """The text parsed, named constants of the scene with their numbers.
+
+    Raises ExpressionError.
+    """
+    return parse(text, constants=constants())
+
+
+class Written(float):
+    """A number and the expression of named constants that gives it; arithmetic gives floats."""
+
+    __slots__ = ("text",)
+    text: str
+
+    def __new__(cls, value: float, text: str) -> Written:
+        found = super().__new__(cls, value)
+        found.text = text
+        return found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Written, (float(self), self.text)
+
+
+def as_number(text: str) -> float | None:
+    """The number of a constant expression, `Written` where named constants are in it; None for what
+    has other names.
+
+    Raises ExpressionError for what is no expression, or has no finite value.
+    """
+    found = expression_of(text)
+    if found.constant is None or found.is_condition:
+        return None
+    return Written(found.constant, found.text) if found.constants else found.constant
+
+
+def unknown(text: str) -> str:
+    """What to do about the first name in a text that is to be constant, as '; ...'; else empty."""
+    names = [name.text for name in expression_of(text).names]
+    if not names:
+        return ""
+    close = difflib.get_close_matches(names[0], constants(), n=1, cutoff=0.6)
+    way_out = f'did you mean "{close[0]}"?' if close else "give it a number in [constants]"
+    return f"; {names[0]!r} is no constant of the scene: {way_out}"
+
+
+def alike(values: tuple[float, ...], given: tuple[float, ...]) -> tuple[float, ...]:
+    """`values`, made of all of the numbers `given`, as they were written: where one is `Written`,
+    every one keeps what was given."""
+    if not any(isinstance(x, Written) for x in given):
+        return values
+    return tuple(
+        Written(value, x.text if isinstance(x, Written) else repr(float(x)))
+        for value, x in zip(values, given, strict=True)
+    )
