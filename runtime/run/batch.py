@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.arrays import Array, batch, by_name, numbers, pair, threads_of
 from mstmm.errors import MstmmError, SceneError
 
+from ..breaks.acting import acting
 from ..integrate.loop import Failure, Run, Status, failure_text
 from ..integrate.settings import Settings, checked
 from ..integrate.steppers import AUTO, check_size, check_steps, get
@@ -96,7 +97,9 @@ def simulate_batch(
         np.full((n, len(times), model.nq + model.nu), np.nan),
         np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64), [()] * n,
     )  # fmt: skip
-    ours = np.array([library is not None and m.fusion.lanes is library for m in models], bool)
+    alike = _of_equal_times(model, models, settings)
+    ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
+                     for m in models], bool)  # fmt: skip
     if library is not None and ours.any():
         _side_by_side(model, library, models, settings, q, u, np.flatnonzero(ours), rows, count)
     alone = np.flatnonzero(~ours)
@@ -135,6 +138,21 @@ def _models(model: Compiled, parameters: Mapping[str, ArrayLike], n: int) -> lis
                 raise SceneError(f"trajectory {i}: {error}") from None
         found.append(made[row])
     return found
+
+
+def _of_equal_times(model: Compiled, models: list[Compiled], settings: Settings) -> dict[int, bool]:
+    """By the id of each model: do its expressions switch at the times of those of `model`?  Where
+    not, the steps of one trajectory would have to end where another's do not."""
+
+    def times(one: Compiled) -> list[list[float]]:
+        known = one.packed.time_map(settings.t_start, settings.t_end)
+        return [known.breaks.tolist(), known.starts.tolist(), known.longest.tolist()]
+
+    expressions = acting(model.scene)
+    return {
+        id(one): acting(one.scene) == expressions or times(one) == times(model)
+        for one in {id(one): one for one in models}.values()
+    }
 
 
 def _lanes(model: Compiled) -> FusedLibrary | None:

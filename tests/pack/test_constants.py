@@ -41,6 +41,20 @@ def test_a_model_follows_its_constants(engine: str) -> None:
     np.testing.assert_allclose(batch.q[0, -1], run.q[-1], rtol=1e-7)
 
 
+def test_trajectories_side_by_side_end_steps_at_their_own_times() -> None:
+    """Where a constant says when a motor gives a short blow."""
+    shown = {"gravity": [0, 0, 0], "body": [body()], "constants": {"on": 0.2},
+             "hinge": [hinge(law={"effort": "where(t < on, 0, where(t < on + 0.001, 50, 0))"})]}  # fmt: skip
+    model = mstmm.compile(Scene.from_data(shown), engine="fused")
+    on = np.array([0.2, 0.31, 0.44, 0.2])
+    states = np.full((4, 1), 0.3), np.zeros((4, 1))
+    batch = model.simulate_batch(states, {"constants.on": on}, t_end=0.5, rtol=1e-6)
+    for i, one in enumerate(on):
+        alone = model.with_parameters({"constants.on": float(one)})
+        run = alone.simulate(0.5, rtol=1e-12, output_times=[0.5], initial=([0.3], [0.0]))
+        assert batch.q[i, -1] == pytest.approx(run.q[-1], abs=3e-7)
+
+
 def test_a_number_may_be_set_in_spite_of_its_constant() -> None:
     changed = mstmm.compile(rod()).with_parameters({"rod1.mass": 3.0})
     assert changed.parameters["rod1.mass"] == 3.0
